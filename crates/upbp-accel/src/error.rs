@@ -1,0 +1,56 @@
+//! What can be wrong with geometry that is handed in.
+
+/// Why a shape or a scene was refused.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GeometryError {
+    /// A parameter is NaN or infinite.
+    #[error("{what} is not finite")]
+    NonFinite {
+        /// The parameter.
+        what: &'static str,
+    },
+    /// An element of a list is NaN or infinite.
+    #[error("{what} {index} is not finite")]
+    NonFiniteElement {
+        /// The kind of element.
+        what: &'static str,
+        /// Its place in the list.
+        index: usize,
+    },
+    /// A shape encloses no volume or has no area.
+    #[error("{what} has no extent")]
+    Degenerate {
+        /// The kind of shape.
+        what: &'static str,
+    },
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {triangle} refers to vertex {vertex}, but there are {vertices}")]
+    IndexOutOfRange {
+        /// The triangle's place in the index list.
+        triangle: usize,
+        /// The offending index.
+        vertex: u32,
+        /// The number of positions.
+        vertices: usize,
+    },
+    /// A mesh has normals, but not one per position.
+    #[error("a mesh of {positions} positions has {normals} normals")]
+    NormalCount {
+        /// The number of positions.
+        positions: usize,
+        /// The number of normals.
+        normals: usize,
+    },
+    /// A scene has more primitives than 32-bit indices can address.
+    #[error("{count} primitives are more than can be indexed")]
+    TooManyPrimitives {
+        /// The number of primitives.
+        count: usize,
+    },
+}
+
+/// Passes `value` if all its components are finite.
+pub(crate) fn finite(value: glam::Vec3, what: &'static str) -> Result<glam::Vec3, GeometryError> {
+    if value.is_finite() { Ok(value) } else { Err(GeometryError::NonFinite { what }) }
+}

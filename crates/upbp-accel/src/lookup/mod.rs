@@ -1,0 +1,16 @@
+//! Where photons and beams are near a point or a ray.
+//!
+//! Both structures rest on one [packed tree](packed): items are sorted into blocks of eight, blocks into
+//! nodes of eight. The search radius belongs to the query, which widens the boxes that it tests.
+
+mod approach;
+mod packed;
+mod point_tree;
+mod probe;
+mod segment_tree;
+mod split;
+
+pub use approach::{ClosestApproach, PARALLEL_SIN2, Segment, closest_approach};
+pub use point_tree::PointTree;
+pub use segment_tree::SegmentTree;
+pub use split::SplitParams;

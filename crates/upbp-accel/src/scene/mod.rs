@@ -1,0 +1,191 @@
+//! All surfaces of a scene behind one hierarchy.
+
+mod bvh;
+mod primitive;
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+
+use self::bvh::Bvh;
+use self::primitive::Item;
+use crate::error::GeometryError;
+use crate::ray::Ray;
+use crate::shape::{AxisBox, Shape, Sphere};
+
+/// The place of a shape in the list that a [`SceneGeometry`] was built from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ShapeId(pub u32);
+
+/// An intersection of a ray with a surface, as the traversal finds it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Distance along the ray, scene units.
+    pub t: f32,
+    /// The shape that is met.
+    pub shape: ShapeId,
+    /// Which part of the shape: the triangle of a mesh, the face of a box (`2·axis`, plus one on the upper
+    /// side), 0 where a line enters a sphere and 1 where it leaves, 0 for a quad.
+    pub primitive: u32,
+    /// Where on a quad (`[0, 1]²`), or the weights of the second and third corner of a triangle. Zero
+    /// for spheres and boxes: see [`SurfacePoint::uv`].
+    pub uv: [f32; 2],
+}
+
+/// What a visitor of intersections wants next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Visit {
+    /// Go on.
+    Continue,
+    /// Go on, but only with intersections nearer than this distance. A greater distance than before has no
+    /// effect.
+    ShrinkTo(f32),
+    /// No more.
+    Stop,
+}
+
+/// Surface data at an intersection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// The point, recomputed on the surface and rounded once, whatever the distance that the ray came from.
+    pub position: Vec3,
+    /// Unit normal of the surface: outwards for closed shapes, by the winding for quads and triangles.
+    pub geometric_normal: Vec3,
+    /// Interpolated unit normal, in the hemisphere of the geometric one.
+    pub shading_normal: Vec3,
+    /// Azimuth and polar angle of a sphere around y, coordinates on a quad or on a box's face, all in
+    /// `[0, 1]`; weights of the second and third corner of a triangle.
+    pub uv: [f32; 2],
+}
+
+/// The shapes of a scene, ready for rays.
+#[derive(Clone, Debug)]
+pub struct SceneGeometry {
+    shapes: Vec<Shape>,
+    bvh: Bvh,
+    /// Primitives in the order of the hierarchy's leaves.
+    items: Vec<Item>,
+}
+
+impl SceneGeometry {
+    /// Builds the hierarchy over all primitives. No shapes at all are allowed.
+    pub fn build(shapes: Vec<Shape>) -> Result<Self, GeometryError> {
+        let items = primitive::collect(&shapes);
+        if u32::try_from(items.len()).is_err() || u32::try_from(shapes.len()).is_err() {
+            return Err(GeometryError::TooManyPrimitives { count: items.len().max(shapes.len()) });
+        }
+        let boxes: Vec<(Vec3, Vec3)> = items.iter().map(Item::aabb).collect();
+        let (bvh, order) = Bvh::build(&boxes);
+        let items = order.iter().map(|&index| items[index as usize]).collect();
+        Ok(Self { shapes, bvh, items })
+    }
+
+    /// The least and the greatest coordinates; both zero for an empty scene.
+    #[must_use]
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let each = self.shapes.iter().map(Shape::aabb);
+        each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((Vec3::ZERO, Vec3::ZERO))
+    }
+
+    /// A shape.
+    ///
+    /// # Panics
+    /// If `id` does not belong to this scene.
+    #[must_use]
+    pub fn shape(&self, id: ShapeId) -> &Shape {
+        &self.shapes[id.0 as usize]
+    }
+
+    /// All shapes; the place in the list is the [`ShapeId`].
+    #[must_use]
+    pub fn shapes(&self) -> &[Shape] {
+        &self.shapes
+    }
+
+    /// Calls `visit` for every intersection with `t` in the open interval `(t_min, t_max)`, in no particular
+    /// but always the same order. `t_min` must not be negative.
+    ///
+    /// Spheres and boxes report where the line enters and where it leaves. The visitor may shorten the ray
+    /// or stop.
+    pub fn for_each_hit(&self, ray: Ray, mut visit: impl FnMut(&Candidate) -> Visit) {
+        let probe = primitive::Probe::new(&ray);
+        self.bvh.traverse(&ray, |range, t_max| {
+            for item in &self.items[range] {
+                let hits = probe.intersect(item);
+                for candidate in hits.into_iter().flatten() {
+                    if !(candidate.t > ray.t_min && candidate.t < *t_max) {
+                        continue;
+                    }
+                    match visit(&candidate) {
+                        Visit::Continue => {}
+                        Visit::ShrinkTo(t) => *t_max = t_max.min(t),
+                        Visit::Stop => return ControlFlow::Break(()),
+                    }
+                }
+            }
+            ControlFlow::Continue(())
+        });
+    }
+
+    /// The nearest intersection in `(t_min, t_max)`.
+    #[must_use]
+    pub fn closest(&self, ray: Ray) -> Option<Candidate> {
+        let mut nearest = None;
+        self.for_each_hit(ray, |candidate| {
+            nearest = Some(*candidate);
+            Visit::ShrinkTo(candidate.t)
+        });
+        nearest
+    }
+
+    /// Whether there is any intersection in `(t_min, t_max)`.
+    #[must_use]
+    pub fn any(&self, ray: Ray) -> bool {
+        let mut found = false;
+        self.for_each_hit(ray, |_| {
+            found = true;
+            Visit::Stop
+        });
+        found
+    }
+
+    /// Surface data of an intersection of `ray` with this scene.
+    ///
+    /// # Panics
+    /// If the candidate does not belong to this scene.
+    #[must_use]
+    pub fn surface(&self, ray: &Ray, candidate: &Candidate) -> SurfacePoint {
+        let along = ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(candidate.t);
+        match self.shape(candidate.shape) {
+            Shape::Sphere(sphere) => {
+                let outwards = (along - sphere.centre().as_dvec3()).normalize();
+                let normal = outwards.as_vec3();
+                flat(sphere.on_surface(outwards), normal, Sphere::uv(normal))
+            }
+            Shape::Quad(quad) => {
+                let (position, normal) = quad.sample_area(candidate.uv);
+                flat(position, normal, candidate.uv)
+            }
+            Shape::Box(axis_box) => {
+                let position = axis_box.on_face(candidate.primitive, along.as_vec3());
+                let uv = axis_box.uv(candidate.primitive, position);
+                flat(position, AxisBox::face_normal(candidate.primitive), uv)
+            }
+            Shape::Mesh(mesh) => {
+                let [b, c] = candidate.uv;
+                let geometric_normal = mesh.geometric_normal(candidate.primitive);
+                SurfacePoint {
+                    position: mesh.point(candidate.primitive, b as f64, c as f64),
+                    geometric_normal,
+                    shading_normal: mesh.shading_normal(candidate.primitive, b, c, geometric_normal),
+                    uv: candidate.uv,
+                }
+            }
+        }
+    }
+}
+
+/// A point of a surface that is shaded as it is.
+fn flat(position: Vec3, normal: Vec3, uv: [f32; 2]) -> SurfacePoint {
+    SurfacePoint { position, geometric_normal: normal, shading_normal: normal, uv }
+}

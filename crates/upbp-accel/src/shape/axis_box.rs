@@ -1,0 +1,140 @@
+//! The box along the axes.
+
+use glam::Vec3;
+
+use crate::error::{GeometryError, finite};
+
+/// A box along the axes; its normals point outwards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisBox {
+    min: Vec3,
+    max: Vec3,
+}
+
+impl AxisBox {
+    /// The box between two corners; `min` must be less than `max` along every axis.
+    pub fn new(min: Vec3, max: Vec3) -> Result<Self, GeometryError> {
+        let min = finite(min, "the lower corner of a box")?;
+        let max = finite(max, "the upper corner of a box")?;
+        if min.cmplt(max).all() {
+            Ok(Self { min, max })
+        } else {
+            Err(GeometryError::Degenerate { what: "a box" })
+        }
+    }
+
+    /// The corner with the least coordinates.
+    #[must_use]
+    pub fn min(&self) -> Vec3 {
+        self.min
+    }
+
+    /// The corner with the greatest coordinates.
+    #[must_use]
+    pub fn max(&self) -> Vec3 {
+        self.max
+    }
+
+    /// Areas of one face across x, y and z.
+    fn face_areas(&self) -> Vec3 {
+        let size = self.max - self.min;
+        Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y)
+    }
+
+    /// Surface area, square scene units.
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        2.0 * self.face_areas().element_sum()
+    }
+
+    /// Volume, cubic scene units.
+    #[must_use]
+    pub fn volume(&self) -> f32 {
+        (self.max - self.min).element_product()
+    }
+
+    /// A point distributed uniformly over the surface, and its normal; `u` in `[0, 1)²`.
+    #[must_use]
+    pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        let areas = self.face_areas().to_array();
+        let mut remaining = u[0] * 2.0 * (areas[0] + areas[1] + areas[2]);
+        let mut face = 0;
+        while face < 5 && remaining >= areas[face / 2] {
+            remaining -= areas[face / 2];
+            face += 1;
+        }
+        // What is left of the random number inside the face is uniform again.
+        let first = (remaining / areas[face / 2]).clamp(0.0, 1.0);
+        let axis = face / 2;
+        let (min, max) = (self.min.to_array(), self.max.to_array());
+        let mut position = [0.0; 3];
+        position[axis] = if face % 2 == 0 { min[axis] } else { max[axis] };
+        for (other, u) in [((axis + 1) % 3, first), ((axis + 2) % 3, u[1])] {
+            position[other] = (min[other] + (max[other] - min[other]) * u).clamp(min[other], max[other]);
+        }
+        (position.into(), Self::face_normal(face as u32))
+    }
+
+    /// Whether `point` lies strictly inside.
+    #[must_use]
+    pub fn contains(&self, point: Vec3) -> bool {
+        self.min.cmplt(point).all() && point.cmplt(self.max).all()
+    }
+
+    /// The least and the greatest coordinates.
+    #[must_use]
+    pub fn aabb(&self) -> (Vec3, Vec3) {
+        (self.min, self.max)
+    }
+
+    /// Distance and face at which the line enters and leaves. A face is `2·axis`, plus one on the upper side.
+    pub(crate) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[(f64, u32); 2]> {
+        let (mut entry, mut exit) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
+        for axis in 0..3 {
+            let (o, d) = (f64::from(origin[axis]), f64::from(direction[axis]));
+            let (low, high) = (f64::from(self.min[axis]) - o, f64::from(self.max[axis]) - o);
+            if d == 0.0 {
+                // In a face's plane counts as inside: the other axes decide.
+                if low > 0.0 || high < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let face = 2 * axis as u32;
+            let (near, far) = if d > 0.0 {
+                ((low / d, face), (high / d, face + 1))
+            } else {
+                ((high / d, face + 1), (low / d, face))
+            };
+            if near.0 > entry.0 {
+                entry = near;
+            }
+            if far.0 < exit.0 {
+                exit = far;
+            }
+        }
+        (entry.0 <= exit.0).then_some([entry, exit])
+    }
+
+    /// The outward normal of a face.
+    pub(crate) fn face_normal(face: u32) -> Vec3 {
+        let mut normal = [0.0; 3];
+        normal[face as usize / 2] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
+        normal.into()
+    }
+
+    /// The point of the face nearest to `position`.
+    pub(crate) fn on_face(&self, face: u32, position: Vec3) -> Vec3 {
+        let axis = face as usize / 2;
+        let mut position = position.clamp(self.min, self.max);
+        position[axis] = if face.is_multiple_of(2) { self.min[axis] } else { self.max[axis] };
+        position
+    }
+
+    /// Where a point of a face lies along the other two axes, each mapped to `[0, 1]`.
+    pub(crate) fn uv(&self, face: u32, position: Vec3) -> [f32; 2] {
+        let relative = ((position - self.min) / (self.max - self.min)).clamp(Vec3::ZERO, Vec3::ONE);
+        let axis = face as usize / 2;
+        [relative[(axis + 1) % 3], relative[(axis + 2) % 3]]
+    }
+}

@@ -1,0 +1,127 @@
+//! The shapes that a scene is made of, validated once when they are made.
+
+mod axis_box;
+mod mesh;
+mod quad;
+mod sphere;
+mod triangle;
+
+pub use axis_box::AxisBox;
+use glam::Vec3;
+pub use mesh::TriangleMesh;
+pub use quad::Quad;
+pub use sphere::Sphere;
+pub(crate) use triangle::RayShear;
+
+/// One surface of a scene.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// A sphere.
+    Sphere(Sphere),
+    /// A parallelogram.
+    Quad(Quad),
+    /// A box along the axes.
+    Box(AxisBox),
+    /// Triangles.
+    Mesh(TriangleMesh),
+}
+
+impl Shape {
+    /// Surface area, square scene units.
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        match self {
+            Self::Sphere(sphere) => sphere.area(),
+            Self::Quad(quad) => quad.area(),
+            Self::Box(axis_box) => axis_box.area(),
+            Self::Mesh(mesh) => mesh.area(),
+        }
+    }
+
+    /// A point distributed uniformly over the surface, and the geometric normal there.
+    ///
+    /// `u` is uniform in `[0, 1)²`; the density is `1 / area()` per square scene unit.
+    #[must_use]
+    pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        match self {
+            Self::Sphere(sphere) => sphere.sample_area(u),
+            Self::Quad(quad) => quad.sample_area(u),
+            Self::Box(axis_box) => axis_box.sample_area(u),
+            Self::Mesh(mesh) => mesh.sample_area(u),
+        }
+    }
+
+    /// Whether the surface separates an inside from an outside.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        match self {
+            Self::Sphere(_) | Self::Box(_) => true,
+            Self::Quad(_) => false,
+            Self::Mesh(mesh) => mesh.is_closed(),
+        }
+    }
+
+    /// Whether `point` lies strictly inside; `None` for a shape that is not closed.
+    ///
+    /// Costs one test per triangle for a mesh.
+    #[must_use]
+    pub fn contains(&self, point: Vec3) -> Option<bool> {
+        match self {
+            Self::Sphere(sphere) => Some(sphere.contains(point)),
+            Self::Quad(_) => None,
+            Self::Box(axis_box) => Some(axis_box.contains(point)),
+            Self::Mesh(mesh) => mesh.contains(point),
+        }
+    }
+
+    /// The least and the greatest coordinates.
+    #[must_use]
+    pub fn aabb(&self) -> (Vec3, Vec3) {
+        match self {
+            Self::Sphere(sphere) => sphere.aabb(),
+            Self::Quad(quad) => quad.aabb(),
+            Self::Box(axis_box) => axis_box.aabb(),
+            Self::Mesh(mesh) => mesh.aabb(),
+        }
+    }
+
+    /// An upper bound of the enclosed volume, cubic scene units; zero for a shape that is not closed.
+    ///
+    /// Exact for spheres and boxes, the volume of the bounding box for meshes.
+    #[must_use]
+    pub fn volume_bound(&self) -> f32 {
+        match self {
+            Self::Sphere(sphere) => sphere.volume(),
+            Self::Box(axis_box) => axis_box.volume(),
+            Self::Mesh(mesh) if mesh.is_closed() => {
+                let (min, max) = mesh.aabb();
+                (max - min).element_product()
+            }
+            Self::Quad(_) | Self::Mesh(_) => 0.0,
+        }
+    }
+}
+
+impl From<Sphere> for Shape {
+    fn from(sphere: Sphere) -> Self {
+        Self::Sphere(sphere)
+    }
+}
+
+impl From<Quad> for Shape {
+    fn from(quad: Quad) -> Self {
+        Self::Quad(quad)
+    }
+}
+
+impl From<AxisBox> for Shape {
+    fn from(axis_box: AxisBox) -> Self {
+        Self::Box(axis_box)
+    }
+}
+
+impl From<TriangleMesh> for Shape {
+    fn from(mesh: TriangleMesh) -> Self {
+        Self::Mesh(mesh)
+    }
+}

@@ -1,0 +1,106 @@
+//! The parallelogram.
+
+use glam::{DVec3, Vec3};
+
+use crate::error::{GeometryError, finite};
+
+/// A parallelogram `origin + u·edge_u + v·edge_v` with `u` and `v` in `[0, 1]`.
+///
+/// Its normal is `edge_u × edge_v`, normalised.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quad {
+    origin: Vec3,
+    edge_u: Vec3,
+    edge_v: Vec3,
+    normal: Vec3,
+    area: f32,
+}
+
+impl Quad {
+    /// The parallelogram at `origin` with these edges, which must not be parallel.
+    pub fn new(origin: Vec3, edge_u: Vec3, edge_v: Vec3) -> Result<Self, GeometryError> {
+        let origin = finite(origin, "the origin of a quad")?;
+        let edge_u = finite(edge_u, "the first edge of a quad")?;
+        let edge_v = finite(edge_v, "the second edge of a quad")?;
+        // Double precision: the square of a small edge underflows in single precision.
+        let cross = edge_u.as_dvec3().cross(edge_v.as_dvec3());
+        let area = cross.length();
+        if area <= 1e-7 * edge_u.as_dvec3().length() * edge_v.as_dvec3().length() {
+            return Err(GeometryError::Degenerate { what: "a quad" });
+        }
+        Ok(Self { origin, edge_u, edge_v, normal: (cross / area).as_vec3(), area: area as f32 })
+    }
+
+    /// The corner with `u = v = 0`.
+    #[must_use]
+    pub fn origin(&self) -> Vec3 {
+        self.origin
+    }
+
+    /// The edge along which `u` grows.
+    #[must_use]
+    pub fn edge_u(&self) -> Vec3 {
+        self.edge_u
+    }
+
+    /// The edge along which `v` grows.
+    #[must_use]
+    pub fn edge_v(&self) -> Vec3 {
+        self.edge_v
+    }
+
+    /// The unit normal.
+    #[must_use]
+    pub fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
+    /// Surface area, square scene units.
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        self.area
+    }
+
+    /// A point distributed uniformly over the surface, and the normal; `u` in `[0, 1)²`.
+    #[must_use]
+    pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        let position = self.origin.as_dvec3()
+            + self.edge_u.as_dvec3() * u[0] as f64
+            + self.edge_v.as_dvec3() * u[1] as f64;
+        (position.as_vec3(), self.normal)
+    }
+
+    /// The least and the greatest coordinates, rounded outwards.
+    #[must_use]
+    pub fn aabb(&self) -> (Vec3, Vec3) {
+        let [u, v] = [self.edge_u, self.edge_v].map(Vec3::as_dvec3);
+        let origin = self.origin.as_dvec3();
+        let min = origin + u.min(v).min(u + v).min(DVec3::ZERO);
+        let max = origin + u.max(v).max(u + v).max(DVec3::ZERO);
+        (min.as_vec3().map(f32::next_down), max.as_vec3().map(f32::next_up))
+    }
+
+    /// Where the line meets the quad: the distance, and the coordinates on the quad.
+    ///
+    /// In double precision: what leaks between neighbours is then what their corners differ by.
+    pub(crate) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<(f64, [f32; 2])> {
+        let [edge_u, edge_v] = [self.edge_u, self.edge_v].map(Vec3::as_dvec3);
+        let direction = direction.as_dvec3();
+        let to_corner = self.origin.as_dvec3() - origin.as_dvec3();
+        let normal = edge_u.cross(edge_v);
+        let cosine = direction.dot(normal);
+        let height = to_corner.dot(normal);
+        // A ray that starts in the plane does not meet it.
+        let zero = 1e-26 * to_corner.length_squared() * normal.length_squared();
+        if cosine == 0.0 || height * height <= zero {
+            return None;
+        }
+        let t = height / cosine;
+        let from_corner = direction * t - to_corner;
+        let scale = normal.length_squared().recip();
+        let u = from_corner.cross(edge_v).dot(normal) * scale;
+        let v = edge_u.cross(from_corner).dot(normal) * scale;
+        let inside = (0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v);
+        inside.then_some((t, [u as f32, v as f32]))
+    }
+}

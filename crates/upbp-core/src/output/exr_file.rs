@@ -1,0 +1,87 @@
+//! One OpenEXR file with everything: the picture as `R`, `G`, `B`, layers as `bpt.R` and so on, the variance.
+//!
+//! One part with dotted channel names is what every viewer reads; all metadata is in one text attribute, because the
+//! encoder writes several in random order.
+
+use std::path::Path;
+
+use exr::prelude::*;
+use serde::Serialize;
+
+use super::write_whole;
+use crate::error::OutputError;
+use crate::film::{Film, Image as Picture};
+use crate::report::Report;
+use crate::settings::Settings;
+
+/// What an image file says of its origin, RON text in the attribute `upbp`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Metadata<'a> {
+    /// Name or hash of the scene.
+    pub scene: &'a str,
+    /// Settings of the render.
+    pub settings: &'a Settings,
+    /// What the render did.
+    pub report: &'a Report,
+}
+
+/// Writes the mean, the layers and the variance of a film, float32.
+///
+/// # Errors
+/// What the file system or the encoder says.
+pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::result::Result<(), OutputError> {
+    let fail = |reason: String| OutputError::Encode { path: path.to_owned(), reason };
+    let image = film.image();
+    let mut channels = SmallVec::<[AnyChannel<FlatSamples>; 4]>::new();
+    push(&mut channels, "", &image);
+    for layer in film.layers() {
+        if let Some(image) = film.layer(*layer) {
+            push(&mut channels, &format!("{}.", layer.name()), &image);
+        }
+    }
+    push(&mut channels, "variance.", &film.variance());
+
+    let size = (image.width as usize, image.height as usize);
+    let mut attributes = LayerAttributes::default();
+    let text = ron::to_string(metadata).map_err(|error| fail(error.to_string()))?;
+    attributes.other.insert(Text::from("upbp"), AttributeValue::Text(Text::from(text.as_str())));
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
+    let file = Image::from_layer(layer);
+    write_whole(path, |writer| {
+        file.write().to_buffered(writer).map_err(|error| fail(error.to_string()))
+    })
+}
+
+fn push(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, prefix: &str, image: &Picture) {
+    for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+        let samples = image.pixels.iter().map(|pixel| pixel[c]).collect();
+        let name = format!("{prefix}{name}");
+        channels.push(AnyChannel::new(Text::from(name.as_str()), FlatSamples::F32(samples)));
+    }
+}
+
+/// Reads the channels `R`, `G`, `B` of an image.
+///
+/// # Errors
+/// What the file system or the decoder says.
+pub fn read_exr(path: &Path) -> std::result::Result<Picture, OutputError> {
+    let image = read_first_rgba_layer_from_file(
+        path,
+        |size, _| Picture {
+            width: size.width() as u32,
+            height: size.height() as u32,
+            pixels: vec![[0.0; 3]; size.width() * size.height()],
+        },
+        |picture: &mut Picture, position, (r, g, b, _): (f32, f32, f32, f32)| {
+            let index = position.y() * picture.width as usize + position.x();
+            picture.pixels[index] = [r, g, b];
+        },
+    )
+    .map_err(|error| OutputError::Read { path: path.to_owned(), reason: error.to_string() })?;
+    Ok(image.layer_data.channel_data.pixels)
+}

@@ -1,0 +1,112 @@
+//! Kernel radii: where they start and how they shrink (`docs/theory.md`, section 5).
+
+use serde::{Deserialize, Serialize};
+use upbp_estimators::{Kernel, Kernels};
+
+/// The first radius of a kernel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum Radius {
+    /// From a pilot: as many photons in a kernel as smooth well, within bounds relative to the scene.
+    #[default]
+    Auto,
+    /// A fraction of the radius of the scene's bounding sphere.
+    Scene(f32),
+    /// In scene units.
+    Absolute(f32),
+}
+
+/// The first radius of each merge technique.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Radii {
+    /// Surface merging.
+    pub surf: Radius,
+    /// Photon points around points.
+    pub pp3d: Radius,
+    /// Photon points around query beams.
+    pub pb2d: Radius,
+    /// Photon beams around points.
+    pub bp2d: Radius,
+    /// Photon beams around query beams.
+    pub bb1d: Radius,
+}
+
+/// Radii over iterations: `r_i = r_0 (1 + i)^−γ`.
+///
+/// `γ = 1/(d + 4)` for a kernel of `d` dimensions balances variance and squared bias of what merges alone can find, and
+/// is consistent, since `0 < γ < 1/d` (section 5.1).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RadiusSchedule {
+    /// Radius of each technique in iteration 0, scene units; 0 where it is off.
+    pub surf: f32,
+    /// PP3D.
+    pub pp3d: f32,
+    /// PB2D.
+    pub pb2d: f32,
+    /// BP2D.
+    pub bp2d: f32,
+    /// BB1D.
+    pub bb1d: f32,
+    /// Whether radii shrink at all.
+    pub progressive: bool,
+    /// Radii do not fall below this, scene units: coordinates have no more digits.
+    pub floor: f32,
+}
+
+impl RadiusSchedule {
+    /// A radius in some iteration, for a kernel of `dimension` dimensions.
+    fn at(&self, first: f32, dimension: i32, iteration: u64) -> f32 {
+        if first <= 0.0 {
+            return 0.0;
+        }
+        let shrink = if self.progressive {
+            (1.0 + iteration as f64).powf(-1.0 / (f64::from(dimension) + 4.0))
+        } else {
+            1.0
+        };
+        ((f64::from(first) * shrink) as f32).max(self.floor)
+    }
+
+    /// The kernels of an iteration.
+    #[must_use]
+    pub fn kernels(&self, iteration: u64) -> Kernels {
+        let kernel = |first: f32, dimension: i32, make: fn(f32) -> Kernel| {
+            let radius = self.at(first, dimension, iteration);
+            if radius > 0.0 { make(radius) } else { Kernel::NONE }
+        };
+        Kernels {
+            surf: kernel(self.surf, 2, Kernel::disc),
+            pp3d: kernel(self.pp3d, 3, Kernel::ball),
+            pb2d: kernel(self.pb2d, 2, Kernel::parabolic_disc),
+            bp2d: kernel(self.bp2d, 2, Kernel::parabolic_disc),
+            bb1d: kernel(self.bb1d, 1, Kernel::parabolic_line),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radii_follow_the_optimal_exponents() {
+        let schedule = RadiusSchedule {
+            surf: 1.0,
+            pp3d: 1.0,
+            pb2d: 1.0,
+            bp2d: 0.0,
+            bb1d: 1.0,
+            progressive: true,
+            floor: 1e-6,
+        };
+        let last = schedule.kernels(999);
+        let slope = |radius: f32| f64::from(radius).ln() / 1000_f64.ln();
+        assert!((slope(last.surf.radius()) + 1.0 / 6.0).abs() < 1e-6);
+        assert!((slope(last.pp3d.radius()) + 1.0 / 7.0).abs() < 1e-6);
+        assert!((slope(last.pb2d.radius()) + 1.0 / 6.0).abs() < 1e-6);
+        assert!((slope(last.bb1d.radius()) + 1.0 / 5.0).abs() < 1e-6);
+        assert_eq!(last.bp2d, Kernel::NONE);
+        let fixed = RadiusSchedule { progressive: false, ..schedule };
+        assert_eq!(fixed.kernels(999), fixed.kernels(0));
+    }
+}

@@ -1,0 +1,179 @@
+//! What a user may choose, and its validation.
+
+use serde::{Deserialize, Serialize};
+use upbp_estimators::TechniqueSet;
+use upbp_estimators::mis::{BeamExtent, Heuristic};
+
+use crate::error::SettingsError;
+use crate::radius::{Radii, Radius};
+
+/// A number of light sub-paths per iteration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LightPaths {
+    /// As many as there are pixels, within the memory budget.
+    #[default]
+    Auto,
+    /// This many, within the memory budget.
+    Count(u32),
+}
+
+/// Settings of a render. All have defaults; a settings file names those that differ.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Techniques, as in `"bpt+surf+pp3d+pb2d+bb1d"`. Those that the scene cannot use are left out.
+    pub techniques: TechniqueSet,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Light sub-paths per iteration.
+    pub light_paths: LightPaths,
+    /// Light sub-paths that leave photon beams, `None` for 1 in 25.
+    pub beams: Option<u32>,
+    /// Light vertices that every camera vertex is connected to, `[1, 1000]`.
+    pub connections: u32,
+    /// Fewest edges of a path between light and camera, at least 1.
+    pub min_length: u32,
+    /// Most edges of a path, at least `min_length`.
+    pub max_length: u32,
+    /// End walks by local Russian roulette: by the albedo of surfaces and media.
+    pub roulette: bool,
+    /// Balance or power heuristic.
+    pub heuristic: Heuristic,
+    /// Extent of photon beams.
+    pub photon_beams: BeamExtent,
+    /// Extent of query beams.
+    pub query_beams: BeamExtent,
+    /// First kernel radii.
+    pub radii: Radii,
+    /// Whether radii shrink, so that the result converges.
+    pub progressive: bool,
+    /// Memory for light vertices, beams, look-up structures and the film, MiB.
+    pub memory: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            techniques: TechniqueSet::default(),
+            seed: 0,
+            light_paths: LightPaths::Auto,
+            beams: None,
+            connections: 1,
+            min_length: 1,
+            max_length: 1000,
+            roulette: true,
+            heuristic: Heuristic::Balance,
+            photon_beams: BeamExtent::Short,
+            query_beams: BeamExtent::Long,
+            radii: Radii::default(),
+            progressive: true,
+            memory: 2048,
+        }
+    }
+}
+
+/// Settings that passed [`Settings::validate`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct CheckedSettings(Settings);
+
+impl std::ops::Deref for CheckedSettings {
+    type Target = Settings;
+
+    fn deref(&self) -> &Settings {
+        &self.0
+    }
+}
+
+impl Settings {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range, with what was expected.
+    pub fn validate(self) -> Result<CheckedSettings, SettingsError> {
+        let refuse = |name, expected, found: String| Err(SettingsError { name, expected, found });
+        if self.techniques.is_empty() {
+            return refuse("techniques", "at least one technique", self.techniques.to_string());
+        }
+        if self.light_paths == LightPaths::Count(0) {
+            return refuse("light_paths", "at least 1", "0".into());
+        }
+        if self.beams == Some(0) {
+            return refuse("beams", "at least 1 (leave out bb1d and bp2d for none)", "0".into());
+        }
+        if !(1..=1000).contains(&self.connections) {
+            return refuse("connections", "1 to 1000", self.connections.to_string());
+        }
+        if self.min_length == 0 {
+            return refuse("min_length", "at least 1", "0".into());
+        }
+        if self.max_length < self.min_length {
+            return refuse(
+                "max_length",
+                "at least min_length",
+                format!("{} with min_length {}", self.max_length, self.min_length),
+            );
+        }
+        if self.memory == 0 {
+            return refuse("memory", "at least 1 MiB", "0".into());
+        }
+        for (name, radius) in [
+            ("radii.surf", self.radii.surf),
+            ("radii.pp3d", self.radii.pp3d),
+            ("radii.pb2d", self.radii.pb2d),
+            ("radii.bp2d", self.radii.bp2d),
+            ("radii.bb1d", self.radii.bb1d),
+        ] {
+            if let Radius::Scene(value) | Radius::Absolute(value) = radius
+                && !(value > 0.0 && value.is_finite())
+            {
+                return refuse(name, "a positive finite radius", value.to_string());
+            }
+        }
+        Ok(CheckedSettings(self))
+    }
+
+    /// Reads settings from RON text, such as `(techniques: "bpt", seed: 7)`.
+    ///
+    /// # Errors
+    /// Line, column and reason of what is not understood.
+    pub fn from_ron(text: &str) -> Result<Self, ron::error::SpannedError> {
+        ron::Options::default()
+            .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
+            .from_str(text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_valid_and_survives_ron() {
+        let settings = Settings::default();
+        let text = ron::to_string(&settings).unwrap();
+        assert_eq!(Settings::from_ron(&text).unwrap(), settings);
+        assert_eq!(Settings::from_ron("()").unwrap(), settings);
+        settings.validate().unwrap();
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let cases: [(&str, &str); 8] = [
+            ("(light_paths: Count(0))", "light_paths"),
+            ("(beams: 0)", "beams"),
+            ("(connections: 0)", "connections"),
+            ("(min_length: 0)", "min_length"),
+            ("(min_length: 5, max_length: 4)", "max_length"),
+            ("(memory: 0)", "memory"),
+            ("(radii: (pb2d: Absolute(0)))", "radii.pb2d"),
+            ("(radii: (surf: Scene(inf)))", "radii.surf"),
+        ];
+        for (text, name) in cases {
+            let error = Settings::from_ron(text).unwrap().validate().unwrap_err();
+            assert_eq!(error.name, name);
+        }
+        let error = Settings::from_ron("(\n  seed: 1,\n  radius: 2,\n)").unwrap_err();
+        assert_eq!(error.span.start.line, 3, "{error}");
+        assert!(Settings::from_ron("(techniques: \"bpt+beams\")").unwrap_err().to_string().contains("beams"));
+    }
+}

@@ -1,0 +1,49 @@
+//! Counts of what the walks did and of what they had to drop.
+
+use serde::Serialize;
+
+use crate::technique::Technique;
+
+/// Counters of one pass or of a whole render; they add up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counters {
+    /// Edges of light sub-paths.
+    pub light_edges: u64,
+    /// Edges of camera sub-paths.
+    pub camera_edges: u64,
+    /// Segments tested for visibility.
+    pub shadow_rays: u64,
+    /// Light sub-path vertices stored.
+    pub light_vertices: u64,
+    /// Photon beams stored.
+    pub photon_beams: u64,
+    /// Contributions of each technique, in the order of [`Technique::ALL`].
+    pub contributions: [u64; 9],
+    /// Contributions that were not finite or negative, and were dropped.
+    pub dropped: u64,
+    /// Walks that left a body without having entered it, or escaped while still inside one: geometry that is not
+    /// closed, or coincident to rounding. They are ended.
+    pub lost_walks: u64,
+}
+
+impl Counters {
+    /// Adds the counts of another pass.
+    pub fn add(&mut self, other: &Self) {
+        self.light_edges += other.light_edges;
+        self.camera_edges += other.camera_edges;
+        self.shadow_rays += other.shadow_rays;
+        self.light_vertices += other.light_vertices;
+        self.photon_beams += other.photon_beams;
+        for (sum, count) in self.contributions.iter_mut().zip(other.contributions) {
+            *sum += count;
+        }
+        self.dropped += other.dropped;
+        self.lost_walks += other.lost_walks;
+    }
+
+    /// Contributions of one technique.
+    #[must_use]
+    pub const fn contributions_of(&self, technique: Technique) -> u64 {
+        self.contributions[technique as usize]
+    }
+}

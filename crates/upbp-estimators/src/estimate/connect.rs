@@ -1,0 +1,134 @@
+//! Connections of a camera vertex to light vertices drawn from all of them.
+//!
+//! Drawing `M` of the `N_V` stored vertices instead of walking along one light sub-path keeps the cost of a camera vertex
+//! constant, however long light sub-paths are (`docs/theory.md`, section 6(m)).
+
+use crate::light_map::LightMap;
+use crate::mis::End;
+use crate::observer::{Joint, ObservedSample, Observer};
+use crate::random::Stream;
+use crate::scene::{Crossing, Scene, Walk};
+use crate::technique::Technique;
+use crate::walk::{Context, LightVertex, Output, QueryVertex, Site, Target, clear_edge, ray_origin};
+
+/// Connects `vertex` to as many light vertices as the plan says.
+pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    map: &LightMap<S::Bsdf>,
+    vertex: &QueryVertex<S::Bsdf>,
+    stream: &mut Stream,
+    crossings: &mut Vec<Crossing>,
+    out: &mut Output<'_, O>,
+) {
+    let plan = context.plan;
+    if plan.connections == 0 || map.vertices.is_empty() {
+        return;
+    }
+    let factor = map.vertices.len() as f64 / (f64::from(plan.connections) * f64::from(plan.light_paths));
+    for _ in 0..plan.connections {
+        let light = &map.vertices[stream.index(map.vertices.len())];
+        if plan.lengths.contain(vertex.depth + light.depth + 1) {
+            connect(context, vertex, light, factor, crossings, out);
+        }
+    }
+}
+
+fn connect<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    vertex: &QueryVertex<S::Bsdf>,
+    light: &LightVertex<S::Bsdf>,
+    factor: f64,
+    crossings: &mut Vec<Crossing>,
+    out: &mut Output<'_, O>,
+) {
+    let Context { world, plan } = *context;
+    let (scene, mis) = (world.scene, &plan.mis);
+    let between = light.position - vertex.position;
+    let distance = between.length();
+    let direction = between / distance;
+    if !direction.is_finite() {
+        return;
+    }
+    let Some(camera_side) = vertex.site.evaluate(
+        scene,
+        plan.roulette,
+        Walk::Camera,
+        vertex.position,
+        vertex.towards_camera,
+        direction,
+    ) else {
+        return;
+    };
+    let Some(light_side) = light.site.evaluate(
+        scene,
+        plan.roulette,
+        Walk::Light,
+        light.position,
+        light.towards_light,
+        -direction,
+    ) else {
+        return;
+    };
+    let scattering = camera_side.value * light_side.value;
+    if scattering.is_black() {
+        return;
+    }
+    out.counters.shadow_rays += 1;
+    let crosses = vertex.site.crosses(vertex.towards_camera, direction);
+    let stack = if crosses { &vertex.behind } else { &vertex.stack };
+    let origin = ray_origin(&vertex.site, vertex.position, direction);
+    let surface = match &light.site {
+        Site::Surface(surface) => Some((light.position, surface.geometric_normal)),
+        Site::Medium(_) => None,
+    };
+    let target = Target { direction, distance, surface };
+    let Some(density) = clear_edge(scene, stack, origin, &target, crossings) else { return };
+
+    let (near, far) = (vertex.site.in_medium(), light.site.in_medium());
+    let distance2 = f64::from(distance).powi(2);
+    // C_{s-1} and L_s: what each walk would have sampled instead of this connection.
+    let light_density = camera_side.rho_own * light_side.cos / distance2 * density.forward(far);
+    let camera_density = light_side.rho_own * camera_side.cos / distance2 * density.backward(near);
+    let c_at_camera_vertex =
+        if near { mis.distance_factor(Walk::Light, density.reach, density.backward(true)) } else { 0.0 };
+    let c_at_light_vertex =
+        if far { mis.distance_factor(Walk::Camera, density.reach, density.forward(true)) } else { 0.0 };
+    let camera_end = End {
+        merges: mis.merge_sum(
+            vertex.site.merge_site(camera_side.sin_theta),
+            Walk::Camera,
+            vertex.tip.c,
+            c_at_camera_vertex,
+        ),
+        before: vertex.tip.before(mis, camera_side.rho_opposite),
+    };
+    let light_end = End {
+        merges: mis.merge_sum(
+            light.site.merge_site(light_side.sin_theta),
+            Walk::Light,
+            light.tip.c,
+            c_at_light_vertex,
+        ),
+        before: light.tip.before(mis, light_side.rho_opposite),
+    };
+    let weight = mis.connect_weight(light_end, light_density, camera_end, camera_density);
+    let geometry = camera_side.cos * light_side.cos / distance2;
+    let value = vertex.throughput
+        * light.throughput
+        * scattering
+        * density.transmittance
+        * (geometry * factor) as f32;
+    if out.add(Technique::Connect, value, weight) {
+        out.observer.sample(&ObservedSample {
+            technique: Technique::Connect,
+            camera_depth: vertex.depth,
+            joint: Joint::Connect {
+                path: light.path,
+                light: (light.position, light.site, light.depth),
+                camera: (vertex.position, vertex.site),
+            },
+            weight,
+            value,
+        });
+    }
+}

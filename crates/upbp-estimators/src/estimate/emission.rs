@@ -1,0 +1,132 @@
+//! Light that a camera sub-path meets: emitters, environments, emitting media.
+
+use glam::Vec3;
+use upbp_media::{Medium, Spectrum};
+
+use crate::mis::Edge;
+use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
+use crate::scene::{Emitter, EmitterId, EmitterPoint, Hit, Scene, Walk};
+use crate::technique::Technique;
+use crate::walk::Context;
+use crate::walk::{Output, Passage, QueryEdge};
+
+/// Emission of media along the whole ray to the next surface, integrated in closed form.
+///
+/// No other technique starts a path in a medium, so the weight is one.
+pub(crate) fn emission_along<S: Scene, O>(
+    context: &Context<'_, S>,
+    passage: &Passage<S::Bsdf>,
+    edge: &QueryEdge,
+    out: &mut Output<'_, O>,
+) {
+    let Context { world, plan } = *context;
+    if plan.mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
+        return;
+    }
+    for span in &passage.spans {
+        let Some(medium) = span.medium else { continue };
+        let medium = &world.scene.media()[medium.0 as usize];
+        if medium.emits() {
+            let emitted = medium.emitted(&passage.segment(span, span.end));
+            out.add(Technique::Hit, edge.throughput * span.before.transmittance * emitted, 1.0);
+        }
+    }
+}
+
+/// The camera sub-path has hit a surface that may shine.
+#[expect(clippy::too_many_arguments, reason = "the state of one hit, used here only")]
+pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    hit: &Hit<S::Bsdf>,
+    direction: Vec3,
+    receiver: Vec3,
+    mis_edge: &Edge,
+    throughput: Spectrum,
+    edge: &QueryEdge,
+    out: &mut Output<'_, O>,
+) {
+    if let Some(emitter) = hit.emitter {
+        let point = EmitterPoint { position: hit.position, normal: hit.geometric_normal };
+        shine(context, emitter, &point, -direction, receiver, mis_edge, throughput, edge, out);
+    }
+}
+
+/// The camera sub-path has left the scene.
+pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    passage: &Passage<S::Bsdf>,
+    edge: &QueryEdge,
+    out: &mut Output<'_, O>,
+) {
+    let world = context.world;
+    if world.environments().is_empty() {
+        return;
+    }
+    let density = passage.density(world.scene);
+    let throughput = edge.throughput * density.transmittance / density.reach as f32;
+    if throughput.is_black() || !throughput.is_finite() {
+        return;
+    }
+    let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.pending.in_medium, false);
+    let away = world.bounds.centre + passage.direction * (2.0 * world.bounds.radius);
+    let point = EmitterPoint { position: away, normal: -passage.direction };
+    for &emitter in world.environments() {
+        shine(
+            context,
+            emitter,
+            &point,
+            -passage.direction,
+            passage.origin,
+            &mis_edge,
+            throughput,
+            edge,
+            out,
+        );
+    }
+}
+
+/// An emitter's light at the end of a camera sub-path.
+#[expect(clippy::too_many_arguments, reason = "the state of one hit, used here only")]
+fn shine<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    emitter: EmitterId,
+    point: &EmitterPoint,
+    direction: Vec3,
+    receiver: Vec3,
+    mis_edge: &Edge,
+    throughput: Spectrum,
+    edge: &QueryEdge,
+    out: &mut Output<'_, O>,
+) {
+    let Context { world, plan } = *context;
+    let mis = &plan.mis;
+    if mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
+        return;
+    }
+    let Some(light) = world.scene.emitters().get(emitter.0 as usize) else { return };
+    let Some(densities) = light.hit(&world.bounds, point, direction, receiver) else { return };
+    let weight = if edge.depth == 1 {
+        // Nothing else makes a path of one edge.
+        1.0
+    } else {
+        let probability = f64::from(world.emitter_probability(emitter));
+        // On arrival at a light the vertex before is connected by next event estimation.
+        let tip = edge.pending.arrive(mis, Walk::Camera, mis_edge, mis.nee);
+        mis.hit_weight(
+            &tip,
+            probability * f64::from(densities.pdf_incident),
+            probability * f64::from(densities.pdf_position),
+            f64::from(densities.pdf_direction),
+        )
+    };
+    let value = throughput * densities.radiance;
+    if out.add(Technique::Hit, value, weight) {
+        out.observer.sample(&ObservedSample {
+            technique: Technique::Hit,
+            camera_depth: edge.depth,
+            joint: Joint::Hit(LightEnd { emitter, point: *point, direction }),
+            weight,
+            value,
+        });
+    }
+}

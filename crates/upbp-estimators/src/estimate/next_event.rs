@@ -1,0 +1,107 @@
+//! Next event estimation: a camera vertex and a point chosen on a light.
+
+use crate::mis::End;
+use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
+use crate::random::Stream;
+use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
+use crate::technique::Technique;
+use crate::walk::{Context, MIN_COSINE, Output, QueryVertex, Target, clear_edge, ray_origin};
+
+/// Connects `vertex` to a light.
+pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    vertex: &QueryVertex<S::Bsdf>,
+    stream: &mut Stream,
+    crossings: &mut Vec<Crossing>,
+    out: &mut Output<'_, O>,
+) {
+    let Context { world, plan } = *context;
+    let mis = &plan.mis;
+    if mis.nee == 0.0 || !plan.lengths.contain(vertex.depth + 1) {
+        return;
+    }
+    let scene = world.scene;
+    let Some((emitter, probability)) = world.choose_emitter(stream.uniform()) else { return };
+    let light = &scene.emitters()[emitter.0 as usize];
+    let Some(incident) = light.sample_incident(&world.bounds, vertex.position, stream.pair()) else {
+        return;
+    };
+    let kind = light.kind();
+    let direction = incident.towards_light;
+    let cos_light = match kind {
+        EmitterKind::Area => -incident.point.normal.dot(direction),
+        _ => 1.0,
+    };
+    if !(cos_light >= MIN_COSINE && incident.pdf > 0.0) || incident.radiance.is_black() {
+        return;
+    }
+    let Some(scattering) = vertex.site.evaluate(
+        scene,
+        plan.roulette,
+        Walk::Camera,
+        vertex.position,
+        vertex.towards_camera,
+        direction,
+    ) else {
+        return;
+    };
+    if scattering.value.is_black() {
+        return;
+    }
+    out.counters.shadow_rays += 1;
+    let crosses = vertex.site.crosses(vertex.towards_camera, direction);
+    let origin = ray_origin(&vertex.site, vertex.position, direction);
+    let surface = (kind == EmitterKind::Area).then_some((incident.point.position, incident.point.normal));
+    let target = Target { direction, distance: incident.distance, surface };
+    let stack = if crosses { &vertex.behind } else { &vertex.stack };
+    let Some(density) = clear_edge(scene, stack, origin, &target, crossings) else { return };
+
+    let in_medium = vertex.site.in_medium();
+    let distance2 = if kind.is_infinite() { 1.0 } else { f64::from(incident.distance).powi(2) };
+    let probability = f64::from(probability);
+    let pdf = probability * f64::from(incident.pdf);
+    let geometry = f64::from(cos_light) * scattering.cos / distance2;
+
+    let hit_density = if kind.is_hittable() {
+        scattering.rho_own * f64::from(cos_light) / distance2 * density.forward(false)
+    } else {
+        0.0
+    };
+    let camera_density = f64::from(incident.pdf_direction) * scattering.cos / distance2
+        * density.backward(in_medium);
+    let c_light =
+        if in_medium { mis.distance_factor(Walk::Light, density.reach, density.backward(true)) } else { 0.0 };
+    let end = End {
+        merges: mis.merge_sum(
+            vertex.site.merge_site(scattering.sin_theta),
+            Walk::Camera,
+            vertex.tip.c,
+            c_light,
+        ),
+        before: vertex.tip.before(mis, scattering.rho_opposite),
+    };
+    let weight = mis.nee_weight(
+        pdf,
+        probability * f64::from(incident.pdf_position),
+        hit_density,
+        end,
+        camera_density,
+    );
+    let value = vertex.throughput
+        * scattering.value
+        * density.transmittance
+        * incident.radiance
+        * (geometry / pdf) as f32;
+    if out.add(Technique::Nee, value, weight) {
+        out.observer.sample(&ObservedSample {
+            technique: Technique::Nee,
+            camera_depth: vertex.depth,
+            joint: Joint::Nee {
+                light: LightEnd { emitter, point: incident.point, direction: -direction },
+                camera: (vertex.position, vertex.site),
+            },
+            weight,
+            value,
+        });
+    }
+}

@@ -1,0 +1,117 @@
+//! Smoothing kernels and the volumes with which they enter the weights (`docs/theory.md`, section 2).
+
+use std::f64::consts::PI;
+
+/// A radial kernel in one, two or three dimensions, normalised to integrate to one.
+///
+/// Points use constant kernels for the three-dimensional and the surface estimate, parabolic (Epanechnikov) ones
+/// where a beam takes part: there the kernel is evaluated along a line and its edge would show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kernel {
+    radius: f32,
+    /// Value at the centre.
+    peak: f32,
+    /// The value at distance `d` is `peak − slope d²`.
+    slope: f32,
+    /// `1 / ∫K²`, the volume that stands for the kernel in a weight.
+    effective_volume: f64,
+}
+
+impl Kernel {
+    /// Nothing is within reach: radius 0, of no effect in weights.
+    pub const NONE: Self = Self { radius: 0.0, peak: 0.0, slope: 0.0, effective_volume: 0.0 };
+
+    fn constant(radius: f32, volume: f64) -> Self {
+        Self { radius, peak: (1.0 / volume) as f32, slope: 0.0, effective_volume: volume }
+    }
+
+    /// Constant on a disc: surface merging.
+    #[must_use]
+    pub fn disc(radius: f32) -> Self {
+        Self::constant(radius, PI * f64::from(radius).powi(2))
+    }
+
+    /// Constant in a ball: PP3D.
+    #[must_use]
+    pub fn ball(radius: f32) -> Self {
+        Self::constant(radius, 4.0 / 3.0 * PI * f64::from(radius).powi(3))
+    }
+
+    /// `2/(πr²) (1 − u²/r²)`: PB2D and BP2D.
+    #[must_use]
+    pub fn parabolic_disc(radius: f32) -> Self {
+        let r = f64::from(radius);
+        let peak = 2.0 / (PI * r * r);
+        Self {
+            radius,
+            peak: peak as f32,
+            slope: (peak / (r * r)) as f32,
+            effective_volume: 0.75 * PI * r * r,
+        }
+    }
+
+    /// `3/(4r) (1 − u²/r²)`: BB1D.
+    #[must_use]
+    pub fn parabolic_line(radius: f32) -> Self {
+        let r = f64::from(radius);
+        let peak = 0.75 / r;
+        Self {
+            radius,
+            peak: peak as f32,
+            slope: (peak / (r * r)) as f32,
+            effective_volume: 5.0 / 3.0 * r,
+        }
+    }
+
+    /// The kernel's radius, scene units.
+    #[must_use]
+    pub const fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    /// `V_K = 1/∫K²`, scene units to the power of the dimension.
+    #[must_use]
+    pub const fn effective_volume(&self) -> f64 {
+        self.effective_volume
+    }
+
+    /// Value at a squared distance below `radius²`.
+    #[must_use]
+    pub fn value(&self, distance_squared: f32) -> f32 {
+        (self.peak - self.slope * distance_squared).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ∫ K^power over `dimension` dimensions by the midpoint rule.
+    fn integral(kernel: &Kernel, dimension: i32, power: i32) -> f64 {
+        let shell = [2.0, 2.0 * PI, 4.0 * PI][dimension as usize - 1];
+        let steps = 20_000;
+        let dr = f64::from(kernel.radius) / f64::from(steps);
+        (0..steps)
+            .map(|i| {
+                let r = (f64::from(i) + 0.5) * dr;
+                shell * r.powi(dimension - 1) * f64::from(kernel.value((r * r) as f32)).powi(power) * dr
+            })
+            .sum()
+    }
+
+    #[test]
+    fn kernels_integrate_to_one_and_their_squares_to_the_inverse_volume() {
+        for radius in [1e-3_f32, 0.7, 30.0] {
+            for (kernel, dimension) in [
+                (Kernel::disc(radius), 2),
+                (Kernel::ball(radius), 3),
+                (Kernel::parabolic_disc(radius), 2),
+                (Kernel::parabolic_line(radius), 1),
+            ] {
+                assert!((integral(&kernel, dimension, 1) - 1.0).abs() < 1e-5, "{kernel:?}");
+                let volume = 1.0 / integral(&kernel, dimension, 2);
+                assert!((volume / kernel.effective_volume() - 1.0).abs() < 1e-5, "{kernel:?}: {volume}");
+            }
+        }
+    }
+}

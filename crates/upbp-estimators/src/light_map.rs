@@ -1,0 +1,69 @@
+//! What all light sub-paths of an iteration left, ready to be looked up.
+
+use upbp_accel::{PointTree, SegmentTree, SplitParams};
+
+use crate::mis::VolumeMerges;
+use crate::plan::Plan;
+use crate::walk::{LightVertex, PhotonBeam, Site};
+
+/// Light vertices and photon beams with their look-up structures.
+pub struct LightMap<B> {
+    /// All vertices that can be connected or merged.
+    pub vertices: Vec<LightVertex<B>>,
+    /// All photon beams.
+    pub beams: Vec<PhotonBeam>,
+    /// Surface photons; the payload is an index into `vertices`.
+    pub(crate) surface: PointTree<u32>,
+    /// Photons in media.
+    pub(crate) medium: PointTree<u32>,
+    /// Photon beams; the payload is an index into `beams`.
+    pub(crate) beam_tree: SegmentTree<u32>,
+}
+
+impl<B: Copy + Send + Sync> LightMap<B> {
+    /// Builds the structures that the plan queries, and no others.
+    #[must_use]
+    pub fn build(plan: &Plan, vertices: Vec<LightVertex<B>>, beams: Vec<PhotonBeam>) -> Self {
+        let photons = |on: bool, keep: fn(&Site<B>) -> bool| {
+            let chosen = vertices.iter().enumerate().filter(|(_, v)| on && keep(&v.site));
+            PointTree::build(chosen.map(|(i, v)| (v.position, i as u32)).collect())
+        };
+        let surface = photons(plan.mis.surf > 0.0, |site| matches!(site, Site::Surface(_)));
+        let medium = photons(plan.stores_medium_photons(), |site| matches!(site, Site::Medium(_)));
+        let segments = beams.iter().enumerate().map(|(i, b)| (b.segment, i as u32)).collect();
+        let beam_tree = SegmentTree::build(segments, SplitParams::default());
+        Self { vertices, beams, surface, medium, beam_tree }
+    }
+
+    /// A map without anything.
+    #[must_use]
+    pub fn empty() -> Self {
+        Self {
+            vertices: Vec::new(),
+            beams: Vec::new(),
+            surface: PointTree::build(Vec::new()),
+            medium: PointTree::build(Vec::new()),
+            beam_tree: SegmentTree::build(Vec::new(), SplitParams::default()),
+        }
+    }
+
+    /// Bytes that the map occupies.
+    #[must_use]
+    pub fn memory_bytes(&self) -> usize {
+        self.vertices.capacity() * size_of::<LightVertex<B>>()
+            + self.beams.capacity() * size_of::<PhotonBeam>()
+            + self.surface.memory_bytes()
+            + self.medium.memory_bytes()
+            + self.beam_tree.memory_bytes()
+    }
+}
+
+/// Whether photon points of a medium are looked up along query beams.
+pub(crate) fn queries_points(merges: &VolumeMerges) -> bool {
+    merges.pb2d > 0.0
+}
+
+/// Whether photon beams of a medium are looked up along query beams.
+pub(crate) fn queries_beams(merges: &VolumeMerges) -> bool {
+    merges.bb1d > 0.0
+}

@@ -1,0 +1,18 @@
+//! Extended multiple importance sampling: weights across estimators of different dimension.
+//!
+//! The balance heuristic over all techniques that can produce a path, where a merge counts with
+//! `n · V_K · (distance factors) · (densities of both sub-paths)`: `docs/theory.md`, sections 3 and 4. A sub-path vertex
+//! carries two numbers ([`Tip`]) from which the weight of any technique that ends there follows in constant time;
+//! [`oracle`] enumerates the same weights the slow, obvious way, and the tests hold one to the other.
+
+pub mod oracle;
+mod plan;
+mod recursion;
+mod weights;
+
+pub use plan::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
+pub use recursion::{Edge, MergeSite, Pending, Tip};
+pub use weights::End;
+
+/// Below this `sin²θ` two beams count as parallel: BB1D neither contributes nor counts in weights.
+pub const PARALLEL_SIN2: f64 = upbp_accel::PARALLEL_SIN2 as f64;

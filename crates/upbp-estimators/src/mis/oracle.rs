@@ -1,0 +1,192 @@
+//! The weights by enumeration: slow, obvious, the oracle of the recursion (`docs/theory.md`, sections 1.2, 2.1 and 3.3).
+//!
+//! A path is described whole, every density of both walks at every vertex and edge; the effective density of each
+//! technique is a product over the path, taken in logarithms. Nothing is shared with the recursion but the
+//! constants of the [`MisPlan`].
+
+use upbp_media::MediumId;
+
+use super::plan::{BeamExtent, Heuristic, MisPlan};
+use super::PARALLEL_SIN2;
+
+/// What a vertex is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VertexKind {
+    /// The light end or the camera end.
+    End,
+    /// A surface vertex that can be connected and merged.
+    Surface,
+    /// A medium vertex.
+    Medium(MediumId),
+    /// A surface vertex where a Dirac lobe scatters.
+    Delta,
+}
+
+/// A vertex of a path; index 0 is on the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathVertex {
+    /// What it is.
+    pub kind: VertexKind,
+    /// `ρL_i`: solid-angle density (Dirac: probability) of the light walk towards the camera's side, roulette included.
+    pub rho_light: f64,
+    /// `ρC_i`: the same of the camera walk towards the light's side.
+    pub rho_camera: f64,
+    /// `χ_i` towards the light's side; 1 in media.
+    pub cos_light: f64,
+    /// `χ_i` towards the camera's side; 1 in media.
+    pub cos_camera: f64,
+    /// Sine of the angle between the two lines at a medium vertex.
+    pub sin_theta: f64,
+}
+
+/// The edge between vertices `i` and `i + 1`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathEdge {
+    /// Distance in scene units, infinite for an infinite emitter.
+    pub distance: f64,
+    /// `tL_{i+1}`: density of the light walk stopping at the camera-side vertex.
+    pub t_light: f64,
+    /// `tC_i`: density of the camera walk stopping at the light-side vertex.
+    pub t_camera: f64,
+    /// Probability to pass the edge.
+    pub reach: f64,
+}
+
+/// A whole path with `edges.len() + 1` vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Path {
+    /// Vertices from the light to the camera.
+    pub vertices: Vec<PathVertex>,
+    /// Edges from the light to the camera.
+    pub edges: Vec<PathEdge>,
+    /// `L_0`, with the choice of the emitter.
+    pub pdf_position: f64,
+    /// `p_nee(x_0 | x_1)`, with the choice of the emitter.
+    pub pdf_incident: f64,
+    /// Whether the emitter can be hit.
+    pub hittable: bool,
+}
+
+/// One technique applied to one place of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Strategy {
+    /// The camera sub-path makes all vertices.
+    Hit,
+    /// Next event at vertex 1.
+    Nee,
+    /// A connection of vertices `s − 1` and `s`.
+    Connect(usize),
+    /// The light sub-path makes all vertices but the camera.
+    LightTracing,
+    /// Surface merging at a vertex.
+    Surf(usize),
+    /// PP3D at a vertex.
+    Pp3d(usize),
+    /// PB2D at a vertex.
+    Pb2d(usize),
+    /// BP2D at a vertex.
+    Bp2d(usize),
+    /// BB1D at a vertex.
+    Bb1d(usize),
+}
+
+impl Path {
+    /// Number of edges.
+    #[must_use]
+    pub fn length(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// `L_i`, i ≥ 1: density of vertex `i` as the light walk makes it.
+    fn light_density(&self, i: usize) -> f64 {
+        let edge = &self.edges[i - 1];
+        let d2 = if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 };
+        self.vertices[i - 1].rho_light * self.vertices[i].cos_light / d2 * edge.t_light
+    }
+
+    /// `C_i`, i ≤ k − 1: density of vertex `i` as the camera walk makes it.
+    fn camera_density(&self, i: usize) -> f64 {
+        let edge = &self.edges[i];
+        let d2 = if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 };
+        self.vertices[i + 1].rho_camera * self.vertices[i].cos_camera / d2 * edge.t_camera
+    }
+
+    /// The weights of all strategies that the plan runs and that can make this path; they sum to one.
+    #[must_use]
+    pub fn weights(&self, plan: &MisPlan) -> Vec<(Strategy, f64)> {
+        let k = self.length();
+        let ok = |i: usize| matches!(self.vertices[i].kind, VertexKind::Surface | VertexKind::Medium(_));
+        let log = |x: f64| if x > 0.0 { x.ln() } else { f64::NEG_INFINITY };
+
+        // A[s] = Σ_{i<s} ln L_i,  B[s] = Σ_{i≥s} ln C_i; the camera end has density 1.
+        let mut light = vec![0.0; k + 1];
+        light[1] = log(self.pdf_position);
+        for s in 2..=k {
+            light[s] = light[s - 1] + log(self.light_density(s - 1));
+        }
+        let mut camera = vec![0.0; k + 1];
+        for s in (0..k).rev() {
+            camera[s] = camera[s + 1] + log(self.camera_density(s));
+        }
+
+        let mut densities = Vec::new();
+        let mut push = |strategy, count: f64, log_density: f64| {
+            if count > 0.0 && log_density > f64::NEG_INFINITY {
+                densities.push((strategy, count.ln() + log_density));
+            }
+        };
+        if self.hittable {
+            push(Strategy::Hit, plan.hit, camera[0]);
+        }
+        if k >= 2 {
+            if ok(1) {
+                push(Strategy::Nee, plan.nee, log(self.pdf_incident) + camera[1]);
+            }
+            for s in 2..k {
+                if ok(s - 1) && ok(s) {
+                    push(Strategy::Connect(s), plan.connect, light[s] + camera[s]);
+                }
+            }
+            if ok(k - 1) {
+                push(Strategy::LightTracing, plan.light_tracing, light[k] + camera[k]);
+            }
+        }
+        for i in 1..k {
+            let both = light[i] + log(self.light_density(i)) + camera[i];
+            match self.vertices[i].kind {
+                VertexKind::Surface => push(Strategy::Surf(i), plan.surf, both),
+                VertexKind::Medium(medium) => {
+                    let v = plan.merges_in(medium);
+                    let factor = |extent, reach: f64, t: f64| match extent {
+                        BeamExtent::Short => reach / t,
+                        BeamExtent::Long => 1.0 / t,
+                    };
+                    let c_light =
+                        factor(plan.photon_beams, self.edges[i - 1].reach, self.edges[i - 1].t_light);
+                    let c_camera = factor(plan.query_beams, self.edges[i].reach, self.edges[i].t_camera);
+                    let sin = self.vertices[i].sin_theta;
+                    let sin = if sin * sin < PARALLEL_SIN2 { 0.0 } else { sin };
+                    push(Strategy::Pp3d(i), v.pp3d, both);
+                    push(Strategy::Pb2d(i), v.pb2d, both + log(c_camera));
+                    push(Strategy::Bp2d(i), v.bp2d, both + log(c_light));
+                    push(Strategy::Bb1d(i), v.bb1d, both + log(c_light) + log(c_camera) + log(sin));
+                }
+                VertexKind::End | VertexKind::Delta => {}
+            }
+        }
+
+        let exponent = match plan.heuristic {
+            Heuristic::Balance => 1.0,
+            Heuristic::Power => 2.0,
+        };
+        let largest = densities.iter().map(|d| d.1).fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = densities.iter().map(|d| (exponent * (d.1 - largest)).exp()).sum();
+        densities.into_iter().map(|(s, q)| (s, (exponent * (q - largest)).exp() / total)).collect()
+    }
+
+    /// The weight of one strategy, 0 if it cannot make the path.
+    #[must_use]
+    pub fn weight(&self, plan: &MisPlan, strategy: Strategy) -> f64 {
+        self.weights(plan).into_iter().find(|(s, _)| *s == strategy).map_or(0.0, |(_, w)| w)
+    }
+}

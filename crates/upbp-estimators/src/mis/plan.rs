@@ -1,0 +1,145 @@
+//! The constants of one iteration that enter weights.
+
+use serde::{Deserialize, Serialize};
+use upbp_media::MediumId;
+
+use super::PARALLEL_SIN2;
+use super::recursion::MergeSite;
+use crate::scene::Walk;
+
+/// How the densities of techniques are turned into weights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Heuristic {
+    /// In proportion to the densities.
+    #[default]
+    Balance,
+    /// In proportion to their squares.
+    Power,
+}
+
+/// How far beams reach (`docs/theory.md`, section 2.6).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum BeamExtent {
+    /// To the distance that the walk sampled.
+    Short,
+    /// To the next surface.
+    Long,
+}
+
+/// Samples times kernel volume of the merges in one medium; zero for what is off there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VolumeMerges {
+    /// `n V_3`, photon points around points.
+    pub pp3d: f64,
+    /// `n V_2`, photon points around query beams.
+    pub pb2d: f64,
+    /// `n V_2`, photon beams around points.
+    pub bp2d: f64,
+    /// `n V_1`, photon beams around query beams.
+    pub bb1d: f64,
+}
+
+/// Sample counts and kernel volumes of one iteration.
+///
+/// Counts are relative to one camera sub-path. A technique that does not run has count zero. The same predicate that
+/// zeroes a count must decide whether the technique runs, else weights do not sum to one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MisPlan {
+    /// Balance or power heuristic.
+    pub heuristic: Heuristic,
+    /// Emission hits: 0 or 1.
+    pub hit: f64,
+    /// Light samples per camera vertex.
+    pub nee: f64,
+    /// Expected number of times that a pair of vertices is connected.
+    pub connect: f64,
+    /// Light sub-paths that are connected to the camera.
+    pub light_tracing: f64,
+    /// `n V_2` of surface merging.
+    pub surf: f64,
+    /// Merges in each medium, by [`MediumId`].
+    pub volume: Vec<VolumeMerges>,
+    /// Extent of photon beams.
+    pub photon_beams: BeamExtent,
+    /// Extent of query beams.
+    pub query_beams: BeamExtent,
+}
+
+impl MisPlan {
+    /// A quantity that is proportional to a density, as the heuristic takes it.
+    #[inline]
+    #[must_use]
+    pub fn pow(&self, q: f64) -> f64 {
+        match self.heuristic {
+            Heuristic::Balance => q,
+            Heuristic::Power => q * q,
+        }
+    }
+
+    /// The merges in a medium; none in one that the plan does not know.
+    #[inline]
+    #[must_use]
+    pub fn merges_in(&self, medium: MediumId) -> VolumeMerges {
+        self.volume.get(medium.0 as usize).copied().unwrap_or_default()
+    }
+
+    /// Extent of the beams of a walk: photon beams on the light's side, query beams on the camera's.
+    #[inline]
+    #[must_use]
+    pub const fn extent(&self, walk: Walk) -> BeamExtent {
+        match walk {
+            Walk::Light => self.photon_beams,
+            Walk::Camera => self.query_beams,
+        }
+    }
+
+    /// The distance factor `c` of a medium vertex: `R/t` for short beams, `1/t` for long ones (section 1.3).
+    #[inline]
+    #[must_use]
+    pub fn distance_factor(&self, walk: Walk, reach: f64, t: f64) -> f64 {
+        match self.extent(walk) {
+            BeamExtent::Short => reach / t,
+            BeamExtent::Long => 1.0 / t,
+        }
+    }
+
+    /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1).
+    #[inline]
+    #[must_use]
+    pub fn volume_factors(&self, medium: MediumId, c_light: f64, c_camera: f64, sin_theta: f64) -> VolumeMerges {
+        let v = self.merges_in(medium);
+        let sin_theta = if sin_theta * sin_theta < PARALLEL_SIN2 { 0.0 } else { sin_theta };
+        VolumeMerges {
+            pp3d: self.pow(v.pp3d),
+            pb2d: self.pow(v.pb2d * c_camera),
+            bp2d: self.pow(v.bp2d * c_light),
+            bb1d: self.pow(v.bb1d * c_light * c_camera * sin_theta),
+        }
+    }
+
+    /// `F_i`: the sum of the merge factors at a vertex (section 4.1).
+    #[inline]
+    #[must_use]
+    pub fn merge_sum(&self, site: MergeSite, walk: Walk, c_own: f64, c_opposite: f64) -> f64 {
+        match site {
+            MergeSite::None => 0.0,
+            MergeSite::Surface => self.pow(self.surf),
+            MergeSite::Medium { medium, sin_theta } => {
+                let (c_light, c_camera) = match walk {
+                    Walk::Light => (c_own, c_opposite),
+                    Walk::Camera => (c_opposite, c_own),
+                };
+                self.volume_factors(medium, c_light, c_camera, sin_theta).sum()
+            }
+        }
+    }
+}
+
+impl VolumeMerges {
+    /// The sum of all four.
+    #[inline]
+    #[must_use]
+    pub fn sum(&self) -> f64 {
+        self.pp3d + self.pb2d + self.bp2d + self.bb1d
+    }
+}

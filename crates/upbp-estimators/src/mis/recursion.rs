@@ -1,0 +1,184 @@
+//! Two numbers per vertex instead of a walk over the path (`docs/theory.md`, sections 4.1 to 4.6).
+//!
+//! For a sub-path that ends at `u_i`, let `B_i` be the sum of the densities of all techniques that split the path
+//! before `u_i`, relative to the density of "the sub-path ends at `u_i`". It is linear in the one unknown, the density
+//! ρ′ with which the other side's walk would scatter at `u_i`: `B_i = D_i + ρ′ E_i`. A vertex carries `D` and `E`.
+//! The same recursion serves both walks. Oracle: [`super::oracle`].
+
+use upbp_media::{EdgeDensity, MediumId};
+
+use super::plan::{BeamExtent, MisPlan};
+use crate::scene::Walk;
+
+/// What a sub-path knows of all its techniques on arrival at a vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tip {
+    /// `D_i`: connecting to this vertex from the one before.
+    pub connect: f64,
+    /// `E_i`: everything below the vertex before, per opposite scattering density.
+    pub below: f64,
+    /// The distance factor of the arriving edge in a medium; 0 on surfaces.
+    pub c: f64,
+}
+
+impl Tip {
+    /// `B_i = D_i + ρ′ E_i` for the opposite scattering density `ρ′`, roulette included, sr⁻¹.
+    #[inline]
+    #[must_use]
+    pub fn before(&self, plan: &MisPlan, rho_opposite: f64) -> f64 {
+        // A branch instead of 0 · ∞ where the other walk cannot scatter this way.
+        if rho_opposite > 0.0 { self.connect + plan.pow(rho_opposite) * self.below } else { self.connect }
+    }
+}
+
+/// Which merges are possible at a vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MergeSite {
+    /// None: an end of the path, or a Dirac lobe.
+    None,
+    /// Surface merging.
+    Surface,
+    /// The merges of a medium.
+    Medium {
+        /// The medium.
+        medium: MediumId,
+        /// Sine of the angle between the incoming and the outgoing line.
+        sin_theta: f64,
+    },
+}
+
+/// A vertex that has scattered: what it passes on to the next vertex, whose distance is not known yet.
+///
+/// Kept as it is with photon and query beams, whose vertices appear anywhere along them (section 4.5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pending {
+    /// `B_i`, as the heuristic takes it.
+    pub before: f64,
+    /// Own scattering density towards the next vertex: sr⁻¹, a probability for a Dirac lobe, per area for infinite lights.
+    pub rho: f64,
+    /// The cosine factor of the outgoing direction; 1 in media and at points.
+    pub cos_out: f64,
+    /// Which merges the vertex takes part in.
+    pub site: MergeSite,
+    /// Distance factor of the edge that arrived at it.
+    pub c: f64,
+    /// Whether the vertex can be connected to the next one.
+    pub connectible: bool,
+    /// Whether it lies in a medium, so that a walk of the other side stops there by a sampled distance.
+    pub in_medium: bool,
+}
+
+impl Pending {
+    /// The light end of a light sub-path (section 4.2). `hit` is the count of emission hits, 0 if the emitter
+    /// cannot be hit; `pdf_position` and `pdf_direction` are `L_0` and `ρL_0`.
+    #[must_use]
+    pub fn at_light(plan: &MisPlan, hittable: bool, cos_out: f64, pdf_position: f64, pdf_direction: f64) -> Self {
+        let hit = if hittable { plan.hit } else { 0.0 };
+        Self {
+            before: plan.pow(hit / pdf_position),
+            rho: pdf_direction,
+            cos_out,
+            site: MergeSite::None,
+            c: 0.0,
+            connectible: true,
+            in_medium: false,
+        }
+    }
+
+    /// The camera end of a camera sub-path; `pdf` is the density of the camera ray, sr⁻¹ per pixel.
+    #[must_use]
+    pub fn at_camera(pdf: f64) -> Self {
+        Self {
+            before: 0.0,
+            rho: pdf,
+            cos_out: 1.0,
+            site: MergeSite::None,
+            c: 0.0,
+            connectible: true,
+            in_medium: false,
+        }
+    }
+
+    /// One step (section 4.3): the tip of the next vertex. `connections` is the number of samples that connect the
+    /// two vertices: of connections in general, of next events (times `p_nee/L_0`) on a light sub-path's first edge or
+    /// at a camera sub-path's vertex on a light, of light tracing on a camera sub-path's first edge; 0 if the new
+    /// vertex cannot be connected.
+    #[inline]
+    #[must_use]
+    pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: f64) -> Tip {
+        let inverse = 1.0 / (self.rho * edge.cos_in * edge.forward);
+        let below = if edge.backward > 0.0 {
+            let c_opposite = if self.in_medium {
+                match walk {
+                    Walk::Light => plan.distance_factor(Walk::Camera, edge.reach, edge.backward),
+                    Walk::Camera => plan.distance_factor(Walk::Light, edge.reach, edge.backward),
+                }
+            } else {
+                0.0
+            };
+            let merges = plan.merge_sum(self.site, walk, self.c, c_opposite);
+            plan.pow(inverse * self.cos_out * edge.backward) * (merges + self.before)
+        } else {
+            0.0
+        };
+        let connect = if self.connectible && connections > 0.0 {
+            plan.pow(connections * inverse * edge.distance_squared)
+        } else {
+            0.0
+        };
+        let c = if edge.ends_in_medium { plan.distance_factor(walk, edge.reach, edge.forward) } else { 0.0 };
+        Tip { connect, below, c }
+    }
+}
+
+/// An edge between two vertices, walked from the first to the second (section 1.3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Squared distance in scene units; 1 from or to an infinite emitter, whose densities are per solid angle.
+    pub distance_squared: f64,
+    /// The cosine factor at the second vertex; 1 in media and towards infinity.
+    pub cos_in: f64,
+    /// Distance density `t` of the walk that stops at the second vertex.
+    pub forward: f64,
+    /// Distance density `t′` of the other walk, which stops at the first.
+    pub backward: f64,
+    /// Probability `R` that a walk passes the whole edge; the same in both directions.
+    pub reach: f64,
+    /// Whether the second vertex lies in a medium.
+    pub ends_in_medium: bool,
+}
+
+impl Edge {
+    /// An edge from what its segments accumulated.
+    #[inline]
+    #[must_use]
+    pub fn new(
+        density: &EdgeDensity,
+        distance: f64,
+        cos_in: f64,
+        starts_in_medium: bool,
+        ends_in_medium: bool,
+    ) -> Self {
+        Self {
+            distance_squared: if distance.is_finite() { distance * distance } else { 1.0 },
+            cos_in,
+            forward: density.forward(ends_in_medium),
+            backward: density.backward(starts_in_medium),
+            reach: density.reach,
+            ends_in_medium,
+        }
+    }
+}
+
+/// Throughput of a beam at a point of it: `T/R` inside a short beam, `T` on a long one.
+impl BeamExtent {
+    /// The divisor of the transmittance: the probability that the beam gets there at all.
+    #[inline]
+    #[must_use]
+    pub const fn normalisation(self, reach: f64) -> f64 {
+        match self {
+            Self::Short => reach,
+            Self::Long => 1.0,
+        }
+    }
+}

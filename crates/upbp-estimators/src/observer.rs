@@ -1,0 +1,121 @@
+//! A view into the walks for tests: every vertex, every accepted sample with its weight.
+
+use glam::Vec3;
+use upbp_media::Spectrum;
+
+use crate::scene::{EmitterId, EmitterPoint};
+use crate::technique::Technique;
+use crate::walk::Site;
+
+/// The light end of a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightEnd {
+    /// The emitter.
+    pub emitter: EmitterId,
+    /// The point on it; for an infinite emitter only `direction` counts.
+    pub point: EmitterPoint,
+    /// Direction of the light that leaves it.
+    pub direction: Vec3,
+}
+
+/// An interior vertex of a sub-path that has scattered.
+#[derive(Clone, Copy, Debug)]
+pub struct ObservedVertex<B> {
+    /// Edges from the sub-path's end to this vertex.
+    pub depth: u32,
+    /// Where it is.
+    pub position: Vec3,
+    /// How it scatters.
+    pub site: Site<B>,
+    /// Whether it scattered by a Dirac lobe.
+    pub delta: bool,
+}
+
+/// What joins the two sub-paths of a sample.
+#[derive(Clone, Copy, Debug)]
+pub enum Joint<B> {
+    /// The camera sub-path reached the light.
+    Hit(LightEnd),
+    /// A camera vertex and a point on a light.
+    Nee {
+        /// The light's point.
+        light: LightEnd,
+        /// The camera vertex.
+        camera: (Vec3, Site<B>),
+    },
+    /// A light vertex and a camera vertex.
+    Connect {
+        /// The light sub-path.
+        path: u32,
+        /// The light vertex, and its depth.
+        light: (Vec3, Site<B>, u32),
+        /// The camera vertex.
+        camera: (Vec3, Site<B>),
+    },
+    /// A light vertex and the lens.
+    LightTracing {
+        /// The light sub-path.
+        path: u32,
+        /// The light vertex, and its depth.
+        light: (Vec3, Site<B>, u32),
+        /// The point of the lens.
+        lens: Vec3,
+        /// Density of the camera ray.
+        pdf: f32,
+    },
+    /// Two vertices within a kernel.
+    Merge {
+        /// The light sub-path.
+        path: u32,
+        /// The photon (a point of the beam), and its depth.
+        light: (Vec3, u32),
+        /// The query point (a point of the beam).
+        camera: (Vec3, Site<B>),
+    },
+}
+
+/// An accepted sample.
+#[derive(Clone, Copy, Debug)]
+pub struct ObservedSample<B> {
+    /// The technique.
+    pub technique: Technique,
+    /// Edges of the camera sub-path up to the joint.
+    pub camera_depth: u32,
+    /// How the sub-paths meet.
+    pub joint: Joint<B>,
+    /// Weight of the technique.
+    pub weight: f64,
+    /// Contribution before weighting.
+    pub value: Spectrum,
+}
+
+/// Receives what the walks do. All methods do nothing by default and then cost nothing.
+pub trait Observer<B> {
+    /// A light sub-path starts.
+    fn light_end(&mut self, path: u32, end: &LightEnd) {
+        let _ = (path, end);
+    }
+
+    /// A light sub-path's vertex has scattered.
+    fn light_vertex(&mut self, path: u32, vertex: &ObservedVertex<B>) {
+        let _ = (path, vertex);
+    }
+
+    /// A camera sub-path starts; `pdf` is the density of its ray.
+    fn camera_end(&mut self, lens: Vec3, direction: Vec3, pdf: f32) {
+        let _ = (lens, direction, pdf);
+    }
+
+    /// A camera sub-path's vertex has scattered.
+    fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
+        let _ = vertex;
+    }
+
+    /// A sample was accepted. Samples of light tracing come with the light sub-paths.
+    fn sample(&mut self, sample: &ObservedSample<B>) {
+        let _ = sample;
+    }
+}
+
+/// Nobody looks.
+impl<B> Observer<B> for () {}

@@ -1,0 +1,187 @@
+//! What one iteration does: techniques, counts, radii.
+
+use upbp_media::Medium;
+
+use crate::kernel::Kernel;
+use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
+use crate::scene::Scene;
+use crate::technique::{Technique, TechniqueSet};
+
+/// The kernel of each merge technique.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kernels {
+    /// Surface merging.
+    pub surf: Kernel,
+    /// Photon points around points.
+    pub pp3d: Kernel,
+    /// Photon points around query beams.
+    pub pb2d: Kernel,
+    /// Photon beams around points.
+    pub bp2d: Kernel,
+    /// Photon beams around query beams.
+    pub bb1d: Kernel,
+}
+
+impl Kernels {
+    /// No merges.
+    pub const NONE: Self = Self {
+        surf: Kernel::NONE,
+        pp3d: Kernel::NONE,
+        pb2d: Kernel::NONE,
+        bp2d: Kernel::NONE,
+        bb1d: Kernel::NONE,
+    };
+}
+
+/// Path lengths that are rendered: the number of edges between the light and the camera, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PathLengths {
+    /// Fewest edges; 1 is a light that is seen directly.
+    pub min: u32,
+    /// Most edges.
+    pub max: u32,
+}
+
+impl PathLengths {
+    /// Whether a path of `edges` edges is rendered.
+    #[inline]
+    #[must_use]
+    pub const fn contain(self, edges: u32) -> bool {
+        self.min <= edges && edges <= self.max
+    }
+}
+
+/// Everything that is fixed during one iteration; weights are exact for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Index of the iteration.
+    pub iteration: u64,
+    /// The techniques that run.
+    pub techniques: TechniqueSet,
+    /// Light sub-paths.
+    pub light_paths: u32,
+    /// How many of them leave photon beams.
+    pub beam_paths: u32,
+    /// Light vertices that each camera vertex is connected to.
+    pub connections: u32,
+    /// Limits of the path length.
+    pub lengths: PathLengths,
+    /// Whether walks end by local Russian roulette.
+    pub roulette: bool,
+    /// Kernels with the radii of this iteration.
+    pub kernels: Kernels,
+    /// Counts and volumes for the weights.
+    pub mis: MisPlan,
+}
+
+/// The free choices of a [`Plan`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlanChoices {
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Index of the iteration.
+    pub iteration: u64,
+    /// The techniques that run.
+    pub techniques: TechniqueSet,
+    /// Light sub-paths.
+    pub light_paths: u32,
+    /// How many of them leave photon beams; at most `light_paths`.
+    pub beam_paths: u32,
+    /// Light vertices that each camera vertex is connected to.
+    pub connections: u32,
+    /// Expected number of connectible vertices of a light sub-path. Must be known before the iteration: a figure of
+    /// the iteration itself would correlate with its samples.
+    pub vertices_per_light_path: f64,
+    /// Limits of the path length.
+    pub lengths: PathLengths,
+    /// Whether walks end by local Russian roulette.
+    pub roulette: bool,
+    /// Kernels.
+    pub kernels: Kernels,
+    /// Heuristic of the weights.
+    pub heuristic: Heuristic,
+    /// Extent of photon beams.
+    pub photon_beams: BeamExtent,
+    /// Extent of query beams.
+    pub query_beams: BeamExtent,
+}
+
+impl Plan {
+    /// Derives the weights' constants, so that counts and what runs cannot disagree.
+    #[must_use]
+    pub fn new<S: Scene>(scene: &S, choices: PlanChoices) -> Self {
+        let PlanChoices { techniques, light_paths, kernels, .. } = choices;
+        let beam_paths = choices.beam_paths.min(light_paths);
+        let on = |technique, value: f64| if techniques.has(technique) { value } else { 0.0 };
+        let paths = f64::from(light_paths);
+        let beams = f64::from(beam_paths);
+        // The two numbers of a photon beam are counted with N_B, all others with N_L (docs/theory.md, section 2.1).
+        let merges = VolumeMerges {
+            pp3d: on(Technique::Pp3d, paths * kernels.pp3d.effective_volume()),
+            pb2d: on(Technique::Pb2d, paths * kernels.pb2d.effective_volume()),
+            bp2d: on(Technique::Bp2d, beams * kernels.bp2d.effective_volume()),
+            bb1d: on(Technique::Bb1d, beams * kernels.bb1d.effective_volume()),
+        };
+        let volume = scene
+            .media()
+            .iter()
+            .map(|medium| if medium.scatters() { merges } else { VolumeMerges::default() })
+            .collect();
+        // Expected samples of one connection: draws per vertex over stored vertices per light path.
+        let connect = if choices.vertices_per_light_path > 0.0 && light_paths > 0 {
+            on(Technique::Connect, f64::from(choices.connections) / choices.vertices_per_light_path)
+        } else {
+            0.0
+        };
+        let mis = MisPlan {
+            heuristic: choices.heuristic,
+            hit: on(Technique::Hit, 1.0),
+            nee: on(Technique::Nee, 1.0),
+            connect,
+            light_tracing: on(Technique::LightTracing, paths),
+            surf: on(Technique::Surf, paths * kernels.surf.effective_volume()),
+            volume,
+            photon_beams: choices.photon_beams,
+            query_beams: choices.query_beams,
+        };
+        Self {
+            seed: choices.seed,
+            iteration: choices.iteration,
+            techniques,
+            light_paths,
+            beam_paths,
+            connections: if connect > 0.0 { choices.connections } else { 0 },
+            lengths: choices.lengths,
+            roulette: choices.roulette,
+            kernels,
+            mis,
+        }
+    }
+
+    /// Whether anything is stored along light sub-paths for camera sub-paths to look up.
+    #[must_use]
+    pub fn stores_vertices(&self) -> bool {
+        self.connections > 0 || self.mis.surf > 0.0 || self.stores_medium_photons()
+    }
+
+    /// Whether PP3D or PB2D runs.
+    #[must_use]
+    pub fn stores_medium_photons(&self) -> bool {
+        self.mis.volume.iter().any(|v| v.pp3d > 0.0 || v.pb2d > 0.0)
+    }
+
+    /// Whether BP2D or BB1D runs.
+    #[must_use]
+    pub fn stores_beams(&self) -> bool {
+        self.mis.volume.iter().any(|v| v.bp2d > 0.0 || v.bb1d > 0.0)
+    }
+
+    /// Whether light sub-paths are of any use.
+    #[must_use]
+    pub fn needs_light_paths(&self) -> bool {
+        self.light_paths > 0
+            && (self.mis.light_tracing > 0.0 || self.stores_vertices() || self.stores_beams())
+    }
+}

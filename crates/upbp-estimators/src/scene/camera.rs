@@ -1,0 +1,62 @@
+//! The camera and its film.
+
+use glam::{Vec2, Vec3};
+
+/// A ray of the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraRay {
+    /// The point on the lens (or the pinhole).
+    pub origin: Vec3,
+    /// Unit direction into the scene.
+    pub direction: Vec3,
+    /// Density of the direction, sr⁻¹, for one sample uniform over **one pixel**, given the lens point:
+    /// `(distance of a film on which a pixel has unit area / cos)² / cos` for a perspective camera
+    /// (`docs/theory.md`, section 1.2).
+    pub pdf: f32,
+}
+
+/// The camera as seen from a point of the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraConnection {
+    /// The point on the lens.
+    pub lens: Vec3,
+    /// Where the point is imaged, in pixels: pixel (i, j) covers `[i, i+1) × [j, j+1)`, row 0 at the top.
+    pub film: Vec2,
+    /// [`CameraRay::pdf`] of the direction from the lens point to the point.
+    pub pdf: f32,
+}
+
+/// A rectangle of pixels, `[x, x + width) × [y, y + height)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelRect {
+    /// First column.
+    pub x: u32,
+    /// First row.
+    pub y: u32,
+    /// Number of columns.
+    pub width: u32,
+    /// Number of rows.
+    pub height: u32,
+}
+
+/// A camera with an ideal lens: the value of a pixel is the mean radiance over its square and the lens.
+pub trait Camera: Send + Sync {
+    /// Width and height of the film in pixels.
+    fn resolution(&self) -> (u32, u32);
+
+    /// The part of the film that is rendered; images have its size. Within the film, not empty.
+    fn crop(&self) -> PixelRect {
+        let (width, height) = self.resolution();
+        PixelRect { x: 0, y: 0, width, height }
+    }
+
+    /// The ray through `film` (in pixels). `u_lens` is uniform in `[0, 1)²`, for the lens point.
+    fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Option<CameraRay>;
+
+    /// How the camera sees `point` through the lens point that `u_lens` stands for; `None` if it is not on the film.
+    /// The inverse of [`ray`](Self::ray): the same `u_lens` gives the same lens point.
+    fn connect(&self, point: Vec3, u_lens: [f32; 2]) -> Option<CameraConnection>;
+
+    /// Whether all rays start in one point, so that the bodies around the camera are looked up only once.
+    fn is_pinhole(&self) -> bool;
+}

@@ -1,0 +1,42 @@
+//! What a ray meets.
+
+use glam::Vec3;
+use upbp_media::Interior;
+
+/// Index into [`Scene::emitters`](super::Scene::emitters).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EmitterId(pub u32);
+
+/// A ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit<B> {
+    /// Distance along the ray, scene units.
+    pub t: f32,
+    /// The point, as close to the surface as the host can tell.
+    pub position: Vec3,
+    /// Unit normal of the surface proper; points out of a closed body.
+    pub geometric_normal: Vec3,
+    /// Unit normal for shading, in the hemisphere of the geometric one.
+    pub shading_normal: Vec3,
+    /// How the surface scatters. `None`: an index-matched boundary, which light passes straight.
+    pub bsdf: Option<B>,
+    /// The body that the surface encloses, if its inside matters: every null boundary, every refracting body.
+    /// Opaque surfaces have none.
+    pub interior: Option<Interior>,
+    /// The light that the surface carries.
+    pub emitter: Option<EmitterId>,
+}
+
+/// A ray goes into or out of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// Distance along the ray, scene units.
+    pub t: f32,
+    /// The body.
+    pub interior: Interior,
+    /// Whether the ray goes in: its direction opposes the outward normal.
+    pub entering: bool,
+    /// Whether the surface scatters (a refracting body): it then blocks a connection, unless it lies in a
+    /// body of higher priority.
+    pub scatters: bool,
+}

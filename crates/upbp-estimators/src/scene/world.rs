@@ -1,0 +1,124 @@
+//! The scene: where rays go.
+
+use glam::Vec3;
+use upbp_accel::Ray;
+use upbp_media::{Medium, MediumId, MediumStack};
+
+use super::{BoundingSphere, Bsdf, Camera, Crossing, Emitter, Hit};
+
+/// A scene to render: the host's geometry and everything on it.
+///
+/// Required is the nearest hit; what is derived from it may be overridden where the host has something faster or
+/// more exact. Whether two surfaces coincide, where a ray starts inside a body, and so on is the host's to answer
+/// consistently: the walks of both sides rely on it.
+pub trait Scene: Sync {
+    /// Scattering of the host's surfaces.
+    type Bsdf: Bsdf;
+    /// The host's lights.
+    type Emitter: Emitter;
+    /// The host's media.
+    type Medium: Medium;
+    /// The host's camera.
+    type Camera: Camera;
+
+    /// The nearest surface with `t` in `(ray.t_min, ray.t_max)`, null boundaries included.
+    fn intersect(&self, ray: &Ray) -> Option<Hit<Self::Bsdf>>;
+
+    /// A sphere around all finite geometry and lights.
+    fn bounds(&self) -> BoundingSphere;
+
+    /// All lights.
+    fn emitters(&self) -> &[Self::Emitter];
+
+    /// All media; a [`MediumId`] is an index into them.
+    fn media(&self) -> &[Self::Medium];
+
+    /// The camera.
+    fn camera(&self) -> &Self::Camera;
+
+    /// The medium around everything, `None` for vacuum. Infinite emitters do not reach into an infinite medium.
+    fn outside(&self) -> Option<MediumId> {
+        None
+    }
+
+    /// Whether any surface has a smooth lobe; `false` saves the preparation of what would find nothing.
+    fn has_connectible_surfaces(&self) -> bool {
+        true
+    }
+
+    /// The nearest surface that scatters, and in `crossings` (empty before, sorted by distance after) the null
+    /// boundaries before it, or all along the ray if there is none.
+    ///
+    /// The default asks [`intersect`](Self::intersect) again behind each boundary, and so misses one of two boundaries
+    /// that coincide to rounding; a host with such geometry overrides this.
+    fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Self::Bsdf>> {
+        let mut rest = *ray;
+        loop {
+            let hit = self.intersect(&rest)?;
+            if hit.bsdf.is_some() {
+                return Some(hit);
+            }
+            push_crossing(crossings, ray.direction, &hit);
+            rest.t_min = behind(hit.t);
+        }
+    }
+
+    /// Whether the segment `(ray.t_min, ray.t_max)` is free of surfaces that end every connection: those that scatter
+    /// and enclose no body. Boundaries of bodies on the way, null or not, go to `crossings`, sorted by distance;
+    /// they are of no interest if the answer is `false`.
+    fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
+        let mut rest = *ray;
+        while let Some(hit) = self.intersect(&rest) {
+            if hit.bsdf.is_some() && hit.interior.is_none() {
+                return false;
+            }
+            push_crossing(crossings, ray.direction, &hit);
+            rest.t_min = behind(hit.t);
+        }
+        true
+    }
+
+    /// The bodies that `point` lies in.
+    ///
+    /// The default follows a ray to infinity: a body is around the point if the ray leaves it more often than it enters.
+    fn stack_at(&self, point: Vec3) -> MediumStack {
+        // Any direction serves; one without symmetry meets few edges.
+        let direction = Vec3::new(0.284_69, 0.867_42, 0.408_03).normalize();
+        let mut ray = Ray { origin: point, direction, t_min: 0.0, t_max: f32::INFINITY };
+        let mut balance: Vec<(upbp_media::Interior, i32)> = Vec::new();
+        while let Some(hit) = self.intersect(&ray) {
+            if let Some(interior) = hit.interior {
+                let step = if direction.dot(hit.geometric_normal) > 0.0 { 1 } else { -1 };
+                match balance.iter_mut().find(|(known, _)| known.body == interior.body) {
+                    Some((_, count)) => *count += step,
+                    None => balance.push((interior, step)),
+                }
+            }
+            ray.t_min = behind(hit.t);
+        }
+        let mut stack = MediumStack::new(self.outside());
+        // Met last is farthest out: entered first.
+        for (interior, count) in balance.into_iter().rev() {
+            if count > 0 {
+                let _ = stack.enter(interior);
+            }
+        }
+        stack
+    }
+}
+
+/// The next distance that is certainly not the same intersection again.
+fn behind(t: f32) -> f32 {
+    t + t.abs().max(f32::MIN_POSITIVE) * 4.0 * f32::EPSILON
+}
+
+fn push_crossing<B>(crossings: &mut Vec<Crossing>, direction: Vec3, hit: &Hit<B>) {
+    if let Some(interior) = hit.interior {
+        crossings.push(Crossing {
+            t: hit.t,
+            interior,
+            entering: direction.dot(hit.geometric_normal) < 0.0,
+            scatters: hit.bsdf.is_some(),
+        });
+    }
+}

@@ -1,0 +1,190 @@
+//! Camera sub-paths: one per pixel sample, with every technique that ends on them.
+
+use glam::{Vec2, Vec3};
+use upbp_media::{MediumStack, Spectrum};
+
+use super::context::{Context, Scratch};
+use super::light::{Arrival, arrive, pend, sample_stop};
+use super::site::Site;
+use super::visibility::ray_origin;
+use crate::counters::Counters;
+use crate::estimate;
+use crate::light_map::LightMap;
+use crate::mis::{Edge, Pending, Tip};
+use crate::observer::{ObservedVertex, Observer};
+use crate::random::{Stream, StreamKind};
+use crate::scene::{Camera, Scene, Walk};
+use crate::technique::{Layer, Technique};
+
+/// The result of one camera sub-path: radiance per layer, weighted.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraWalk {
+    /// Contributions by [`Layer`].
+    pub layers: [Spectrum; Layer::COUNT],
+}
+
+/// What a technique adds to: the layers of the sample at hand and the counters of the pass.
+pub(crate) struct Output<'a, O> {
+    pub(crate) layers: &'a mut [Spectrum; Layer::COUNT],
+    pub(crate) counters: &'a mut Counters,
+    pub(crate) observer: &'a mut O,
+}
+
+impl<O> Output<'_, O> {
+    /// Adds a weighted contribution; whether it was accepted.
+    #[inline]
+    pub(crate) fn add(&mut self, technique: Technique, value: Spectrum, weight: f64) -> bool {
+        match self.counters.accept(technique, value, weight) {
+            Some(contribution) => {
+                self.layers[technique.layer() as usize] += contribution;
+                true
+            }
+            None => false,
+        }
+    }
+}
+
+/// A camera sub-path between two vertices.
+pub(crate) struct QueryEdge {
+    /// Importance over density at the edge's first vertex, after scattering.
+    pub(crate) throughput: Spectrum,
+    /// What the weights need of the first vertex.
+    pub(crate) pending: Pending,
+    /// Samples that connect the first vertex to one on this edge.
+    pub(crate) connections: f64,
+    /// Edges from the camera to a vertex on this edge.
+    pub(crate) depth: u32,
+}
+
+/// A camera sub-path's end at a vertex.
+pub(crate) struct QueryVertex<B> {
+    pub(crate) position: Vec3,
+    /// Direction to the vertex before, towards the camera.
+    pub(crate) towards_camera: Vec3,
+    pub(crate) throughput: Spectrum,
+    pub(crate) tip: Tip,
+    pub(crate) depth: u32,
+    pub(crate) site: Site<B>,
+    /// The bodies on the camera's side, and on the other side of a surface.
+    pub(crate) stack: MediumStack,
+    pub(crate) behind: MediumStack,
+}
+
+/// Traces the camera sub-path of one sample of a pixel. `index` addresses its random numbers.
+#[expect(clippy::too_many_arguments, reason = "one call per sample, with the state of the pass")]
+pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    map: &LightMap<S::Bsdf>,
+    kind: StreamKind,
+    pixel: [u32; 2],
+    index: u64,
+    scratch: &mut Scratch<S::Bsdf>,
+    counters: &mut Counters,
+    observer: &mut O,
+) -> CameraWalk {
+    let mut walk = CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT] };
+    let Context { world, plan } = *context;
+    let scene = world.scene;
+    let mut stream = Stream::new(plan.seed, plan.iteration, kind, index);
+    let [dx, dy] = stream.pair();
+    let film = Vec2::new(pixel[0] as f32 + dx, pixel[1] as f32 + dy);
+    let Some(ray) = scene.camera().ray(film, stream.pair()) else { return walk };
+    observer.camera_end(ray.origin, ray.direction, ray.pdf);
+    let mut out = Output { layers: &mut walk.layers, counters, observer };
+    let mut stack = world.stack_at_camera(ray.origin);
+    let mut origin = ray.origin;
+    let mut direction = ray.direction;
+    let mut edge = QueryEdge {
+        throughput: Spectrum::ONE,
+        pending: Pending::at_camera(f64::from(ray.pdf)),
+        connections: plan.mis.light_tracing,
+        depth: 1,
+    };
+
+    for depth in 1..=plan.lengths.max {
+        out.counters.camera_edges += 1;
+        edge.depth = depth;
+        scratch.passage.trace(scene, origin, direction, &stack);
+        let passage = &scratch.passage;
+        estimate::emission_along(context, passage, &edge, &mut out);
+        let stop = sample_stop(scene, passage, &mut stream);
+        estimate::along_beam(context, map, passage, stop, &edge, &mut out);
+
+        let arrived = match arrive(scene, passage, stop) {
+            Arrival::Vertex(arrived) => arrived,
+            Arrival::Escaped => {
+                estimate::environment(context, passage, &edge, &mut out);
+                break;
+            }
+            Arrival::Absorbed => break,
+            Arrival::Lost => {
+                out.counters.lost_walks += 1;
+                break;
+            }
+        };
+        let in_medium = arrived.site.in_medium();
+        let t = arrived.density.forward(in_medium);
+        let throughput = edge.throughput * arrived.density.transmittance / t as f32;
+        if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
+            break;
+        }
+        let from = -direction;
+        let mis_edge = Edge::new(
+            &arrived.density,
+            f64::from(arrived.distance),
+            arrived.site.cosine(from),
+            edge.pending.in_medium,
+            in_medium,
+        );
+        if !in_medium && let Some(hit) = &passage.hit {
+            estimate::emitter_hit(context, hit, direction, origin, &mis_edge, throughput, &edge, &mut out);
+        }
+        if depth == plan.lengths.max {
+            break;
+        }
+        let connectible = arrived.site.is_connectible();
+        let tip = edge.pending.arrive(
+            &plan.mis,
+            Walk::Camera,
+            &mis_edge,
+            if connectible { edge.connections } else { 0.0 },
+        );
+        let vertex = QueryVertex {
+            position: arrived.position,
+            towards_camera: from,
+            throughput,
+            tip,
+            depth,
+            site: arrived.site,
+            stack: arrived.stack,
+            behind: arrived.behind,
+        };
+        if connectible {
+            estimate::next_event(context, &vertex, &mut stream, &mut scratch.crossings, &mut out);
+            estimate::connections(context, map, &vertex, &mut stream, &mut scratch.crossings, &mut out);
+            estimate::at_point(context, map, &vertex, &mut out);
+        }
+
+        let Some(scattered) =
+            vertex.site.scatter(scene, plan.roulette, Walk::Camera, vertex.position, from, &mut stream)
+        else {
+            break;
+        };
+        out.observer.camera_vertex(&ObservedVertex {
+            depth,
+            position: vertex.position,
+            site: vertex.site,
+            delta: scattered.delta,
+        });
+        origin = ray_origin(&vertex.site, vertex.position, scattered.direction);
+        direction = scattered.direction;
+        stack = if scattered.transmitted { vertex.behind } else { vertex.stack };
+        edge = QueryEdge {
+            throughput: throughput * scattered.weight,
+            pending: pend(context, &vertex.tip, &vertex.site, &scattered),
+            connections: plan.mis.connect,
+            depth,
+        };
+    }
+    walk
+}

@@ -1,0 +1,307 @@
+//! Vertices where a path can be connected and merged, and how they scatter.
+
+use glam::Vec3;
+use upbp_media::{Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
+
+use super::MIN_COSINE;
+use crate::mis::MergeSite;
+use crate::random::Stream;
+use crate::scene::{Bsdf, Hit, Interface, Scene, Walk};
+
+/// Where a path scatters.
+#[derive(Clone, Copy, Debug)]
+pub enum Site<B> {
+    /// On a surface.
+    Surface(SurfaceSite<B>),
+    /// In a medium.
+    Medium(MediumId),
+}
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceSite<B> {
+    /// How it scatters.
+    pub bsdf: B,
+    /// Geometric normal, out of a closed body.
+    pub geometric_normal: Vec3,
+    /// Shading normal.
+    pub shading_normal: Vec3,
+    /// Refractive indices on its two sides.
+    pub interface: Interface,
+}
+
+/// A pair of directions at a vertex, evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Evaluation {
+    /// The scattering function `s`: BSDF times the shading-normal correction, or `σ_s ρ`.
+    pub value: Spectrum,
+    /// Density of the own walk choosing this direction, roulette included, sr⁻¹.
+    pub rho_own: f64,
+    /// Density of the opposite walk, which comes from there and leaves to where this walk came from.
+    pub rho_opposite: f64,
+    /// Cosine factor of the direction: with the geometric normal, 1 in a medium.
+    pub cos: f64,
+    /// Sine of the angle between the two lines in a medium.
+    pub sin_theta: f64,
+}
+
+/// A sampled direction at a vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct Scattered {
+    /// Where the walk goes.
+    pub direction: Vec3,
+    /// Factor of the throughput, roulette included.
+    pub weight: Spectrum,
+    /// As [`Evaluation::rho_own`]; for a Dirac lobe its probability.
+    pub rho_own: f64,
+    /// As [`Evaluation::rho_opposite`]; for a Dirac lobe as in (4.6).
+    pub rho_opposite: f64,
+    /// As [`Evaluation::cos`].
+    pub cos: f64,
+    /// As [`Evaluation::sin_theta`].
+    pub sin_theta: f64,
+    /// Whether the lobe is a Dirac.
+    pub delta: bool,
+    /// Whether the walk passed through the surface.
+    pub transmitted: bool,
+}
+
+/// `sin` of the angle between two lines, without the cancellation of `√(1 − cos²)`.
+fn sine(a: Vec3, b: Vec3) -> f64 {
+    f64::from(a.cross(b).length()).min(1.0)
+}
+
+impl<B: Bsdf> Site<B> {
+    /// The surface of a hit; `before` are the bodies on the side that the ray comes from.
+    ///
+    /// Returns the site and the bodies on the other side. `None` if the surface is grazed.
+    pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, before: &MediumStack) -> Option<(Self, MediumStack)> {
+        let cos = direction.dot(hit.geometric_normal);
+        if cos.abs() < MIN_COSINE || !hit.shading_normal.is_finite() {
+            return None;
+        }
+        let entering = cos < 0.0;
+        let mut behind = *before;
+        if let Some(interior) = hit.interior {
+            let _ = behind.cross(interior, entering);
+        }
+        let (above, below) = if entering { (before, &behind) } else { (&behind, before) };
+        let site = SurfaceSite {
+            bsdf,
+            geometric_normal: hit.geometric_normal,
+            shading_normal: hit.shading_normal,
+            interface: Interface { above: above.ior(), below: below.ior() },
+        };
+        Some((Self::Surface(site), behind))
+    }
+
+    /// Whether paths can be connected and merged here.
+    #[inline]
+    pub fn is_connectible(&self) -> bool {
+        match self {
+            Self::Surface(surface) => surface.bsdf.is_connectible(),
+            Self::Medium(_) => true,
+        }
+    }
+
+    /// Whether the vertex is in a medium.
+    #[inline]
+    pub const fn in_medium(&self) -> bool {
+        matches!(self, Self::Medium(_))
+    }
+
+    /// Cosine factor of an arriving or leaving direction.
+    #[inline]
+    pub fn cosine(&self, direction: Vec3) -> f64 {
+        match self {
+            Self::Surface(surface) => f64::from(direction.dot(surface.geometric_normal).abs()),
+            Self::Medium(_) => 1.0,
+        }
+    }
+
+    /// Whether a path that comes from `from` and goes to `to` passes through the surface.
+    #[inline]
+    pub fn crosses(&self, from: Vec3, to: Vec3) -> bool {
+        match self {
+            Self::Surface(surface) => {
+                from.dot(surface.geometric_normal) * to.dot(surface.geometric_normal) < 0.0
+            }
+            Self::Medium(_) => false,
+        }
+    }
+
+    /// The merges that a path with this pair of lines takes part in.
+    #[inline]
+    pub const fn merge_site(&self, sin_theta: f64) -> MergeSite {
+        match self {
+            Self::Surface(_) => MergeSite::Surface,
+            Self::Medium(medium) => MergeSite::Medium { medium: *medium, sin_theta },
+        }
+    }
+
+    /// Evaluates the smooth scattering of `walk`, which came from `from` and goes to `to`; both directions point
+    /// away from the vertex. `None` if nothing is scattered.
+    pub fn evaluate<S: Scene<Bsdf = B>>(
+        &self,
+        scene: &S,
+        roulette: bool,
+        walk: Walk,
+        position: Vec3,
+        from: Vec3,
+        to: Vec3,
+    ) -> Option<Evaluation> {
+        match self {
+            Self::Surface(surface) => surface.evaluate(roulette, walk, from, to),
+            Self::Medium(medium) => {
+                let medium = &scene.media()[medium.0 as usize];
+                let phase = medium.phase().eval(-from, to);
+                let rho = f64::from(phase) * f64::from(continuation(medium, position, roulette));
+                Some(Evaluation {
+                    value: medium.sigma_s(position) * phase,
+                    rho_own: rho,
+                    rho_opposite: rho,
+                    cos: 1.0,
+                    sin_theta: sine(from, to),
+                })
+            }
+        }
+    }
+
+    /// Samples a direction for `walk`, which came from `from`. `None`: the walk ends.
+    pub fn scatter<S: Scene<Bsdf = B>>(
+        &self,
+        scene: &S,
+        roulette: bool,
+        walk: Walk,
+        position: Vec3,
+        from: Vec3,
+        stream: &mut Stream,
+    ) -> Option<Scattered> {
+        let u_continue = stream.uniform();
+        let u_lobe = stream.uniform();
+        let u = stream.pair();
+        match self {
+            Self::Surface(surface) => surface.scatter(roulette, walk, from, u_continue, u_lobe, u),
+            Self::Medium(medium) => {
+                let medium = &scene.media()[medium.0 as usize];
+                let survival = continuation(medium, position, roulette);
+                if u_continue >= survival {
+                    return None;
+                }
+                let sample = PhaseFunction::sample(medium.phase(), -from, u);
+                let rho = f64::from(sample.pdf) * f64::from(survival);
+                Some(Scattered {
+                    direction: sample.after,
+                    // The phase function is sampled perfectly: its value over its density is one.
+                    weight: medium.sigma_s(position) / survival,
+                    rho_own: rho,
+                    rho_opposite: rho,
+                    cos: 1.0,
+                    sin_theta: sine(from, sample.after),
+                    delta: false,
+                    transmitted: false,
+                })
+            }
+        }
+    }
+}
+
+fn continuation<M: Medium>(medium: &M, position: Vec3, roulette: bool) -> f32 {
+    if roulette { medium.continuation(position) } else { 1.0 }
+}
+
+impl<B: Bsdf> SurfaceSite<B> {
+    /// The basis in which the BSDF is asked: columns are the two tangents and the shading normal.
+    fn local(&self, direction: Vec3) -> Vec3 {
+        let (s, t) = orthonormal_basis(self.shading_normal);
+        Vec3::new(direction.dot(s), direction.dot(t), direction.dot(self.shading_normal))
+    }
+
+    fn world(&self, local: Vec3) -> Vec3 {
+        let (s, t) = orthonormal_basis(self.shading_normal);
+        local.x * s + local.y * t + local.z * self.shading_normal
+    }
+
+    fn continuation(&self, from: Vec3, roulette: bool) -> f32 {
+        if roulette { self.bsdf.continuation(from).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    /// Cosine with the geometric normal if both normals agree on the side of `direction`, local `z` given.
+    fn agreeing_cosine(&self, direction: Vec3, shading_cosine: f32) -> Option<f32> {
+        let cos = direction.dot(self.geometric_normal);
+        (cos * shading_cosine > 0.0 && cos.abs() >= MIN_COSINE).then_some(cos)
+    }
+
+    fn evaluate(&self, roulette: bool, walk: Walk, from: Vec3, to: Vec3) -> Option<Evaluation> {
+        let (local_from, local_to) = (self.local(from), self.local(to));
+        let cos_from = self.agreeing_cosine(from, local_from.z)?;
+        let cos_to = self.agreeing_cosine(to, local_to.z)?;
+        let (value, correction) = match walk {
+            Walk::Camera => (
+                self.bsdf.eval(local_to, local_from, self.interface),
+                // The geometry term has the geometric normal; the light's side is shaded with the other (section 1.6).
+                local_to.z / cos_to,
+            ),
+            Walk::Light => (self.bsdf.eval(local_from, local_to, self.interface), local_from.z / cos_from),
+        };
+        let rho_own = self.bsdf.pdf(local_from, local_to, self.interface);
+        let rho_opposite = self.bsdf.pdf(local_to, local_from, self.interface);
+        Some(Evaluation {
+            value: value * correction.abs(),
+            rho_own: f64::from(rho_own) * f64::from(self.continuation(local_from, roulette)),
+            rho_opposite: f64::from(rho_opposite) * f64::from(self.continuation(local_to, roulette)),
+            cos: f64::from(cos_to.abs()),
+            sin_theta: 0.0,
+        })
+    }
+
+    fn scatter(
+        &self,
+        roulette: bool,
+        walk: Walk,
+        from: Vec3,
+        u_continue: f32,
+        u_lobe: f32,
+        u: [f32; 2],
+    ) -> Option<Scattered> {
+        let local_from = self.local(from);
+        let cos_from = self.agreeing_cosine(from, local_from.z)?;
+        let survival = self.continuation(local_from, roulette);
+        if u_continue >= survival {
+            return None;
+        }
+        let sample = self.bsdf.sample(local_from, walk, self.interface, u_lobe, u)?;
+        let direction = self.world(sample.to).normalize();
+        let cos_to = self.agreeing_cosine(direction, sample.to.z)?;
+        let mut weight = sample.weight / survival;
+        if walk == Walk::Light {
+            // Adjoint of the shading normal (section 1.6).
+            weight *= ((local_from.z * cos_to) / (cos_from * sample.to.z)).abs();
+        }
+        let own = f64::from(sample.pdf) * f64::from(survival);
+        let mut opposite =
+            f64::from(sample.pdf_reverse) * f64::from(self.continuation(sample.to, roulette));
+        let transmitted = cos_from * cos_to < 0.0;
+        if sample.delta && transmitted {
+            // Radiance is compressed and the beam widened: (4.6), about the normal that bends. Reflection has
+            // equal factors.
+            let (eta_from, eta_to) = if cos_from > 0.0 {
+                (self.interface.above, self.interface.below)
+            } else {
+                (self.interface.below, self.interface.above)
+            };
+            let squared = f64::from(eta_from / eta_to).powi(2);
+            opposite *= squared * f64::from((local_from.z / sample.to.z).abs());
+        }
+        Some(Scattered {
+            direction,
+            weight,
+            rho_own: own,
+            rho_opposite: opposite,
+            cos: f64::from(cos_to.abs()),
+            sin_theta: 0.0,
+            delta: sample.delta,
+            transmitted,
+        })
+    }
+}

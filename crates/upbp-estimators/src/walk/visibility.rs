@@ -1,0 +1,86 @@
+//! What lies between two vertices that are to be connected.
+
+use glam::Vec3;
+use upbp_accel::{Ray, offset_origin};
+use upbp_media::{EdgeDensity, Medium, MediumStack, RaySegment};
+
+use super::passage::is_hidden;
+use super::site::Site;
+use crate::scene::{Crossing, Scene};
+
+/// The far end of a connection.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    /// Direction to it from the near vertex, a unit vector.
+    pub direction: Vec3,
+    /// Distance in scene units; infinite for an infinite emitter.
+    pub distance: f32,
+    /// Point and normal of the surface that it lies on, if any.
+    pub surface: Option<(Vec3, Vec3)>,
+}
+
+/// Where a ray from a vertex starts: off the surface, by no more than rounding requires.
+pub(crate) fn ray_origin<B>(site: &Site<B>, position: Vec3, direction: Vec3) -> Vec3 {
+    match site {
+        Site::Surface(surface) => offset_origin(position, surface.geometric_normal, direction),
+        Site::Medium(_) => position,
+    }
+}
+
+/// The densities of the edge from `origin` (off its surface) to `target`, or `None` if a surface is in between.
+///
+/// `stack` holds the bodies at the near end, on the side of `target`; the far end has none of its own.
+pub fn clear_edge<S: Scene>(
+    scene: &S,
+    stack: &MediumStack,
+    origin: Vec3,
+    target: &Target,
+    crossings: &mut Vec<Crossing>,
+) -> Option<EdgeDensity> {
+    crossings.clear();
+    let ray = match target.surface {
+        Some((position, normal)) => {
+            // Both ends stand off their surfaces, so that neither blocks the view; the ray ends before it could, by
+            // rounding, meet a surface that it grazes.
+            let between = offset_origin(position, normal, -target.direction) - origin;
+            let length = between.length();
+            Ray { origin, direction: between / length, t_min: 0.0, t_max: length * (1.0 - 1e-5) }
+        }
+        None => Ray { origin, direction: target.direction, t_min: 0.0, t_max: target.distance },
+    };
+    if !(ray.t_max > 0.0) || !ray.direction.is_finite() || !scene.is_clear(&ray, crossings) {
+        return None;
+    }
+    let mut stack = *stack;
+    let mut density = EdgeDensity::EMPTY;
+    let mut start = 0.0;
+    let mut push = |medium: Option<upbp_media::MediumId>, start: f32, end: f32| match medium {
+        Some(medium) => density.push(
+            &scene.media()[medium.0 as usize].segment(&RaySegment {
+                origin: ray.origin,
+                direction: ray.direction,
+                start,
+                end,
+            }),
+        ),
+        None => density.push_vacuum(),
+    };
+    for crossing in crossings.iter() {
+        if crossing.scatters && !is_hidden(&stack, &crossing.interior, crossing.entering) {
+            return None;
+        }
+        let medium = stack.medium();
+        let _ = stack.cross(crossing.interior, crossing.entering);
+        if stack.medium() != medium {
+            let t = crossing.t.max(start);
+            if t > start {
+                push(medium, start, t);
+            }
+            start = t;
+        }
+    }
+    if ray.t_max > start || start == 0.0 {
+        push(stack.medium(), start, ray.t_max);
+    }
+    Some(density)
+}

@@ -1,0 +1,172 @@
+//! Random abstract paths and plans: hard cases first, shared by the tests of this crate.
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use upbp_estimators::MediumId;
+use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
+use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2, VolumeMerges};
+
+/// The number of techniques, in the order hit, nee, connect, light tracing, surf, pp3d, pb2d, bp2d, bb1d.
+pub(crate) const TECHNIQUES: u32 = 9;
+
+/// The number of media of a plan.
+pub(crate) const MEDIA: u32 = 3;
+
+/// A number between `e^{-spread}` and `e^{spread}`.
+fn around_one(spread: f64) -> impl Strategy<Value = f64> {
+    (-spread..spread).prop_map(f64::exp)
+}
+
+/// A density of which nothing is known; now and then the walk cannot go that way at all.
+fn density(spread: f64) -> impl Strategy<Value = f64> {
+    prop_oneof![19 => around_one(spread), 1 => Just(0.0)]
+}
+
+fn cosine() -> impl Strategy<Value = f64> {
+    prop_oneof![4 => 1e-3..1.0, 1 => Just(1e-6)]
+}
+
+fn sine() -> impl Strategy<Value = f64> {
+    let threshold = PARALLEL_SIN2.sqrt();
+    prop_oneof![8 => 1e-3..1.0, 1 => Just(0.5 * threshold), 1 => Just(2.0 * threshold), 1 => Just(0.0)]
+}
+
+fn vertex(spread: f64) -> impl Strategy<Value = PathVertex> {
+    let kind = prop_oneof![
+        2 => Just(VertexKind::Surface),
+        3 => (0..MEDIA).prop_map(|medium| VertexKind::Medium(MediumId(medium))),
+        1 => Just(VertexKind::Delta),
+    ];
+    (kind, density(spread), density(spread), cosine(), cosine(), sine()).prop_map(
+        |(kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta)| {
+            let in_medium = matches!(kind, VertexKind::Medium(_));
+            PathVertex {
+                kind,
+                rho_light,
+                rho_camera,
+                cos_light: if in_medium { 1.0 } else { cos_light },
+                cos_camera: if in_medium { 1.0 } else { cos_camera },
+                sin_theta: if in_medium { sin_theta } else { 0.0 },
+            }
+        },
+    )
+}
+
+/// Distance, reach, and the densities of stopping at either end, should it be in a medium.
+fn edge(spread: f64) -> impl Strategy<Value = [f64; 4]> {
+    let reach = prop_oneof![3 => 1e-6..1.0, 1 => Just(1.0)];
+    (around_one(spread), reach, around_one(spread), around_one(spread)).prop_map(|(d, r, a, b)| [d, r, a, b])
+}
+
+/// What a path starts on.
+#[derive(Clone, Copy, Debug)]
+enum Light {
+    Area,
+    Point,
+    Directional,
+    Environment,
+}
+
+/// A path of 1 to `longest` edges whose densities lie between `e^{-spread}` and `e^{spread}`, independent in the two
+/// directions.
+pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
+    let light = prop_oneof![
+        Just(Light::Area),
+        Just(Light::Point),
+        Just(Light::Directional),
+        Just(Light::Environment)
+    ];
+    let ends = (light, around_one(spread), around_one(spread), around_one(spread), around_one(spread), cosine());
+    (vec((vertex(spread), edge(spread)), 0..longest), edge(spread), ends).prop_map(|(steps, last, ends)| {
+        let (light, rho_light, rho_camera, pdf_position, pdf_incident, cos) = ends;
+        let end = PathVertex {
+            kind: VertexKind::End,
+            rho_light,
+            rho_camera,
+            cos_light: 1.0,
+            cos_camera: 1.0,
+            sin_theta: 0.0,
+        };
+        let cos_camera = if matches!(light, Light::Area) { cos } else { 1.0 };
+        let mut vertices = vec![PathVertex { cos_camera, ..end }];
+        vertices.extend(steps.iter().map(|step| step.0));
+        vertices.push(end);
+        let mut edges: Vec<PathEdge> = Vec::new();
+        for (i, [distance, reach, at_camera_side, at_light_side]) in
+            steps.iter().map(|step| step.1).chain([last]).enumerate()
+        {
+            let t = |vertex: &PathVertex, stop| match vertex.kind {
+                VertexKind::Medium(_) => stop,
+                _ => reach,
+            };
+            edges.push(PathEdge {
+                distance,
+                t_light: t(&vertices[i + 1], at_camera_side),
+                t_camera: t(&vertices[i], at_light_side),
+                reach,
+            });
+        }
+        if matches!(light, Light::Directional | Light::Environment) {
+            edges[0].distance = f64::INFINITY;
+        }
+        let dirac = matches!(light, Light::Point | Light::Directional);
+        Path {
+            vertices,
+            edges,
+            pdf_position: if dirac { 1.0 } else { pdf_position },
+            pdf_incident: if dirac { 1.0 } else { pdf_incident },
+            hittable: !dirac,
+        }
+    })
+}
+
+/// A plan with all techniques and different merges in each medium.
+pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
+    let volume = vec((0.0..1e3, 0.0..1e3, 0.0..1e3, 0.0..1e3), MEDIA as usize).prop_map(|media| {
+        media.into_iter().map(|(pp3d, pb2d, bp2d, bb1d)| VolumeMerges { pp3d, pb2d, bp2d, bb1d }).collect()
+    });
+    (1.0..4.0, 1e-3..10.0, 1.0..1e5, 1e-3..1e3, volume).prop_map(
+        |(nee, connect, light_tracing, surf, volume): (_, _, _, _, Vec<VolumeMerges>)| MisPlan {
+            heuristic: Heuristic::Balance,
+            hit: 1.0,
+            nee,
+            connect,
+            light_tracing,
+            surf,
+            volume,
+            photon_beams: BeamExtent::Short,
+            query_beams: BeamExtent::Long,
+        },
+    )
+}
+
+/// The plan with only the techniques whose bits are set.
+pub(crate) fn masked(plan: &MisPlan, mask: u32) -> MisPlan {
+    let on = |bit: u32, value: f64| if mask >> bit & 1 == 1 { value } else { 0.0 };
+    MisPlan {
+        hit: on(0, plan.hit),
+        nee: on(1, plan.nee),
+        connect: on(2, plan.connect),
+        light_tracing: on(3, plan.light_tracing),
+        surf: on(4, plan.surf),
+        volume: plan
+            .volume
+            .iter()
+            .map(|v| VolumeMerges {
+                pp3d: on(5, v.pp3d),
+                pb2d: on(6, v.pb2d),
+                bp2d: on(7, v.bp2d),
+                bb1d: on(8, v.bb1d),
+            })
+            .collect(),
+        ..plan.clone()
+    }
+}
+
+/// All heuristics and beam extents.
+pub(crate) fn modes() -> impl Iterator<Item = (Heuristic, BeamExtent, BeamExtent)> {
+    let extents = [BeamExtent::Short, BeamExtent::Long];
+    [Heuristic::Balance, Heuristic::Power].into_iter().flat_map(move |heuristic| {
+        extents.into_iter().flat_map(move |photon| extents.into_iter().map(move |query| (heuristic, photon, query)))
+    })
+}

@@ -1,0 +1,78 @@
+//! The contract of a participating medium.
+
+use glam::Vec3;
+
+use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
+
+/// A participating medium: what a stretch of it does to light, and how walks through it are sampled.
+///
+/// The densities that [`segment`](Self::segment) reports are those of
+/// [`sample_distance`](Self::sample_distance), whichever channel was drawn and whichever way the walk
+/// goes. The estimators rest on this:
+///
+/// - `∫₀^ℓ p(t) dt + S(ℓ) = 1` on every segment: a walk stops somewhere or passes;
+/// - neither depends on the throughput of the path, since the density must be computable from the other
+///   end as well.
+///
+/// The transmittance of a segment is the product over its pieces, its reach need not be: a mixture of
+/// channels draws anew on each piece. A density is therefore that of a walk only if it is computed from the
+/// segments that the walk took, cut where the walk cut them.
+///
+/// A medium that does not scatter is never sampled: its segments are passed with probability one and
+/// only attenuate. Coefficients and densities per length are in inverse scene units. Methods are called
+/// from many threads at once and must give the same bits for the same arguments.
+///
+/// # Path-level lanes
+///
+/// `sample_distance` takes the number that picks the channel apart from the number that picks the
+/// distance. A walk that holds `u_channel` fixed on all its segments draws every distance from the same
+/// channel `c = ⌊3·u_channel⌋`, and in a medium whose channels are exponentials the densities of that lane
+/// are at hand: `S_c` is `transmittance[c]` and `p_c` is `sigma_t[c] · transmittance[c]`. The path-level mixture
+/// (policy C of `docs/theory.md`, section 1.4) therefore needs a method that returns the three lanes of a
+/// segment in double precision, with no change to those here.
+///
+/// Source: `docs/theory.md`, sections 1.3 and 1.4.
+pub trait Medium: Send + Sync {
+    /// Whether light can be scattered in this medium. If not, no walk ever stops in it.
+    fn scatters(&self) -> bool;
+
+    /// Transmittance and densities of one segment.
+    fn segment(&self, segment: &RaySegment) -> SegmentDensity;
+
+    /// Distance from the ray's origin, in `[start, end)`, at which a walk from start to end stops; `None`
+    /// if it passes the segment.
+    ///
+    /// `u_channel` and `u_distance` are uniform in `[0, 1)`. With `u_distance = 0` a walk may stop
+    /// exactly at the start.
+    fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32>;
+
+    /// Scattering coefficient at `position`, in inverse scene units.
+    fn sigma_s(&self, position: Vec3) -> Spectrum;
+
+    /// Extinction coefficient at `position`, in inverse scene units: absorption plus scattering.
+    fn sigma_t(&self, position: Vec3) -> Spectrum;
+
+    /// The phase function, the same everywhere in the medium.
+    fn phase(&self) -> &PhaseFunction;
+
+    /// Whether the medium emits light. If not, [`emitted`](Self::emitted) is black.
+    fn emits(&self) -> bool {
+        false
+    }
+
+    /// Radiance that the segment sends from its inside back to `start`: `∫ T(start, t) σ_a L_e dt`, in
+    /// W m⁻² sr⁻¹.
+    fn emitted(&self, segment: &RaySegment) -> Spectrum {
+        let _ = segment;
+        Spectrum::ZERO
+    }
+
+    /// Probability in `(0, 1]` that a walk goes on after a collision at `position`.
+    ///
+    /// Depends on the position alone, so that both directions of walking agree on it.
+    fn continuation(&self, position: Vec3) -> f32;
+
+    /// One over the mean extinction, in scene units; infinite if there is none. A figure for heuristics,
+    /// in no estimate.
+    fn mean_free_path(&self) -> f32;
+}

@@ -1,0 +1,294 @@
+//! Which bodies a point is inside of, and which medium that makes.
+//!
+//! Bodies may overlap: a marble in a glass of milk, a glass whose water reaches into its wall. Where they
+//! do, the one with the highest priority wins, and among equals the one entered last. Every sub-path
+//! carries such a list; a surface whose priority is below the current one is not there for the path.
+//!
+//! Source: `docs/theory.md`, section 1.7; priorities after Schmidt and Budge, "Simple Nested
+//! Dielectrics in Ray Traced Images", JGT 7(2), 2002.
+
+/// Number of a medium in its scene.
+#[derive(Copy, Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MediumId(pub u32);
+
+/// Number of a closed body in its scene.
+#[derive(Copy, Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct BodyId(pub u32);
+
+/// The inside of a closed body, as its surface announces it.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct Interior {
+    /// The body.
+    pub body: BodyId,
+    /// What fills it; `None` for vacuum.
+    pub medium: Option<MediumId>,
+    /// Which of several bodies counts where they overlap: the highest, among equals the last entered.
+    pub priority: i32,
+    /// Index of refraction, relative to vacuum.
+    pub ior: f32,
+}
+
+/// What became of crossing a boundary.
+#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+#[must_use]
+pub enum Crossing {
+    /// The stack has changed.
+    Done,
+    /// Entered a body that the point is already inside of: ignored.
+    AlreadyInside,
+    /// Left a body that the point is not inside of: ignored.
+    NotInside,
+    /// Entered one body more than [`MediumStack::CAPACITY`]: ignored.
+    Overflow,
+}
+
+/// The bodies that a point is inside of. A plain value: rays that look ahead walk a copy.
+#[derive(Copy, Clone, Debug)]
+pub struct MediumStack {
+    /// The first `len` entries are in use, by ascending priority, among equals in order of entering.
+    bodies: [Interior; Self::CAPACITY],
+    outside: Option<MediumId>,
+    len: u8,
+}
+
+impl MediumStack {
+    /// How many bodies may overlap in one point.
+    pub const CAPACITY: usize = 8;
+
+    /// A point outside all bodies, in the medium around everything (`None` for vacuum), of index 1.
+    #[inline]
+    #[must_use]
+    pub const fn new(outside: Option<MediumId>) -> Self {
+        const UNUSED: Interior = Interior { body: BodyId(0), medium: None, priority: 0, ior: 1.0 };
+        Self { bodies: [UNUSED; Self::CAPACITY], outside, len: 0 }
+    }
+
+    /// The bodies that the point is inside of, the current one last.
+    #[inline]
+    #[must_use]
+    pub fn bodies(&self) -> &[Interior] {
+        &self.bodies[..usize::from(self.len)]
+    }
+
+    /// The body that counts; `None` outside all bodies.
+    #[inline]
+    #[must_use]
+    pub fn top(&self) -> Option<&Interior> {
+        self.bodies().last()
+    }
+
+    /// The medium at the point; `None` for vacuum.
+    #[inline]
+    #[must_use]
+    pub fn medium(&self) -> Option<MediumId> {
+        self.top().map_or(self.outside, |interior| interior.medium)
+    }
+
+    /// Index of refraction at the point; 1 outside all bodies.
+    #[inline]
+    #[must_use]
+    pub fn ior(&self) -> f32 {
+        self.top().map_or(1.0, |interior| interior.ior)
+    }
+
+    /// Priority of the body that counts; `i32::MIN` outside all bodies.
+    #[inline]
+    #[must_use]
+    pub fn priority(&self) -> i32 {
+        self.top().map_or(i32::MIN, |interior| interior.priority)
+    }
+
+    /// Whether the point is inside of `body`, whether or not it is the one that counts.
+    #[inline]
+    #[must_use]
+    pub fn contains(&self, body: BodyId) -> bool {
+        self.bodies().iter().any(|interior| interior.body == body)
+    }
+
+    /// How many bodies the point is inside of.
+    #[inline]
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.len as usize
+    }
+
+    /// Whether the point is outside all bodies.
+    #[inline]
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Goes into a body: above all others of at most its priority.
+    #[inline]
+    pub fn enter(&mut self, interior: Interior) -> Crossing {
+        let len = self.len();
+        if self.contains(interior.body) {
+            return Crossing::AlreadyInside;
+        }
+        if len == Self::CAPACITY {
+            return Crossing::Overflow;
+        }
+        let slot = self.bodies().partition_point(|below| below.priority <= interior.priority);
+        self.bodies.copy_within(slot..len, slot + 1);
+        self.bodies[slot] = interior;
+        self.len += 1;
+        Crossing::Done
+    }
+
+    /// Goes out of a body, wherever in the list it is.
+    #[inline]
+    pub fn leave(&mut self, body: BodyId) -> Crossing {
+        let len = self.len();
+        let Some(slot) = self.bodies().iter().position(|interior| interior.body == body) else {
+            return Crossing::NotInside;
+        };
+        self.bodies.copy_within(slot + 1..len, slot);
+        self.len -= 1;
+        Crossing::Done
+    }
+
+    /// Crosses the surface of a body, inwards if `entering`.
+    #[inline]
+    pub fn cross(&mut self, interior: Interior, entering: bool) -> Crossing {
+        if entering { self.enter(interior) } else { self.leave(interior.body) }
+    }
+}
+
+impl PartialEq for MediumStack {
+    /// The same bodies in the same order around the same outside; what unused slots hold is no matter.
+    fn eq(&self, other: &Self) -> bool {
+        self.outside == other.outside && self.bodies() == other.bodies()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+    use proptest::sample::subsequence;
+
+    use super::*;
+
+    fn interior(body: u32, priority: i32) -> Interior {
+        Interior { body: BodyId(body), medium: Some(MediumId(body)), priority, ior: 1.0 + body as f32 }
+    }
+
+    #[test]
+    fn outside_everything_is_the_global_medium() {
+        let stack = MediumStack::new(Some(MediumId(7)));
+        assert!(stack.is_empty());
+        assert_eq!((stack.medium(), stack.ior(), stack.priority()), (Some(MediumId(7)), 1.0, i32::MIN));
+        assert_eq!((stack.top(), stack.len()), (None, 0));
+    }
+
+    #[test]
+    fn a_body_of_vacuum_hides_what_is_around_it() {
+        let mut stack = MediumStack::new(Some(MediumId(7)));
+        assert_eq!(stack.enter(Interior { medium: None, ..interior(1, 0) }), Crossing::Done);
+        assert_eq!((stack.medium(), stack.ior()), (None, 2.0));
+        assert_eq!(stack.leave(BodyId(1)), Crossing::Done);
+        assert_eq!(stack, MediumStack::new(Some(MediumId(7))));
+    }
+
+    #[test]
+    fn the_highest_priority_counts_then_the_most_recent() {
+        let mut stack = MediumStack::new(None);
+        for (body, priority, top) in [(1, 5, 1), (2, 3, 1), (3, 5, 3), (4, 5, 4), (5, i32::MIN, 4), (6, 9, 6)]
+        {
+            assert_eq!(stack.cross(interior(body, priority), true), Crossing::Done);
+            assert_eq!(stack.medium(), Some(MediumId(top)), "after entering {body}");
+        }
+        for (body, top) in [(4, 6), (6, 3), (3, 1), (1, 2), (2, 5)] {
+            assert_eq!(stack.cross(interior(body, 0), false), Crossing::Done);
+            assert_eq!(stack.medium(), Some(MediumId(top)), "after leaving {body}");
+        }
+    }
+
+    #[test]
+    fn contradictions_are_reported_and_ignored() {
+        let mut stack = MediumStack::new(None);
+        assert_eq!(stack.leave(BodyId(1)), Crossing::NotInside);
+        assert_eq!(stack.enter(interior(1, 0)), Crossing::Done);
+        // The second time even with another priority.
+        assert_eq!(stack.enter(interior(1, 3)), Crossing::AlreadyInside);
+        assert_eq!((stack.len(), stack.priority()), (1, 0));
+        assert_eq!(stack.leave(BodyId(2)), Crossing::NotInside);
+        assert_eq!(stack.len(), 1);
+    }
+
+    #[test]
+    fn a_full_stack_refuses_and_stays_as_it_is() {
+        let mut stack = MediumStack::new(None);
+        for body in 0..MediumStack::CAPACITY as u32 {
+            assert_eq!(stack.enter(interior(body, 0)), Crossing::Done);
+        }
+        let before = stack;
+        assert_eq!(stack.enter(interior(99, 100)), Crossing::Overflow);
+        assert_eq!(stack.enter(interior(3, 100)), Crossing::AlreadyInside);
+        assert_eq!(stack, before);
+        assert_eq!(stack.leave(BodyId(99)), Crossing::NotInside);
+        assert_eq!(stack.leave(BodyId(0)), Crossing::Done);
+        assert_eq!(stack.enter(interior(99, 100)), Crossing::Done);
+        assert_eq!(stack.medium(), Some(MediumId(99)));
+    }
+
+    #[test]
+    fn equality_does_not_see_bodies_that_were_left() {
+        let (mut one, mut other) = (MediumStack::new(None), MediumStack::new(None));
+        for body in [1, 2] {
+            assert_eq!(one.enter(interior(body, 0)), Crossing::Done);
+        }
+        assert_eq!(one.leave(BodyId(2)), Crossing::Done);
+        assert_eq!(other.enter(interior(1, 0)), Crossing::Done);
+        assert_eq!(one, other);
+        assert_ne!(one, MediumStack::new(None));
+        assert_ne!(MediumStack::new(None), MediumStack::new(Some(MediumId(0))));
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_a_search_through_the_history(steps in vec((0_u32..12, -2_i32..3, any::<bool>()), 0..60)) {
+            let mut stack = MediumStack::new(Some(MediumId(99)));
+            // In order of entering.
+            let mut history: Vec<Interior> = Vec::new();
+            for (body, priority, entering) in steps {
+                let interior = interior(body, priority);
+                let inside = history.iter().position(|other| other.body == interior.body);
+                let expected = match (entering, inside) {
+                    (true, Some(_)) => Crossing::AlreadyInside,
+                    (true, None) if history.len() == MediumStack::CAPACITY => Crossing::Overflow,
+                    (true, None) => { history.push(interior); Crossing::Done }
+                    (false, Some(index)) => { history.remove(index); Crossing::Done }
+                    (false, None) => Crossing::NotInside,
+                };
+                prop_assert_eq!(stack.cross(interior, entering), expected);
+                // The last of the highest: `max_by_key` returns the last among equals.
+                let top = history.iter().max_by_key(|interior| interior.priority);
+                prop_assert_eq!(stack.top(), top);
+                prop_assert_eq!(stack.len(), history.len());
+                prop_assert_eq!(stack.contains(interior.body), history.iter().any(|other| other.body == interior.body));
+            }
+        }
+
+        #[test]
+        fn the_order_of_distinct_priorities_does_not_matter(
+            entering in Just((0_u32..8).collect::<Vec<_>>()).prop_shuffle(),
+            leaving in subsequence((0_u32..8).collect::<Vec<_>>(), 0..8).prop_shuffle(),
+        ) {
+            let mut stack = MediumStack::new(None);
+            for &body in &entering {
+                prop_assert_eq!(stack.enter(interior(body, 10 * body.cast_signed())), Crossing::Done);
+            }
+            for &body in &leaving {
+                prop_assert_eq!(stack.leave(BodyId(body)), Crossing::Done);
+            }
+            let left: Vec<_> = (0..8)
+                .filter(|body| !leaving.contains(body))
+                .map(|body| interior(body, 10 * body.cast_signed()))
+                .collect();
+            prop_assert_eq!(stack.bodies(), left.as_slice());
+            prop_assert_eq!(stack.top(), left.last());
+        }
+    }
+}

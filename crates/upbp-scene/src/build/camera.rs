@@ -1,0 +1,59 @@
+//! The camera and its film.
+
+use glam::Vec3;
+use upbp_estimators::scene::PixelRect;
+
+use super::Builder;
+use super::surfaces::ShapeDraft;
+use crate::camera::{PerspectiveCamera, PerspectiveView};
+use crate::description::Camera;
+
+impl Builder<'_> {
+    pub(super) fn camera(&mut self) -> Option<PerspectiveCamera> {
+        let film = &self.description.film;
+        let (width, height) = (film.width.get(), film.height.get());
+        let crop = film.crop.map_or(PixelRect { x: 0, y: 0, width, height }, |crop| PixelRect {
+            x: crop.x,
+            y: crop.y,
+            width: crop.width.get(),
+            height: crop.height.get(),
+        });
+        let ends = (u64::from(crop.x) + u64::from(crop.width), u64::from(crop.y) + u64::from(crop.height));
+        if ends.0 > u64::from(width) || ends.1 > u64::from(height) {
+            let message = format!(
+                "the crop ends at ({}, {}), outside of the {width} x {height} pixels",
+                ends.0, ends.1
+            );
+            self.problem("film", message);
+        }
+        let Camera::Perspective { origin, target, up, fov_degrees, lens_radius, focus_distance } =
+            &self.description.camera;
+        let view = PerspectiveView {
+            origin: origin.get(),
+            target: target.get(),
+            up: up.get(),
+            horizontal_fov: fov_degrees.get().to_radians(),
+            lens_radius: lens_radius.get(),
+            focus_distance: focus_distance
+                .map_or_else(|| origin.get().distance(target.get()), crate::description::Positive::get),
+        };
+        let whole = PixelRect { x: 0, y: 0, width, height };
+        if view.origin == view.target {
+            self.problem("camera", "`origin` and `target` are the same point");
+        } else if PerspectiveCamera::new(&view, width, height, whole).is_none() {
+            self.problem("camera", "`up` is zero or along the direction of view");
+        }
+        PerspectiveCamera::new(&view, width, height, crop)
+    }
+
+    /// A camera in something opaque sees nothing.
+    pub(super) fn check_camera_is_free(&mut self, origin: Vec3, drafts: &[Option<ShapeDraft>]) {
+        for (index, draft) in drafts.iter().enumerate() {
+            let Some(draft) = draft else { continue };
+            if draft.body.is_none() && draft.shape.contains(origin) == Some(true) {
+                let message = format!("lies inside of the opaque {}", self.shape_item(index));
+                self.problem("camera", message);
+            }
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Lights that are no surfaces.
+
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::Builder;
+use crate::description::Light as Description;
+use crate::light::{
+    ConstantEnvironment, DirectionalLight, EnvironmentImage, ImageEnvironment, Light, PointLight, SpotCone,
+    SpotLight,
+};
+
+/// How messages call a light: by its place from 1 and its kind.
+pub(super) fn item(index: usize, light: &Description) -> String {
+    let kind = match light {
+        Description::Point { .. } => "Point",
+        Description::Spot { .. } => "Spot",
+        Description::Directional { .. } => "Directional",
+        Description::Constant(_) => "Constant",
+        Description::Image { .. } => "Image",
+    };
+    format!("light {} ({kind})", index + 1)
+}
+
+/// Whether it is infinitely far away.
+pub(super) fn is_infinite(light: &Description) -> bool {
+    matches!(light, Description::Directional { .. } | Description::Constant(_) | Description::Image { .. })
+}
+
+/// Whether it is not black.
+pub(super) fn shines(light: &Description) -> bool {
+    match light {
+        Description::Point { intensity, .. } | Description::Spot { intensity, .. } => {
+            !intensity.get().is_black()
+        }
+        Description::Directional { irradiance, .. } => !irradiance.get().is_black(),
+        Description::Constant(radiance) => !radiance.get().is_black(),
+        Description::Image { .. } => true,
+    }
+}
+
+impl Builder<'_> {
+    pub(super) fn lights(&mut self) -> Vec<Light> {
+        let mut lights = Vec::new();
+        for (index, light) in self.description.lights.iter().enumerate() {
+            match self.light(light) {
+                Ok(light) => lights.push(light),
+                Err(message) => self.problem(item(index, light), message),
+            }
+        }
+        lights
+    }
+
+    fn light(&mut self, light: &Description) -> Result<Light, String> {
+        Ok(match light {
+            Description::Point { position, intensity } => {
+                Light::Point(PointLight { position: position.get(), intensity: intensity.get() })
+            }
+            Description::Spot { position, target, direction, intensity, beam_degrees, cutoff_degrees } => {
+                let axis = match (target, direction) {
+                    (Some(target), None) => unit(target.get() - position.get())
+                        .ok_or("`position` and `target` are the same point")?,
+                    (None, Some(direction)) => unit(direction.get()).ok_or("`direction` is zero")?,
+                    _ => return Err("needs either `target` or `direction`".into()),
+                };
+                let cutoff = cutoff_degrees.get();
+                let beam = beam_degrees.map_or(cutoff, crate::description::BeamAngle::get);
+                if beam > cutoff {
+                    return Err(format!("`beam_degrees` {beam} is more than `cutoff_degrees` {cutoff}"));
+                }
+                let cone = SpotCone { axis, beam: beam.to_radians(), cutoff: cutoff.to_radians().min(PI) };
+                Light::Spot(SpotLight { position: position.get(), intensity: intensity.get(), cone })
+            }
+            Description::Directional { direction, irradiance } => {
+                let direction = unit(direction.get()).ok_or("`direction` is zero")?;
+                Light::Directional(DirectionalLight { direction, irradiance: irradiance.get() })
+            }
+            Description::Constant(radiance) => {
+                Light::Constant(ConstantEnvironment { radiance: radiance.get() })
+            }
+            Description::Image { file, scale, rotation_degrees } => {
+                let image = self.environment_image(file)?;
+                let rotation = rotation_degrees.get().to_radians();
+                Light::Image(ImageEnvironment::new(Arc::new(image), scale.get(), rotation))
+            }
+        })
+    }
+
+    fn environment_image(&mut self, file: &str) -> Result<EnvironmentImage, String> {
+        let path = self.path(file);
+        let describe = |error: crate::light::EnvironmentImageError| {
+            // The reason is part of the message: a list of problems has no sources.
+            let reason =
+                std::error::Error::source(&error).map_or_else(String::new, |reason| format!(": {reason}"));
+            format!("image `{}` {error}{reason}", path.display())
+        };
+        let image = EnvironmentImage::load(&path).map_err(describe)?;
+        self.hash.write(&image.fingerprint().to_le_bytes());
+        Ok(image)
+    }
+}
+
+/// In double precision: short and long vectors alike.
+fn unit(v: Vec3) -> Option<Vec3> {
+    v.as_dvec3().try_normalize().map(|v| v.as_vec3())
+}

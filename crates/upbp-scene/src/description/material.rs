@@ -1,0 +1,54 @@
+//! Materials.
+
+use serde::{Deserialize, Serialize};
+
+use super::value::{Colour, Ior, NonNegative, Reflectance, Roughness};
+
+/// What a surface is made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Material {
+    /// Matt; both sides reflect.
+    Lambert(Reflectance),
+    /// Matt with a glossy lobe; both sides reflect.
+    Phong {
+        /// Albedo of the matt part.
+        diffuse: Reflectance,
+        /// Albedo of the lobe; with the matt part at most 1.
+        specular: Reflectance,
+        /// Sharpness of the lobe.
+        exponent: NonNegative,
+    },
+    /// Perfectly smooth metal; both sides reflect.
+    Mirror(Reflectance),
+    /// Rough metal by its complex index of refraction; both sides reflect.
+    Conductor {
+        /// Width of the distribution of normals.
+        alpha: Roughness,
+        /// Real part of the index.
+        eta: Colour,
+        /// Imaginary part of the index.
+        k: Colour,
+    },
+    /// Rough metal by its colour at normal incidence; both sides reflect.
+    Metal {
+        /// Width of the distribution of normals.
+        alpha: Roughness,
+        /// Share of the light that is reflected at normal incidence.
+        reflectance: Reflectance,
+    },
+    /// Smooth glass: bounds a body.
+    Dielectric {
+        /// Index of refraction of the body.
+        ior: Ior,
+    },
+    /// Rough glass: bounds a body.
+    RoughDielectric {
+        /// Width of the distribution of normals.
+        alpha: Roughness,
+        /// Index of refraction of the body.
+        ior: Ior,
+    },
+    /// Nothing to see: bounds a body that does not refract.
+    Null,
+}

@@ -1,0 +1,78 @@
+//! Surfaces.
+
+use serde::{Deserialize, Serialize};
+
+use super::is_default;
+use super::value::{Colour, Positive, Vector};
+
+/// A surface, or a body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shape {
+    /// For messages.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Where it is.
+    pub geometry: Geometry,
+    /// Name of the material.
+    pub material: String,
+    /// Name of the medium inside of a body; vacuum if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interior: Option<String>,
+    /// Where bodies overlap, the one with the higher priority counts; among equals the one with the smaller volume.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub priority: i32,
+    /// Radiance of the side that the normal points to.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub emission: Colour,
+}
+
+/// The geometry of a surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Geometry {
+    /// A sphere.
+    Sphere {
+        /// Centre.
+        centre: Vector,
+        /// Radius.
+        radius: Positive,
+    },
+    /// The parallelogram `origin + a edge_u + b edge_v`, a and b in `[0, 1]`, with the normal `edge_u × edge_v`.
+    Quad {
+        /// A corner.
+        origin: Vector,
+        /// One edge from there.
+        edge_u: Vector,
+        /// The other.
+        edge_v: Vector,
+    },
+    /// A box along the axes.
+    Box {
+        /// The corner with the least coordinates.
+        min: Vector,
+        /// The corner with the greatest.
+        max: Vector,
+    },
+    /// Triangles from a file, or given here: either `file`, or `positions` and `indices`.
+    Mesh {
+        /// Path of a Wavefront OBJ file, relative to the scene file.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        file: Option<String>,
+        /// Corners.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        positions: Vec<Vector>,
+        /// Triangles as numbers of corners, from 0, counter-clockwise as seen from outside.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        indices: Vec<[u32; 3]>,
+        /// Shading normals, none or one per corner.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        normals: Vec<Vector>,
+        /// Factor for all coordinates, applied first.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        scale: Option<Positive>,
+        /// Moves all corners, applied second.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        translate: Option<Vector>,
+    },
+}

@@ -1,0 +1,70 @@
+//! Scenes as RON text, and their fingerprint.
+
+use ron::Options;
+use ron::error::SpannedError;
+use ron::extensions::Extensions;
+use ron::ser::PrettyConfig;
+
+use super::SceneDescription;
+use crate::error::SceneError;
+
+/// `Some` and the parentheses of single values may be left out.
+fn options() -> Options {
+    Options::default()
+        .with_default_extension(Extensions::IMPLICIT_SOME)
+        .with_default_extension(Extensions::UNWRAP_NEWTYPES)
+}
+
+impl SceneDescription {
+    /// Reads a scene file's text.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Syntax`] with line and column of the first place that is wrong.
+    pub fn from_ron(text: &str) -> Result<Self, SceneError> {
+        options().from_str(text).map_err(|error| syntax_error(&error))
+    }
+
+    /// The scene as the text of a file.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Unwritable`]; no description that came from a file causes it.
+    pub fn to_ron(&self) -> Result<String, SceneError> {
+        let pretty =
+            PrettyConfig::new().new_line("\n").indentor("  ").depth_limit(4).separate_tuple_members(false);
+        options().to_string_pretty(self, pretty).map_err(|error| SceneError::Unwritable(error.to_string()))
+    }
+
+    /// A number that is the same for equal descriptions, on any machine: FNV-1a over the compact text. The
+    /// contents of files that the scene refers to do not enter.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        let mut hash = Fnv1a::default();
+        // A description that cannot be written has its error as a fingerprint.
+        hash.write(options().to_string(self).unwrap_or_else(|error| error.to_string()).as_bytes());
+        hash.0
+    }
+}
+
+fn syntax_error(error: &SpannedError) -> SceneError {
+    let start = error.span.start;
+    SceneError::Syntax { path: None, line: start.line, column: start.col, message: error.code.to_string() }
+}
+
+/// Fowler, Noll and Vo's hash, variant 1a with 64 bits: stable across versions, unlike the standard library's.
+pub(crate) struct Fnv1a(pub(crate) u64);
+
+impl Default for Fnv1a {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Fnv1a {
+    pub(crate) fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+}

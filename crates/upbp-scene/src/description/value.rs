@@ -1,0 +1,356 @@
+//! Numbers that are checked where they are read.
+//!
+//! Each type accepts one range and refuses the rest, NaN and infinities included, with a message that says what
+//! was expected; the reader adds line and column.
+
+use std::fmt;
+
+use glam::Vec3;
+use serde::de::{Error as _, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use upbp_media::Spectrum;
+
+/// Largest coordinate, in scene units: squares and cubes of lengths stay finite in single precision.
+const MAX_COORDINATE: f32 = 1e12;
+
+/// A value outside the range of its type.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("expected {expected}, found {found}")]
+pub struct ValueError {
+    /// The accepted range, in words.
+    pub expected: &'static str,
+    /// The value, as text.
+    pub found: String,
+}
+
+/// A number in a range.
+macro_rules! number {
+    ($(#[$doc:meta])* $name:ident($inner:ty), $expected:literal, $accepts:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(try_from = "f32", into = "f32")]
+        pub struct $name($inner);
+
+        impl $name {
+            /// Checks the range.
+            pub fn new(value: f32) -> Result<Self, ValueError> {
+                let accepts: fn(f32) -> bool = $accepts;
+                if accepts(value) {
+                    Ok(Self(value))
+                } else {
+                    Err(ValueError { expected: $expected, found: value.to_string() })
+                }
+            }
+
+            /// The number.
+            #[must_use]
+            pub const fn get(self) -> f32 {
+                self.0
+            }
+        }
+
+        impl TryFrom<f32> for $name {
+            type Error = ValueError;
+
+            fn try_from(value: f32) -> Result<Self, ValueError> {
+                Self::new(value)
+            }
+        }
+
+        impl From<$name> for f32 {
+            fn from(value: $name) -> Self {
+                value.0
+            }
+        }
+    };
+}
+
+number!(
+    /// A finite number of at least zero.
+    NonNegative(f32), "a finite number of at least 0", |x| (0.0..=MAX_COORDINATE).contains(&x)
+);
+number!(
+    /// A finite number above zero.
+    Positive(f32), "a finite number above 0", |x| x.is_normal() && x > 0.0 && x <= MAX_COORDINATE
+);
+number!(
+    /// A Henyey-Greenstein asymmetry, in `(-1, 1)`.
+    Asymmetry(f32), "a mean cosine above -1 and below 1", |x| x > -1.0 && x < 1.0
+);
+number!(
+    /// An index of refraction, in `[0.1, 10]`.
+    Ior(f32), "an index of refraction from 0.1 to 10", |x| (0.1..=10.0).contains(&x)
+);
+number!(
+    /// Width of the distribution of normals of a rough surface, in `[0.001, 1]`.
+    Roughness(f32), "a roughness from 0.001 to 1 (for less, use a smooth material)", |x| (0.001..=1.0).contains(&x)
+);
+number!(
+    /// Full horizontal angle of an image in degrees, in `[0.001, 179]`.
+    FieldOfView(f32), "an angle from 0.001 to 179 degrees", |x| (0.001..=179.0).contains(&x)
+);
+number!(
+    /// Half angle of a cone in degrees up to which a spot has its full intensity, in `[0, 180]`.
+    BeamAngle(f32), "an angle from 0 to 180 degrees", |x| (0.0..=180.0).contains(&x)
+);
+number!(
+    /// Half angle of a cone in degrees at which a spot ends, in `[0.01, 180]`.
+    CutoffAngle(f32), "an angle from 0.01 to 180 degrees", |x| (0.01..=180.0).contains(&x)
+);
+number!(
+    /// An angle in degrees, in `[-360, 360]`.
+    Degrees(f32), "an angle from -360 to 360 degrees", |x| (-360.0..=360.0).contains(&x)
+);
+
+impl NonNegative {
+    /// Zero.
+    pub const ZERO: Self = Self(0.0);
+}
+
+impl Positive {
+    /// One.
+    pub const ONE: Self = Self(1.0);
+}
+
+impl Degrees {
+    /// No rotation.
+    pub const ZERO: Self = Self(0.0);
+}
+
+impl Default for Degrees {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+/// The format's version: 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub struct Version;
+
+impl TryFrom<u32> for Version {
+    type Error = ValueError;
+
+    fn try_from(version: u32) -> Result<Self, ValueError> {
+        if version == 1 {
+            Ok(Self)
+        } else {
+            Err(ValueError { expected: "version 1 of the format", found: version.to_string() })
+        }
+    }
+}
+
+impl From<Version> for u32 {
+    fn from(_: Version) -> Self {
+        1
+    }
+}
+
+/// A number of pixels along one side of an image, in `[1, 65536]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub struct Count(u32);
+
+impl Count {
+    /// Checks the range.
+    pub fn new(value: u32) -> Result<Self, ValueError> {
+        if (1..=65_536).contains(&value) {
+            Ok(Self(value))
+        } else {
+            Err(ValueError { expected: "a number of pixels from 1 to 65536", found: value.to_string() })
+        }
+    }
+
+    /// Side of the image if a file does not say.
+    pub(super) const DEFAULT: Self = Self(512);
+
+    /// The number.
+    #[must_use]
+    pub const fn get(self) -> u32 {
+        self.0
+    }
+}
+
+impl TryFrom<u32> for Count {
+    type Error = ValueError;
+
+    fn try_from(value: u32) -> Result<Self, ValueError> {
+        Self::new(value)
+    }
+}
+
+impl From<Count> for u32 {
+    fn from(value: Count) -> Self {
+        value.0
+    }
+}
+
+/// Three finite numbers: a point or a direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "[f32; 3]", into = "[f32; 3]")]
+pub struct Vector(Vec3);
+
+impl Vector {
+    /// Upwards: +y.
+    pub const UP: Self = Self(Vec3::Y);
+    /// The origin.
+    pub const ZERO: Self = Self(Vec3::ZERO);
+
+    /// Checks that all coordinates are finite, and at most 10¹² in size.
+    pub fn new(value: Vec3) -> Result<Self, ValueError> {
+        if value.is_finite() && value.abs().max_element() <= MAX_COORDINATE {
+            Ok(Self(value))
+        } else {
+            let expected = "finite coordinates between -1e12 and 1e12";
+            Err(ValueError { expected, found: format!("({}, {}, {})", value.x, value.y, value.z) })
+        }
+    }
+
+    /// The coordinates.
+    #[must_use]
+    pub const fn get(self) -> Vec3 {
+        self.0
+    }
+}
+
+impl TryFrom<[f32; 3]> for Vector {
+    type Error = ValueError;
+
+    fn try_from(value: [f32; 3]) -> Result<Self, ValueError> {
+        Self::new(value.into())
+    }
+}
+
+impl From<Vector> for [f32; 3] {
+    fn from(value: Vector) -> Self {
+        value.0.into()
+    }
+}
+
+/// Red, green and blue, in a range. A single number stands for grey.
+macro_rules! colour {
+    ($(#[$doc:meta])* $name:ident, $expected:literal, $accepts:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name(Spectrum);
+
+        impl $name {
+            /// Black.
+            pub const ZERO: Self = Self(Spectrum::ZERO);
+
+            /// Checks the range of every channel.
+            pub fn new(value: Spectrum) -> Result<Self, ValueError> {
+                let accepts: fn(f32) -> bool = $accepts;
+                let [r, g, b] = value.to_array();
+                if accepts(r) && accepts(g) && accepts(b) {
+                    Ok(Self(value))
+                } else {
+                    let found = if [g, b] == [r; 2] { r.to_string() } else { format!("({r}, {g}, {b})") };
+                    Err(ValueError { expected: $expected, found })
+                }
+            }
+
+            /// The channels.
+            #[must_use]
+            pub const fn get(self) -> Spectrum {
+                self.0
+            }
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self::ZERO
+            }
+        }
+
+        impl Serialize for $name {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let channels = self.0.to_array();
+                if channels == [channels[0]; 3] {
+                    channels[0].serialize(serializer)
+                } else {
+                    channels.serialize(serializer)
+                }
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let value = deserializer.deserialize_any(Channels)?;
+                Self::new(value).map_err(D::Error::custom)
+            }
+        }
+    };
+}
+
+colour!(
+    /// Three finite numbers of at least zero: radiance, intensity, a coefficient.
+    Colour, "finite numbers of at least 0", |x| (0.0..=MAX_COORDINATE).contains(&x)
+);
+colour!(
+    /// Three numbers in `[0, 1]`: the share of light that is reflected.
+    Reflectance, "numbers from 0 to 1", |x| (0.0..=1.0).contains(&x)
+);
+
+impl Reflectance {
+    /// Reflects everything.
+    pub const ONE: Self = Self(Spectrum::ONE);
+}
+
+/// Reads `(r, g, b)` or a single number.
+struct Channels;
+
+impl<'de> Visitor<'de> for Channels {
+    type Value = Spectrum;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a colour: a number, or three in parentheses (r, g, b)")
+    }
+
+    fn visit_f64<E>(self, grey: f64) -> Result<Spectrum, E> {
+        Ok(Spectrum::splat(grey as f32))
+    }
+
+    fn visit_f32<E>(self, grey: f32) -> Result<Spectrum, E> {
+        Ok(Spectrum::splat(grey))
+    }
+
+    fn visit_u64<E>(self, grey: u64) -> Result<Spectrum, E> {
+        Ok(Spectrum::splat(grey as f32))
+    }
+
+    fn visit_i64<E>(self, grey: i64) -> Result<Spectrum, E> {
+        Ok(Spectrum::splat(grey as f32))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut channels: A) -> Result<Spectrum, A::Error> {
+        let mut rgb = [0.0; 3];
+        for (index, channel) in rgb.iter_mut().enumerate() {
+            *channel = channels.next_element()?.ok_or_else(|| A::Error::invalid_length(index, &self))?;
+        }
+        if channels.next_element::<f32>()?.is_some() {
+            return Err(A::Error::invalid_length(4, &self));
+        }
+        Ok(Spectrum::from_array(rgb))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_number_in_range_is_refused() {
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e-30] {
+            assert!(NonNegative::new(bad).is_err());
+            assert!(Positive::new(bad).is_err());
+            assert!(Reflectance::new(Spectrum::new(0.5, bad, 0.5)).is_err());
+        }
+        assert!(NonNegative::new(0.0).is_ok());
+        assert!(Positive::new(0.0).is_err());
+        assert!(Positive::new(1e-40).is_err());
+        assert!(Vector::new(Vec3::new(0.0, f32::NAN, 0.0)).is_err());
+        assert!(Asymmetry::new(1.0).is_err());
+        assert!(Count::new(0).is_err());
+    }
+}

@@ -1,0 +1,87 @@
+//! What can be wrong with a scene.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Why a scene cannot be rendered.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The text is not a scene: the first place that is wrong.
+    #[error("{}{line}:{column}: {message}", prefix(path.as_deref()))]
+    Syntax {
+        /// The file, if the text came from one.
+        path: Option<PathBuf>,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What was expected and found.
+        message: String,
+    },
+    /// The text is read, but describes no scene: all problems.
+    #[error("{}", Listing { path: path.as_deref(), problems })]
+    Invalid {
+        /// The file, if the description came from one.
+        path: Option<PathBuf>,
+        /// At least one.
+        problems: Vec<Problem>,
+    },
+    /// A description cannot be written as text.
+    #[error("the scene cannot be written: {0}")]
+    Unwritable(String),
+}
+
+impl SceneError {
+    /// Adds the file to an error about text.
+    pub(crate) fn in_file(mut self, file: &Path) -> Self {
+        if let Self::Syntax { path, .. } | Self::Invalid { path, .. } = &mut self {
+            path.get_or_insert_with(|| file.to_owned());
+        }
+        self
+    }
+}
+
+/// One thing that is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// The part of the scene: ``shape `floor` ``, `light 2 (Spot)`.
+    pub item: String,
+    /// What is wrong with it, what was expected, and the value that was found.
+    pub message: String,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.item, self.message)
+    }
+}
+
+fn prefix(path: Option<&Path>) -> String {
+    path.map_or_else(String::new, |path| format!("{}:", path.display()))
+}
+
+struct Listing<'a> {
+    path: Option<&'a Path>,
+    problems: &'a [Problem],
+}
+
+impl fmt::Display for Listing<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = self.problems.len();
+        let what = if count == 1 { "problem" } else { "problems" };
+        match self.path {
+            Some(path) => write!(f, "{}: {count} {what}", path.display())?,
+            None => write!(f, "{count} {what} in the scene")?,
+        }
+        self.problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
+    }
+}

@@ -1,0 +1,18 @@
+#![doc = include_str!("../README.md")]
+
+mod build;
+mod camera;
+pub mod description;
+mod error;
+pub mod light;
+pub mod material;
+pub mod obj;
+mod sampling;
+mod scene;
+
+pub use self::camera::{PerspectiveCamera, PerspectiveView};
+pub use self::description::SceneDescription;
+pub use self::error::{Problem, SceneError};
+pub use self::light::Light;
+pub use self::material::Material;
+pub use self::scene::ReadyScene;

@@ -1,0 +1,152 @@
+//! A surface that shines: the same radiance in all directions on the side of its geometric normal.
+//!
+//! Points are uniform by area, except that a receiver outside of a sphere chooses uniformly by solid angle
+//! among the points that it sees.
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+use glam::Vec3;
+use upbp_accel::{Shape, Sphere};
+use upbp_estimators::scene::{
+    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+};
+use upbp_media::Spectrum;
+
+use super::direction_and_distance;
+use crate::sampling;
+
+/// Nearer to the centre of a sphere than this many radii (squared), the cone of directions is too close to a
+/// hemisphere: points are chosen by area.
+const NEAR_SPHERE: f32 = 1.001;
+
+/// A surface that shines on one side.
+#[derive(Clone, Debug)]
+pub struct AreaLight {
+    shape: Shape,
+    area: f32,
+    radiance: Spectrum,
+}
+
+impl AreaLight {
+    /// A light of the given radiance, W m⁻² sr⁻¹, on `shape`, which should be the very shape of the scene.
+    /// `None` if its area is zero, or too small or large to be inverted.
+    #[must_use]
+    pub fn new(shape: Shape, radiance: Spectrum) -> Option<Self> {
+        let area = shape.area();
+        (area.is_normal() && area > 0.0 && (1.0 / area).is_finite()).then_some(Self { shape, area, radiance })
+    }
+
+    /// Radiance of the shining side, W m⁻² sr⁻¹.
+    #[must_use]
+    pub const fn radiance(&self) -> Spectrum {
+        self.radiance
+    }
+
+    /// The cone of directions in which `receiver` sees the light, if points are chosen by it: its axis, and one
+    /// minus the cosine of its half angle.
+    fn cone(&self, receiver: Vec3) -> Option<(&Sphere, Vec3, f32)> {
+        let Shape::Sphere(sphere) = &self.shape else { return None };
+        let to_centre = sphere.centre() - receiver;
+        let sin2 = sphere.radius() * sphere.radius() / to_centre.length_squared();
+        if sin2 * NEAR_SPHERE >= 1.0 {
+            return None;
+        }
+        let axis = to_centre.try_normalize()?;
+        // 1 − cos without cancellation for a small sphere.
+        let height = sin2 / (1.0 + (1.0 - sin2).sqrt());
+        (height > 0.0).then_some((sphere, axis, height))
+    }
+
+    fn sample_point(&self, receiver: Vec3, u: [f32; 2]) -> Option<EmitterPoint> {
+        let Some((sphere, axis, height)) = self.cone(receiver) else {
+            let (position, normal) = self.shape.sample_area(u);
+            return Some(EmitterPoint { position, normal });
+        };
+        let towards = sampling::cone(axis, height, u);
+        // Where that ray enters the sphere; a ray on the rim may miss by rounding, and touches.
+        let to_centre = (sphere.centre() - receiver).as_dvec3();
+        let along = to_centre.dot(towards.as_dvec3());
+        let across = to_centre - towards.as_dvec3() * along;
+        let radius = f64::from(sphere.radius());
+        let half_chord = (radius * radius - across.length_squared()).max(0.0).sqrt();
+        let normal = (towards.as_dvec3() * -half_chord - across).try_normalize()?;
+        let position = (sphere.centre().as_dvec3() + normal * radius).as_vec3();
+        Some(EmitterPoint { position, normal: normal.as_vec3() })
+    }
+}
+
+impl Emitter for AreaLight {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Area
+    }
+
+    fn power(&self, _: &BoundingSphere) -> f32 {
+        PI * self.area * self.radiance.mean()
+    }
+
+    fn sample_emission(
+        &self,
+        _: &BoundingSphere,
+        u_position: [f32; 2],
+        u_direction: [f32; 2],
+    ) -> Option<Emission> {
+        let (position, normal) = self.shape.sample_area(u_position);
+        let direction = sampling::to_world(normal, sampling::cosine_hemisphere(u_direction));
+        let cosine = direction.dot(normal);
+        (cosine > 0.0).then(|| Emission {
+            point: EmitterPoint { position, normal },
+            direction,
+            radiance: self.radiance,
+            pdf_position: 1.0 / self.area,
+            pdf_direction: cosine * FRAC_1_PI,
+        })
+    }
+
+    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
+        let point = self.sample_point(receiver, u)?;
+        let (towards_light, distance) = direction_and_distance(receiver, point.position)?;
+        let seen = self.hit(bounds, &point, -towards_light, receiver)?;
+        (seen.pdf_incident > 0.0).then_some(Incident {
+            point,
+            towards_light,
+            distance,
+            radiance: seen.radiance,
+            pdf: seen.pdf_incident,
+            pdf_position: seen.pdf_position,
+            pdf_direction: seen.pdf_direction,
+        })
+    }
+
+    fn hit(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        receiver: Vec3,
+    ) -> Option<HitDensities> {
+        let cosine = direction.dot(point.normal);
+        let pdf_position = 1.0 / self.area;
+        (cosine > 0.0).then(|| HitDensities {
+            radiance: self.radiance,
+            pdf_incident: self.pdf_incident(bounds, point, direction, receiver, pdf_position),
+            pdf_position,
+            pdf_direction: cosine.min(1.0) * FRAC_1_PI,
+        })
+    }
+
+    fn pdf_incident(
+        &self,
+        _: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        receiver: Vec3,
+        pdf_position: f32,
+    ) -> f32 {
+        let Some((_, _, height)) = self.cone(receiver) else { return pdf_position };
+        // p_area = p_ω cos θ / d²: zero on the far side, which the receiver does not see.
+        let pdf_solid_angle = 1.0 / (TAU * height);
+        let pdf = pdf_solid_angle * direction.dot(point.normal).max(0.0)
+            / receiver.distance_squared(point.position);
+        if pdf.is_finite() { pdf } else { 0.0 }
+    }
+}

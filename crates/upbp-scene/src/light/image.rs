@@ -1,0 +1,321 @@
+//! Light from all directions by a latitude-longitude image.
+//!
+//! The radiance is constant over each pixel, and directions are drawn with a density in exact proportion to its
+//! luminance: by row, then by column, then uniformly by solid angle within the pixel. With the polar angle θ
+//! from +y, a pixel of an image of w columns covers `(2π/w) (cos θ₀ − cos θ₁)` steradians.
+//!
+//! Oracle: `tests::the_density_of_an_image_integrates_to_one`.
+
+use std::f32::consts::{FRAC_1_PI, TAU};
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::Vec3;
+use upbp_estimators::scene::{
+    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+};
+use upbp_media::Spectrum;
+
+use super::{beyond, disc_area, start_on_disc};
+use crate::description::Fnv1a;
+
+/// The most pixels that an environment may have: 16384 × 8192.
+const MAX_PIXELS: usize = 1 << 27;
+
+/// Why an image cannot serve as an environment.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EnvironmentImageError {
+    /// The file is no readable `OpenEXR` image with channels R, G and B.
+    #[error("cannot be read as an OpenEXR image with channels R, G, B")]
+    Unreadable(#[source] exr::error::Error),
+    /// No pixels, not as many as the size says, or too many.
+    #[error("has {pixels} pixels for {width} x {height}, expected all of them, from 1 to {MAX_PIXELS}")]
+    Size {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Pixels.
+        pixels: usize,
+    },
+    /// A pixel that is no radiance.
+    #[error("pixel ({x}, {y}) is {value:?}, expected finite values of at least zero")]
+    Pixel {
+        /// Column, from 0 at the left.
+        x: usize,
+        /// Row, from 0 at the top.
+        y: usize,
+        /// Its channels.
+        value: [f32; 3],
+    },
+    /// Every pixel is black.
+    #[error("is black everywhere")]
+    Black,
+}
+
+/// Pixels of an environment with the tables to sample them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentImage {
+    width: usize,
+    height: usize,
+    pixels: Vec<Spectrum>,
+    /// `∫ luminance dω` up to the end of each row, relative to the whole.
+    rows: Vec<f32>,
+    /// The same within each row, up to the end of each column, relative to the row.
+    columns: Vec<f32>,
+    /// `∫ luminance dω` over all directions.
+    total_luminance: f64,
+    /// `∫ mean of the channels dω` over all directions.
+    total_mean: f64,
+}
+
+impl EnvironmentImage {
+    /// From pixels row by row, the first row around +y. Values are radiance in W m⁻² sr⁻¹.
+    pub fn new(width: usize, height: usize, pixels: Vec<Spectrum>) -> Result<Self, EnvironmentImageError> {
+        let expected = width.checked_mul(height).filter(|&count| count > 0 && count <= MAX_PIXELS);
+        if expected != Some(pixels.len()) {
+            return Err(EnvironmentImageError::Size { width, height, pixels: pixels.len() });
+        }
+        if let Some(index) = pixels.iter().position(|pixel| !(pixel.is_finite() && pixel.is_non_negative())) {
+            let value = pixels[index].to_array();
+            return Err(EnvironmentImageError::Pixel { x: index % width, y: index / width, value });
+        }
+        let mut rows = Vec::with_capacity(height);
+        let mut columns = Vec::with_capacity(width * height);
+        let (mut total_luminance, mut total_mean) = (0.0_f64, 0.0_f64);
+        for (y, row) in pixels.chunks_exact(width).enumerate() {
+            let solid_angle = pixel_solid_angle(width, height, y);
+            let row_luminance: f64 = row.iter().map(|pixel| f64::from(pixel.luminance())).sum();
+            let mut sum = 0.0;
+            columns.extend(
+                row.iter()
+                    .enumerate()
+                    .map(|(x, pixel)| {
+                        sum += f64::from(pixel.luminance());
+                        // A row without light is never drawn; its table only has to be one.
+                        if row_luminance > 0.0 { sum / row_luminance } else { (x + 1) as f64 / width as f64 }
+                    })
+                    .map(|share| share as f32),
+            );
+            total_luminance += row_luminance * solid_angle;
+            total_mean += row.iter().map(|pixel| f64::from(pixel.mean())).sum::<f64>() * solid_angle;
+            rows.push(total_luminance);
+        }
+        if total_luminance <= 0.0 {
+            return Err(EnvironmentImageError::Black);
+        }
+        let rows = rows.into_iter().map(|sum| (sum / total_luminance) as f32).collect();
+        Ok(Self { width, height, pixels, rows, columns, total_luminance, total_mean })
+    }
+
+    /// Reads an `OpenEXR` file: the first layer with channels R, G and B.
+    pub fn load(path: &Path) -> Result<Self, EnvironmentImageError> {
+        use exr::prelude::{ReadChannels, ReadLayers, read};
+        struct Pixels {
+            width: usize,
+            height: usize,
+            values: Vec<Spectrum>,
+        }
+        let image = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .rgb_channels(
+                |size, _| {
+                    // A larger image is refused below; its pixels are not stored.
+                    let (width, height) = (size.width(), size.height());
+                    let count = width.checked_mul(height).filter(|&count| count <= MAX_PIXELS);
+                    Pixels { width, height, values: vec![Spectrum::ZERO; count.unwrap_or(0)] }
+                },
+                |pixels: &mut Pixels, at, (r, g, b): (f32, f32, f32)| {
+                    if let Some(value) = pixels.values.get_mut(at.y() * pixels.width + at.x()) {
+                        *value = Spectrum::new(r, g, b);
+                    }
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .from_file(path)
+            .map_err(EnvironmentImageError::Unreadable)?;
+        let pixels = image.layer_data.channel_data.pixels;
+        Self::new(pixels.width, pixels.height, pixels.values)
+    }
+
+    /// A number that is the same for equal pixels.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let mut hash = Fnv1a::default();
+        hash.write(&(self.width as u64).to_le_bytes());
+        for channel in self.pixels.iter().flat_map(|pixel| pixel.to_array()) {
+            hash.write(&channel.to_le_bytes());
+        }
+        hash.0
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub const fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// Radiance from `direction` (of the image, unit vector) and the density of [`sample`](Self::sample) there.
+    ///
+    /// The middle of the image is at −z, its top at +y, and its right half, as seen from inside, at +x.
+    pub(super) fn lookup(&self, direction: Vec3) -> (Spectrum, f32) {
+        let longitude = direction.x.atan2(-direction.z);
+        let column = (longitude / TAU + 0.5) * self.width as f32;
+        // The arc tangent keeps the angle at the poles, where the arc cosine has no digits.
+        let polar = direction.x.hypot(direction.z).atan2(direction.y);
+        let row = polar * FRAC_1_PI * self.height as f32;
+        let x = (column as usize).min(self.width - 1);
+        let y = (row as usize).min(self.height - 1);
+        let radiance = self.pixels[y * self.width + x];
+        (radiance, (f64::from(radiance.luminance()) / self.total_luminance) as f32)
+    }
+
+    /// Draws a direction of the image, in proportion to the luminance.
+    fn sample(&self, u: [f32; 2]) -> Vec3 {
+        let (y, v) = invert(&self.rows, u[0]);
+        let (x, u) = invert(&self.columns[y * self.width..(y + 1) * self.width], u[1]);
+        // Uniform by solid angle: the versine is linear in it. From the nearer pole, for its digits.
+        let (top, bottom) = (polar_angle(self.height, y), polar_angle(self.height, y + 1));
+        let versine = |angle: f64| 2.0 * (0.5 * angle).sin().powi(2);
+        let (below, above) = (
+            versine(top) + (versine(bottom) - versine(top)) * f64::from(v),
+            versine(std::f64::consts::PI - top)
+                + (versine(std::f64::consts::PI - bottom) - versine(std::f64::consts::PI - top))
+                    * f64::from(v),
+        );
+        let sine = (below * above).max(0.0).sqrt();
+        let cosine = 0.5 * (above - below);
+        let longitude = ((x as f64 + f64::from(u)) / self.width as f64 - 0.5) * std::f64::consts::TAU;
+        Vec3::new((sine * longitude.sin()) as f32, cosine as f32, (-sine * longitude.cos()) as f32)
+            .normalize()
+    }
+}
+
+/// Polar angle of the upper edge of row `y`.
+fn polar_angle(height: usize, y: usize) -> f64 {
+    std::f64::consts::PI * y as f64 / height as f64
+}
+
+/// Solid angle of each pixel of row `y`: `(2π/w) (cos θ₀ − cos θ₁)`, the difference as a product.
+fn pixel_solid_angle(width: usize, height: usize, y: usize) -> f64 {
+    let (top, bottom) = (polar_angle(height, y), polar_angle(height, y + 1));
+    let belt = 2.0 * (0.5 * (top + bottom)).sin() * (0.5 * (bottom - top)).sin();
+    std::f64::consts::TAU / width as f64 * belt
+}
+
+/// The step of a cumulative table that `u` falls on, and where within the step, in `[0, 1)`.
+fn invert(cumulative: &[f32], u: f32) -> (usize, f32) {
+    let index = cumulative.partition_point(|&end| end <= u).min(cumulative.len() - 1);
+    let start = if index == 0 { 0.0 } else { cumulative[index - 1] };
+    let within = (u - start) / (cumulative[index] - start);
+    (index, if within.is_finite() { within.clamp(0.0, 1.0 - f32::EPSILON) } else { 0.5 })
+}
+
+/// An environment given by an image.
+#[derive(Clone, Debug)]
+pub struct ImageEnvironment {
+    image: Arc<EnvironmentImage>,
+    scale: f32,
+    rotation: Rotation,
+}
+
+/// A rotation about +y by its sine and cosine.
+#[derive(Clone, Copy, Debug)]
+struct Rotation {
+    sin: f32,
+    cos: f32,
+}
+
+impl Rotation {
+    fn apply(self, v: Vec3) -> Vec3 {
+        Vec3::new(self.cos * v.x + self.sin * v.z, v.y, self.cos * v.z - self.sin * v.x)
+    }
+
+    fn inverse(self) -> Self {
+        Self { sin: -self.sin, cos: self.cos }
+    }
+}
+
+impl ImageEnvironment {
+    /// The light of `image` times `scale`, which is finite and not negative, turned by `rotation` radians
+    /// about +y, counter-clockwise as seen from above.
+    #[must_use]
+    pub fn new(image: Arc<EnvironmentImage>, scale: f32, rotation: f32) -> Self {
+        let (sin, cos) = rotation.sin_cos();
+        Self { image, scale, rotation: Rotation { sin, cos } }
+    }
+
+    /// Radiance from `towards_light`, a unit vector of the scene, and the density of choosing it, sr⁻¹.
+    #[must_use]
+    pub fn radiance_and_pdf(&self, towards_light: Vec3) -> (Spectrum, f32) {
+        let (radiance, pdf) = self.image.lookup(self.rotation.inverse().apply(towards_light));
+        (radiance * self.scale, pdf)
+    }
+
+    /// Draws a direction; none in the rare case that rounding moves it into a black pixel.
+    fn sample(&self, u: [f32; 2]) -> Option<(Vec3, Spectrum, f32)> {
+        let towards_light = self.rotation.apply(self.image.sample(u)).normalize();
+        let (radiance, pdf) = self.radiance_and_pdf(towards_light);
+        (pdf > 0.0).then_some((towards_light, radiance, pdf))
+    }
+}
+
+impl Emitter for ImageEnvironment {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Environment
+    }
+
+    fn power(&self, bounds: &BoundingSphere) -> f32 {
+        let power = disc_area(bounds) * self.scale * self.image.total_mean as f32;
+        if power.is_finite() { power } else { f32::MAX }
+    }
+
+    fn sample_emission(
+        &self,
+        bounds: &BoundingSphere,
+        u_position: [f32; 2],
+        u_direction: [f32; 2],
+    ) -> Option<Emission> {
+        let (towards_light, radiance, pdf_position) = self.sample(u_direction)?;
+        let direction = -towards_light;
+        let position = start_on_disc(bounds, direction, u_position);
+        Some(Emission {
+            point: EmitterPoint { position, normal: direction },
+            direction,
+            radiance,
+            pdf_position,
+            pdf_direction: 1.0 / disc_area(bounds),
+        })
+    }
+
+    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
+        let (towards_light, radiance, pdf) = self.sample(u)?;
+        Some(Incident {
+            point: beyond(bounds, receiver, towards_light),
+            towards_light,
+            distance: f32::INFINITY,
+            radiance,
+            pdf,
+            pdf_position: pdf,
+            pdf_direction: 1.0 / disc_area(bounds),
+        })
+    }
+
+    fn hit(
+        &self,
+        bounds: &BoundingSphere,
+        _: &EmitterPoint,
+        direction: Vec3,
+        _: Vec3,
+    ) -> Option<HitDensities> {
+        let (radiance, pdf) = self.radiance_and_pdf(-direction);
+        Some(HitDensities {
+            radiance,
+            pdf_incident: pdf,
+            pdf_position: pdf,
+            pdf_direction: 1.0 / disc_area(bounds),
+        })
+    }
+}

@@ -1,0 +1,131 @@
+//! What shines: surfaces, points, spots, and light from infinitely far away.
+//!
+//! One file per light. Contract and measures: [`Emitter`] and `docs/theory.md`, section 2.8; oracle:
+//! [`check_emitter`](upbp_estimators::check::check_emitter).
+
+mod area;
+mod constant;
+mod directional;
+mod image;
+mod point;
+mod spot;
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use upbp_estimators::scene::{
+    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+};
+
+pub use self::area::AreaLight;
+pub use self::constant::ConstantEnvironment;
+pub use self::directional::DirectionalLight;
+pub use self::image::{EnvironmentImage, EnvironmentImageError, ImageEnvironment};
+pub use self::point::PointLight;
+pub use self::spot::{SpotCone, SpotLight};
+use crate::sampling;
+
+/// A light of a ready-made scene.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// A surface that shines.
+    Area(AreaLight),
+    /// A point that shines in all directions alike.
+    Point(PointLight),
+    /// A point that shines into a cone.
+    Spot(SpotLight),
+    /// Parallel light.
+    Directional(DirectionalLight),
+    /// The same light from all directions.
+    Constant(ConstantEnvironment),
+    /// Light from all directions, by an image.
+    Image(ImageEnvironment),
+}
+
+macro_rules! dispatch {
+    ($self:expr, $light:ident => $call:expr) => {
+        match $self {
+            Light::Area($light) => $call,
+            Light::Point($light) => $call,
+            Light::Spot($light) => $call,
+            Light::Directional($light) => $call,
+            Light::Constant($light) => $call,
+            Light::Image($light) => $call,
+        }
+    };
+}
+
+impl Emitter for Light {
+    fn kind(&self) -> EmitterKind {
+        dispatch!(self, light => light.kind())
+    }
+
+    fn power(&self, bounds: &BoundingSphere) -> f32 {
+        dispatch!(self, light => light.power(bounds))
+    }
+
+    fn sample_emission(
+        &self,
+        bounds: &BoundingSphere,
+        u_position: [f32; 2],
+        u_direction: [f32; 2],
+    ) -> Option<Emission> {
+        dispatch!(self, light => light.sample_emission(bounds, u_position, u_direction))
+    }
+
+    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
+        dispatch!(self, light => light.sample_incident(bounds, receiver, u))
+    }
+
+    fn hit(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        receiver: Vec3,
+    ) -> Option<HitDensities> {
+        dispatch!(self, light => light.hit(bounds, point, direction, receiver))
+    }
+
+    fn pdf_incident(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        receiver: Vec3,
+        pdf_position: f32,
+    ) -> f32 {
+        dispatch!(self, light => light.pdf_incident(bounds, point, direction, receiver, pdf_position))
+    }
+}
+
+/// Area of the disc that parallel light starts from.
+fn disc_area(bounds: &BoundingSphere) -> f32 {
+    PI * bounds.radius * bounds.radius
+}
+
+/// A start of a ray in `direction`, uniform over the disc that casts its shadow on the scene, before the
+/// scene.
+fn start_on_disc(bounds: &BoundingSphere, direction: Vec3, u: [f32; 2]) -> Vec3 {
+    let across = sampling::disc(u) * bounds.radius;
+    let (tangent, bitangent) = upbp_media::orthonormal_basis(direction);
+    // Ten per cent outside, so that no rounding puts the start behind a surface on the bounds.
+    let back = direction * (1.1 * bounds.radius);
+    bounds.centre - back + tangent * across.x + bitangent * across.y
+}
+
+/// A point outside of the scene in the direction of an infinite light.
+fn beyond(bounds: &BoundingSphere, receiver: Vec3, towards_light: Vec3) -> EmitterPoint {
+    let distance = 2.0 * bounds.radius + receiver.distance(bounds.centre);
+    EmitterPoint { position: receiver + towards_light * distance, normal: -towards_light }
+}
+
+/// Unit direction and distance from one point to another; none if they coincide.
+fn direction_and_distance(from: Vec3, to: Vec3) -> Option<(Vec3, f32)> {
+    let between = to - from;
+    let distance = between.length();
+    (distance > 0.0 && distance.is_finite()).then(|| (between / distance, distance))
+}
+
+#[cfg(test)]
+mod tests;

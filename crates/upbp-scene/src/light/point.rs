@@ -1,0 +1,62 @@
+//! A point that shines in all directions alike.
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use glam::Vec3;
+use upbp_estimators::scene::{
+    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+};
+use upbp_media::Spectrum;
+
+use super::direction_and_distance;
+use crate::sampling;
+
+/// An isotropic point light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLight {
+    /// Where it is, scene units.
+    pub position: Vec3,
+    /// Radiant intensity, W sr⁻¹.
+    pub intensity: Spectrum,
+}
+
+/// Density of a uniform direction.
+const PDF_DIRECTION: f32 = 0.25 * FRAC_1_PI;
+
+impl Emitter for PointLight {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Point
+    }
+
+    fn power(&self, _: &BoundingSphere) -> f32 {
+        4.0 * PI * self.intensity.mean()
+    }
+
+    fn sample_emission(&self, _: &BoundingSphere, _: [f32; 2], u_direction: [f32; 2]) -> Option<Emission> {
+        let direction = sampling::sphere(u_direction);
+        Some(Emission {
+            point: EmitterPoint { position: self.position, normal: direction },
+            direction,
+            radiance: self.intensity,
+            pdf_position: 1.0,
+            pdf_direction: PDF_DIRECTION,
+        })
+    }
+
+    fn sample_incident(&self, _: &BoundingSphere, receiver: Vec3, _: [f32; 2]) -> Option<Incident> {
+        let (towards_light, distance) = direction_and_distance(receiver, self.position)?;
+        Some(Incident {
+            point: EmitterPoint { position: self.position, normal: -towards_light },
+            towards_light,
+            distance,
+            radiance: self.intensity,
+            pdf: 1.0,
+            pdf_position: 1.0,
+            pdf_direction: PDF_DIRECTION,
+        })
+    }
+
+    fn hit(&self, _: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> {
+        None
+    }
+}

@@ -1,0 +1,178 @@
+//! Every light against the contract.
+
+use std::f32::consts::{FRAC_PI_2, TAU};
+use std::sync::Arc;
+
+use upbp_accel::{AxisBox, Quad, Shape, Sphere, TriangleMesh};
+use upbp_estimators::check::check_emitter;
+use upbp_media::Spectrum;
+
+use super::*;
+
+const BOUNDS: BoundingSphere = BoundingSphere { centre: Vec3::new(0.5, 0.0, -1.0), radius: 4.0 };
+
+fn receivers() -> [Vec3; 4] {
+    [Vec3::new(0.3, 2.0, 0.1), Vec3::new(-1.0, 0.4, 1.5), Vec3::new(0.0, -3.0, 0.2), Vec3::new(0.1, 0.3, 0.0)]
+}
+
+fn check(light: impl Into<Light>) {
+    let light = light.into();
+    check_emitter(&light, &BOUNDS, &receivers()).unwrap_or_else(|violation| panic!("{light:?}\n{violation}"));
+}
+
+fn area(shape: impl Into<Shape>) -> Light {
+    Light::Area(AreaLight::new(shape.into(), Spectrum::new(3.0, 2.0, 1.0)).unwrap())
+}
+
+fn spot(beam: f32, cutoff: f32) -> SpotLight {
+    let axis = Vec3::new(1.0, -2.0, 0.5).normalize();
+    SpotLight {
+        position: Vec3::new(0.0, 1.0, 0.0),
+        intensity: Spectrum::splat(2.0),
+        cone: SpotCone { axis, beam, cutoff },
+    }
+}
+
+fn image() -> Arc<EnvironmentImage> {
+    let (width, height) = (16, 8);
+    let pixels = (0..width * height).map(|i| match i {
+        37 => Spectrum::new(30.0, 20.0, 10.0),
+        i if i % 5 == 0 => Spectrum::ZERO,
+        i => Spectrum::new(i as f32, 1.0, 0.5) * 0.02,
+    });
+    Arc::new(EnvironmentImage::new(width, height, pixels.collect()).unwrap())
+}
+
+#[test]
+fn area_lights_satisfy_the_contract() {
+    check(area(Quad::new(Vec3::new(-0.5, 0.5, -0.5), Vec3::X, Vec3::Z * 1.5).unwrap()));
+    check(area(Sphere::new(Vec3::new(0.2, 0.5, 0.0), 0.3).unwrap()));
+    check(area(Sphere::new(Vec3::new(0.2, 0.5, 0.0), 1e-3).unwrap()));
+    check(area(AxisBox::new(Vec3::new(-0.2, 0.6, -0.4), Vec3::new(0.4, 0.9, 0.1)).unwrap()));
+    let corners =
+        vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].into_iter().map(|corner| corner * 0.3).collect();
+    let tetrahedron = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    check(area(TriangleMesh::new(corners, tetrahedron, None).unwrap()));
+}
+
+#[test]
+fn points_and_spots_satisfy_the_contract() {
+    check(Light::Point(PointLight { position: Vec3::new(0.1, 0.9, 0.2), intensity: Spectrum::splat(5.0) }));
+    for (beam, cutoff) in [(0.2, 0.5), (0.3, 0.3), (0.0, 1.0), (0.5, FRAC_PI_2), (1.0, PI), (PI, PI)] {
+        check(Light::Spot(spot(beam, cutoff)));
+    }
+}
+
+#[test]
+fn infinite_lights_satisfy_the_contract() {
+    let direction = Vec3::new(0.2, -1.0, 0.3).normalize();
+    check(Light::Directional(DirectionalLight { direction, irradiance: Spectrum::splat(2.0) }));
+    check(Light::Constant(ConstantEnvironment { radiance: Spectrum::new(1.0, 0.5, 0.2) }));
+    check(Light::Image(ImageEnvironment::new(image(), 1.0, 0.0)));
+    check(Light::Image(ImageEnvironment::new(image(), 0.3, 2.1)));
+}
+
+#[test]
+fn the_flux_of_a_spot_is_the_integral_of_its_falloff() {
+    for (beam, cutoff) in
+        [(0.0_f32, 1.0_f32), (0.2, 0.5), (0.4, 0.4), (0.4, 0.4001), (1e-3, 2e-3), (1.0, 3.0), (PI, PI)]
+    {
+        let cone = spot(beam, cutoff).cone;
+        let steps = 20_000;
+        let (tangent, _) = upbp_media::orthonormal_basis(cone.axis);
+        let integral: f64 = (0..steps)
+            .map(|i| (f64::from(i) + 0.5) / f64::from(steps) * f64::from(cutoff))
+            .map(|angle| {
+                let (sin, cos) = angle.sin_cos();
+                let direction = (cone.axis.as_dvec3() * cos + tangent.as_dvec3() * sin).as_vec3();
+                f64::from(cone.falloff(direction)) * sin * f64::from(cutoff) / f64::from(steps)
+            })
+            .sum::<f64>()
+            * f64::from(TAU);
+        let relative = f64::from(cone.solid_angle()) / integral - 1.0;
+        assert!(relative.abs() < 2e-3, "{beam} {cutoff}: {} {integral}", cone.solid_angle());
+    }
+    assert!((spot(PI, PI).cone.solid_angle() - 2.0 * TAU).abs() < 1e-5);
+}
+
+#[test]
+fn the_density_of_an_image_integrates_to_one() {
+    let light = ImageEnvironment::new(image(), 1.0, 0.4);
+    let (rows, columns) = (800, 1600);
+    let mut integral = 0.0;
+    for row in 0..rows {
+        let theta = (f64::from(row) + 0.5) / f64::from(rows) * std::f64::consts::PI;
+        for column in 0..columns {
+            let phi = (f64::from(column) + 0.5) / f64::from(columns) * std::f64::consts::TAU;
+            let direction = glam::DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            integral += f64::from(light.radiance_and_pdf(direction.as_vec3()).1) * theta.sin();
+        }
+    }
+    integral *= std::f64::consts::PI / f64::from(rows) * std::f64::consts::TAU / f64::from(columns);
+    assert!((integral - 1.0).abs() < 1e-3, "{integral}");
+}
+
+#[test]
+fn an_image_is_oriented_as_documented() {
+    let (width, height) = (8, 4);
+    let lit = |x: usize, y: usize, rotation: f32| {
+        let mut pixels = vec![Spectrum::ZERO; width * height];
+        pixels[y * width + x] = Spectrum::ONE;
+        ImageEnvironment::new(Arc::new(EnvironmentImage::new(width, height, pixels).unwrap()), 1.0, rotation)
+    };
+    // Just right of the middle and above the horizon; a quarter turn counter-clockwise moves −z to −x.
+    let ahead = Vec3::new(0.1, 0.1, -1.0).normalize();
+    assert!(lit(4, 1, 0.0).radiance_and_pdf(ahead).1 > 0.0);
+    assert!(lit(6, 1, 0.0).radiance_and_pdf(Vec3::new(1.0, 0.1, 0.1).normalize()).1 > 0.0);
+    let left = Vec3::new(-1.0, 0.1, -0.1).normalize();
+    assert!(lit(4, 1, FRAC_PI_2).radiance_and_pdf(left).1 > 0.0);
+    // All draws land in the only lit pixel.
+    let light = lit(4, 1, 0.7);
+    for i in 0..1000_u16 {
+        let u = [f32::from(i) / 1000.0, f32::from(i * 37 % 1000) / 1000.0];
+        let incident = light.sample_incident(&BOUNDS, Vec3::ZERO, u);
+        assert!(incident.is_none_or(|incident| incident.pdf > 0.0));
+    }
+}
+
+#[test]
+fn images_that_are_no_light_are_refused() {
+    let message =
+        |width, height, pixels| EnvironmentImage::new(width, height, pixels).unwrap_err().to_string();
+    let white = Spectrum::ONE;
+    assert!(message(0, 0, vec![]).starts_with("has 0 pixels"));
+    assert!(message(2, 2, vec![white; 3]).starts_with("has 3 pixels"));
+    assert!(message(usize::MAX, 2, vec![]).starts_with("has 0 pixels"));
+    assert_eq!(message(2, 1, vec![Spectrum::ZERO; 2]), "is black everywhere");
+    let negative = Spectrum::new(0.0, -1.0, 0.0);
+    assert!(message(2, 1, vec![white, negative]).starts_with("pixel (1, 0) is [0.0, -1.0, 0.0]"));
+    assert!(
+        message(2, 1, vec![Spectrum::splat(f32::NAN), white]).starts_with("pixel (0, 0) is [NaN, NaN, NaN]")
+    );
+}
+
+#[test]
+fn images_are_read_from_openexr() {
+    let path = std::env::temp_dir().join(format!("upbp-scene-environment-{}.exr", std::process::id()));
+    exr::prelude::write_rgb_file(&path, 4, 2, |x, y| (x as f32, y as f32, 0.5_f32)).unwrap();
+    let image = EnvironmentImage::load(&path);
+    std::fs::remove_file(&path).unwrap();
+    let image = image.unwrap();
+    assert_eq!(image.size(), (4, 2));
+    assert_eq!(image.lookup(Vec3::new(-0.1, 0.1, -1.0).normalize()).0, Spectrum::new(1.0, 0.0, 0.5));
+    assert_eq!(image.lookup(Vec3::new(0.1, -0.1, -1.0).normalize()).0, Spectrum::new(2.0, 1.0, 0.5));
+}
+
+#[test]
+fn a_receiver_inside_or_on_a_sphere_finds_its_density() {
+    let sphere = Sphere::new(Vec3::ZERO, 1.0).unwrap();
+    let light = area(sphere);
+    for receiver in [Vec3::X, Vec3::X * 1.0001, Vec3::X * 1.01, Vec3::X * 0.5, Vec3::X * 1e4] {
+        for i in 0..100_u16 {
+            let u = [f32::from(i) / 100.0, f32::from(i * 7 % 100) / 100.0];
+            if let Some(incident) = light.sample_incident(&BOUNDS, receiver, u) {
+                assert!(incident.pdf.is_finite() && incident.pdf > 0.0, "{receiver} {incident:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Surfaces: how they scatter light.
+//!
+//! One file per material. Directions are local, z along the shading normal, and point away from the surface.
+//! Contract and conventions: [`Bsdf`]; oracle: [`check_bsdf`](upbp_estimators::check::check_bsdf).
+
+mod conductor;
+mod dielectric;
+mod fresnel;
+mod lambert;
+mod mirror;
+mod phong;
+mod rough_dielectric;
+mod trowbridge_reitz;
+
+use glam::Vec3;
+use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
+use upbp_media::Spectrum;
+
+pub use self::conductor::{Conductor, MetalFresnel};
+pub use self::dielectric::Dielectric;
+pub use self::lambert::Lambert;
+pub use self::mirror::Mirror;
+pub use self::phong::Phong;
+pub use self::rough_dielectric::RoughDielectric;
+pub use self::trowbridge_reitz::TrowbridgeReitz;
+
+/// Floor of [`Bsdf::continuation`]: a path that survives a dark surface gains at most a factor of 20.
+const MIN_CONTINUATION: f32 = 0.05;
+
+/// What a surface of a ready-made scene is made of. Index-matched boundaries have none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Material {
+    /// Matt.
+    Lambert(Lambert),
+    /// Matt with a glossy lobe.
+    Phong(Phong),
+    /// Perfectly smooth metal.
+    Mirror(Mirror),
+    /// Smooth glass.
+    Dielectric(Dielectric),
+    /// Rough metal.
+    Conductor(Conductor),
+    /// Rough glass.
+    RoughDielectric(RoughDielectric),
+}
+
+impl Material {
+    /// Whether light passes through, so that the material may bound a body.
+    #[must_use]
+    pub const fn is_refracting(&self) -> bool {
+        matches!(self, Self::Dielectric(_) | Self::RoughDielectric(_))
+    }
+}
+
+macro_rules! dispatch {
+    ($self:expr, $material:ident => $call:expr) => {
+        match $self {
+            Material::Lambert($material) => $call,
+            Material::Phong($material) => $call,
+            Material::Mirror($material) => $call,
+            Material::Dielectric($material) => $call,
+            Material::Conductor($material) => $call,
+            Material::RoughDielectric($material) => $call,
+        }
+    };
+}
+
+impl Bsdf for Material {
+    fn eval(&self, towards_light: Vec3, towards_camera: Vec3, interface: Interface) -> Spectrum {
+        dispatch!(self, material => material.eval(towards_light, towards_camera, interface))
+    }
+
+    fn pdf(&self, from: Vec3, to: Vec3, interface: Interface) -> f32 {
+        dispatch!(self, material => material.pdf(from, to, interface))
+    }
+
+    fn sample(
+        &self,
+        from: Vec3,
+        walk: Walk,
+        interface: Interface,
+        u_lobe: f32,
+        u: [f32; 2],
+    ) -> Option<BsdfSample> {
+        dispatch!(self, material => material.sample(from, walk, interface, u_lobe, u))
+    }
+
+    fn is_connectible(&self) -> bool {
+        dispatch!(self, material => material.is_connectible())
+    }
+
+    fn continuation(&self, from: Vec3) -> f32 {
+        dispatch!(self, material => material.continuation(from))
+    }
+}
+
+/// Roulette by albedo: no path carries more after it than before.
+fn continuation_by_albedo(albedo: Spectrum) -> f32 {
+    albedo.max_component().clamp(MIN_CONTINUATION, 1.0)
+}
+
+/// The indices on the side of `from` and on the other.
+fn indices(from: Vec3, interface: Interface) -> (f32, f32) {
+    if from.z > 0.0 { (interface.above, interface.below) } else { (interface.below, interface.above) }
+}
+
+/// Mirror direction about z.
+fn mirrored(direction: Vec3) -> Vec3 {
+    Vec3::new(-direction.x, -direction.y, direction.z)
+}
+
+/// Density of [`cosine_hemisphere`](crate::sampling::cosine_hemisphere) on the side of `from`.
+fn cosine_pdf(from: Vec3, to: Vec3) -> f32 {
+    if from.z * to.z > 0.0 { to.z.abs() * std::f32::consts::FRAC_1_PI } else { 0.0 }
+}
+
+/// Draws from [`cosine_pdf`].
+fn sample_cosine(from: Vec3, u: [f32; 2]) -> Vec3 {
+    let up = crate::sampling::cosine_hemisphere(u);
+    Vec3::new(up.x, up.y, up.z.copysign(from.z))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,55 @@
+//! Maps from the unit square to discs, hemispheres, spheres and cones.
+//!
+//! All of them preserve area, so that a density is a constant over the area of the target. Sources: Shirley
+//! and Chiu, "A Low Distortion Map Between Disk and Square", JGT 2(3), 1997, for the disc; Archimedes for the
+//! rest: the area of a belt of the sphere is proportional to its height.
+
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+
+use glam::{Vec2, Vec3};
+use upbp_media::orthonormal_basis;
+
+/// A point of the unit disc, uniform by area.
+pub(crate) fn disc(u: [f32; 2]) -> Vec2 {
+    let offset = Vec2::from(u) * 2.0 - Vec2::ONE;
+    if offset == Vec2::ZERO {
+        return Vec2::ZERO;
+    }
+    let (radius, phi) = if offset.x.abs() > offset.y.abs() {
+        (offset.x, FRAC_PI_4 * (offset.y / offset.x))
+    } else {
+        (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
+    };
+    radius * Vec2::from_angle(phi)
+}
+
+/// A direction of the hemisphere around +z with density `cos θ / π`.
+pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+    let p = disc(u);
+    // On the rim the height would vanish, and with it the density that others divide by.
+    Vec3::new(p.x, p.y, (1.0 - p.length_squared()).max(1e-10).sqrt()).normalize()
+}
+
+/// A direction, uniform over the sphere: density `1 / 4π`.
+pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {
+    cone_local(2.0, u)
+}
+
+/// A direction around `axis`, uniform over the cone with `1 − cos θ_max = height`: density `1 / (2π height)`.
+pub(crate) fn cone(axis: Vec3, height: f32, u: [f32; 2]) -> Vec3 {
+    to_world(axis, cone_local(height, u))
+}
+
+fn cone_local(height: f32, u: [f32; 2]) -> Vec3 {
+    // The distance from the pole keeps its digits in a narrow cone, where the cosine has none.
+    let below_pole = height * u[0];
+    let sin_theta = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
+    let (sin_phi, cos_phi) = (TAU * u[1]).sin_cos();
+    Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 1.0 - below_pole)
+}
+
+/// Turns a direction of the frame in which `axis` is z into a direction of the world.
+pub(crate) fn to_world(axis: Vec3, local: Vec3) -> Vec3 {
+    let (tangent, bitangent) = orthonormal_basis(axis);
+    (local.x * tangent + local.y * bitangent + local.z * axis).normalize()
+}

@@ -1,0 +1,212 @@
+//! A scene that is ready to render.
+//!
+//! The geometry lies behind one hierarchy; beside it there is a record per shape of what it is. Boundaries of
+//! bodies are gathered in one traversal together with the surface that ends the ray, so that boundaries that
+//! coincide are all found.
+
+use glam::Vec3;
+use upbp_accel::{Candidate, Ray, SceneGeometry, Shape, ShapeId, Visit};
+use upbp_estimators::scene::{BoundingSphere, Crossing, EmitterId, Hit, Scene};
+use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
+
+use crate::camera::PerspectiveCamera;
+use crate::light::Light;
+use crate::material::Material;
+
+/// Distances that differ by less than this share of themselves are one event: some roundings.
+const COINCIDENT: f32 = 4.0 * f32::EPSILON;
+
+/// What a shape is, besides its geometry.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    /// `None`: an index-matched boundary.
+    pub(crate) bsdf: Option<Material>,
+    /// The body that it encloses.
+    pub(crate) interior: Option<Interior>,
+    /// The light that it carries.
+    pub(crate) emitter: Option<EmitterId>,
+}
+
+/// A body, for finding those that a point is in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Body {
+    pub(crate) shape: ShapeId,
+    pub(crate) aabb: (Vec3, Vec3),
+    pub(crate) interior: Interior,
+}
+
+/// A scene that is ready to render: read it with [`load`](Self::load) or
+/// [`from_ron_str`](Self::from_ron_str), or [`build`](Self::build) it from a description.
+#[derive(Clone, Debug)]
+pub struct ReadyScene {
+    pub(crate) geometry: SceneGeometry,
+    /// By [`ShapeId`].
+    pub(crate) surfaces: Vec<Surface>,
+    pub(crate) bodies: Vec<Body>,
+    pub(crate) lights: Vec<Light>,
+    pub(crate) media: Vec<Homogeneous>,
+    pub(crate) camera: PerspectiveCamera,
+    pub(crate) outside: Option<MediumId>,
+    pub(crate) bounds: BoundingSphere,
+    pub(crate) hash: u64,
+}
+
+impl ReadyScene {
+    /// The shapes behind their hierarchy, in the order of the description.
+    #[must_use]
+    pub const fn geometry(&self) -> &SceneGeometry {
+        &self.geometry
+    }
+
+    /// A number that is the same for equal scenes: the [hash of the description](crate::SceneDescription::hash),
+    /// mixed with the contents of the files that it refers to.
+    #[must_use]
+    pub const fn hash(&self) -> u64 {
+        self.hash
+    }
+
+    fn record(&self, candidate: &Candidate) -> &Surface {
+        &self.surfaces[candidate.shape.0 as usize]
+    }
+
+    fn hit(&self, ray: &Ray, candidate: &Candidate) -> Hit<Material> {
+        let point = self.geometry.surface(ray, candidate);
+        let record = self.record(candidate);
+        Hit {
+            t: candidate.t,
+            position: point.position,
+            geometric_normal: point.geometric_normal,
+            shading_normal: point.shading_normal,
+            bsdf: record.bsdf,
+            interior: record.interior,
+            emitter: record.emitter,
+        }
+    }
+
+    /// Whether the ray goes into the body whose surface it meets.
+    fn is_entering(&self, ray: &Ray, candidate: &Candidate) -> bool {
+        match self.geometry.shape(candidate.shape) {
+            Shape::Sphere(_) => candidate.primitive == 0,
+            _ => self.geometry.surface(ray, candidate).geometric_normal.dot(ray.direction) < 0.0,
+        }
+    }
+
+    fn crossing(&self, ray: &Ray, candidate: &Candidate, interior: Interior, scatters: bool) -> Crossing {
+        Crossing { t: candidate.t, interior, entering: self.is_entering(ray, candidate), scatters }
+    }
+}
+
+/// By distance; at the same distance into a body before out of one, so that a body that is only touched is left
+/// again.
+fn sort(crossings: &mut [Crossing]) {
+    crossings.sort_unstable_by(|a, b| {
+        let by_body = || a.interior.body.cmp(&b.interior.body);
+        a.t.total_cmp(&b.t).then(b.entering.cmp(&a.entering)).then_with(by_body)
+    });
+}
+
+/// Keeps the nearer candidate, of two at the same distance the one of the earlier shape: the order of the
+/// traversal does not matter.
+fn keep_nearer(nearest: &mut Option<Candidate>, candidate: &Candidate) {
+    let key = |candidate: &Candidate| (candidate.t, candidate.shape, candidate.primitive);
+    if nearest.as_ref().is_none_or(|nearest| key(candidate) < key(nearest)) {
+        *nearest = Some(*candidate);
+    }
+}
+
+impl Scene for ReadyScene {
+    type Bsdf = Material;
+    type Emitter = Light;
+    type Medium = Homogeneous;
+    type Camera = PerspectiveCamera;
+
+    fn intersect(&self, ray: &Ray) -> Option<Hit<Material>> {
+        self.geometry.closest(*ray).map(|candidate| self.hit(ray, &candidate))
+    }
+
+    fn bounds(&self) -> BoundingSphere {
+        self.bounds
+    }
+
+    fn emitters(&self) -> &[Light] {
+        &self.lights
+    }
+
+    fn media(&self) -> &[Homogeneous] {
+        &self.media
+    }
+
+    fn camera(&self) -> &PerspectiveCamera {
+        &self.camera
+    }
+
+    fn outside(&self) -> Option<MediumId> {
+        self.outside
+    }
+
+    fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Material>> {
+        let (mut opaque, mut refracting) = (None, None);
+        self.geometry.for_each_hit(*ray, |candidate| {
+            let record = self.record(candidate);
+            match (record.bsdf, record.interior) {
+                (None, Some(interior)) => {
+                    crossings.push(self.crossing(ray, candidate, interior, false));
+                    return Visit::Continue;
+                }
+                (_, None) => keep_nearer(&mut opaque, candidate),
+                (Some(_), Some(_)) => keep_nearer(&mut refracting, candidate),
+            }
+            // As far as something may coincide.
+            Visit::ShrinkTo(candidate.t * (1.0 + 2.0 * COINCIDENT))
+        });
+        let nearest = match (opaque, refracting) {
+            // A glass that stands on a table: the light inside of it must not get below.
+            (Some(opaque), Some(refracting)) if opaque.t > refracting.t * (1.0 + COINCIDENT) => {
+                Some(refracting)
+            }
+            (opaque, refracting) => opaque.or(refracting),
+        };
+        if let Some(nearest) = &nearest {
+            // What is reflected by an opaque surface stays on this side of a boundary that coincides with it. At a
+            // refracting surface most goes through.
+            let refracts = self.record(nearest).interior.is_some();
+            let end = if refracts { nearest.t } else { nearest.t * (1.0 - COINCIDENT) };
+            crossings.retain(|crossing| crossing.t <= end);
+        }
+        sort(crossings);
+        nearest.map(|nearest| self.hit(ray, &nearest))
+    }
+
+    fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
+        let mut clear = true;
+        self.geometry.for_each_hit(*ray, |candidate| {
+            let record = self.record(candidate);
+            let Some(interior) = record.interior else {
+                clear = false;
+                return Visit::Stop;
+            };
+            crossings.push(self.crossing(ray, candidate, interior, record.bsdf.is_some()));
+            Visit::Continue
+        });
+        if clear {
+            sort(crossings);
+        }
+        clear
+    }
+
+    fn stack_at(&self, point: Vec3) -> MediumStack {
+        let mut stack = MediumStack::new(self.outside);
+        for body in &self.bodies {
+            let (min, max) = body.aabb;
+            let near = min.cmple(point).all() && point.cmple(max).all();
+            if near && self.geometry.shape(body.shape).contains(point) == Some(true) {
+                // More bodies than a stack holds: the walks count those that they cannot enter.
+                let _ = stack.enter(body.interior);
+            }
+        }
+        stack
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,257 @@
+//! The scene's own traversals against the defaults of the trait, which only know the nearest surface.
+
+use upbp_estimators::check::check_scene;
+use upbp_media::BodyId;
+
+use super::*;
+
+/// Forwards what is required, so that the rest is the trait's.
+struct Plain<'a>(&'a ReadyScene);
+
+impl Scene for Plain<'_> {
+    type Bsdf = Material;
+    type Emitter = Light;
+    type Medium = Homogeneous;
+    type Camera = PerspectiveCamera;
+
+    fn intersect(&self, ray: &Ray) -> Option<Hit<Material>> {
+        self.0.intersect(ray)
+    }
+    fn bounds(&self) -> BoundingSphere {
+        self.0.bounds()
+    }
+    fn emitters(&self) -> &[Light] {
+        self.0.emitters()
+    }
+    fn media(&self) -> &[Homogeneous] {
+        self.0.media()
+    }
+    fn camera(&self) -> &PerspectiveCamera {
+        self.0.camera()
+    }
+    fn outside(&self) -> Option<MediumId> {
+        self.0.outside()
+    }
+}
+
+fn shipped() -> Vec<(String, ReadyScene)> {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/scenes");
+    let reference =
+        ["absorb_only", "fog_two_spheres", "forward_hg_box", "glass_env", "mirror_fog", "point_bubble_fog"];
+    ["cornell_media.ron".to_owned(), "glass_and_null.ron".to_owned()]
+        .into_iter()
+        .chain(reference.map(|name| format!("reference/{name}.ron")))
+        .map(|name| {
+            let scene = ReadyScene::load(root.join(&name)).unwrap_or_else(|error| panic!("{error}"));
+            (name, scene)
+        })
+        .collect()
+}
+
+/// Points in and around the bounds.
+fn points(scene: &ReadyScene) -> impl Iterator<Item = Vec3> {
+    let BoundingSphere { centre, radius } = scene.bounds();
+    let fraction = |i: u32, alpha: f64| (f64::from(i) * alpha).fract() as f32 * 2.0 - 1.0;
+    (1..).map(move |i| {
+        let offset =
+            Vec3::new(fraction(i, 0.819_172_513), fraction(i, 0.671_043_607), fraction(i, 0.549_700_478));
+        centre + 1.1 * radius * offset
+    })
+}
+
+fn rays(scene: &ReadyScene) -> impl Iterator<Item = Ray> {
+    points(scene)
+        .zip(points(scene).skip(17))
+        .filter_map(|(origin, target)| Some(Ray::new(origin, (target - origin).try_normalize()?)))
+}
+
+/// Equal but for the roundings of a ray that is cut behind every boundary.
+fn equal(a: &[Crossing], b: &[Crossing]) -> bool {
+    a.len() == b.len()
+        && a.iter().zip(b).all(|(a, b)| {
+            (a.t - b.t).abs() <= 1e-5 * a.t
+                && (a.interior, a.entering, a.scatters) == (b.interior, b.entering, b.scatters)
+        })
+}
+
+#[test]
+fn trace_agrees_with_the_default() {
+    for (name, scene) in shipped() {
+        for ray in rays(&scene).take(5000) {
+            let (mut own, mut default) = (Vec::new(), Vec::new());
+            let (a, b) = (scene.trace(&ray, &mut own), Plain(&scene).trace(&ray, &mut default));
+            assert_eq!(a, b, "{name} {ray:?}");
+            assert!(equal(&own, &default), "{name} {ray:?}\n{own:?}\n{default:?}");
+        }
+    }
+}
+
+#[test]
+fn is_clear_agrees_with_the_default() {
+    for (name, scene) in shipped() {
+        for ray in rays(&scene).take(5000) {
+            let ray = ray.with_range(0.0, scene.bounds().radius);
+            let (mut own, mut default) = (Vec::new(), Vec::new());
+            let clear = scene.is_clear(&ray, &mut own);
+            assert_eq!(clear, Plain(&scene).is_clear(&ray, &mut default), "{name} {ray:?}");
+            assert!(!clear || equal(&own, &default), "{name} {ray:?}\n{own:?}\n{default:?}");
+        }
+    }
+}
+
+#[test]
+fn stack_at_agrees_with_the_default() {
+    for (name, scene) in shipped() {
+        for point in points(&scene).take(5000) {
+            assert_eq!(scene.stack_at(point), Plain(&scene).stack_at(point), "{name} {point}");
+        }
+    }
+}
+
+fn scene(media: &str, shapes: &str) -> ReadyScene {
+    let text = format!(
+        "(version: 1, camera: Perspective(origin: (0, 0, 9), target: (0, 0, 0), fov_degrees: 40),
+          media: {{ {media} }},
+          materials: {{ \"null\": Null, \"glass\": Dielectric(ior: 1.5), \"water\": Dielectric(ior: 1.33), \"wall\": Lambert(0.5) }},
+          shapes: [ {shapes} ],
+          lights: [ Point(position: (0, 8, 0), intensity: 1) ])"
+    );
+    ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn medium_at(scene: &ReadyScene, x: f32) -> Option<MediumId> {
+    scene.stack_at(Vec3::new(x, 0.0, 0.0)).medium()
+}
+
+const MEDIA: &str = "\"a\": Homogeneous(sigma_s: 1), \"b\": Homogeneous(sigma_s: 2)";
+const ALONG_X: Ray =
+    Ray { origin: Vec3::new(-5.0, 0.1, 0.2), direction: Vec3::X, t_min: 0.0, t_max: f32::INFINITY };
+
+#[test]
+fn nested_bodies_need_no_priority() {
+    // The cavity comes first in the file, and still counts inside of the cloud.
+    let scene = scene(
+        MEDIA,
+        "(geometry: Sphere(centre: (0, 0, 0), radius: 0.5), material: \"null\"),
+         (geometry: Sphere(centre: (0, 0, 0), radius: 2), material: \"null\", interior: \"a\"),
+         (geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"b\")",
+    );
+    assert_eq!(medium_at(&scene, 0.0), None);
+    assert_eq!(medium_at(&scene, 0.7), Some(MediumId(1)));
+    assert_eq!(medium_at(&scene, 1.5), Some(MediumId(0)));
+    assert_eq!(medium_at(&scene, 3.0), None);
+    assert_eq!(scene.stack_at(Vec3::ZERO).len(), 3);
+    check_scene(&scene).unwrap();
+}
+
+#[test]
+fn a_priority_goes_before_the_size() {
+    let scene = scene(
+        MEDIA,
+        "(geometry: Sphere(centre: (0, 0, 0), radius: 2), material: \"null\", interior: \"a\", priority: 1),
+         (geometry: Sphere(centre: (1.5, 0, 0), radius: 1), material: \"null\", interior: \"b\")",
+    );
+    assert_eq!(medium_at(&scene, 1.5), Some(MediumId(0)));
+    assert_eq!(medium_at(&scene, 2.2), Some(MediumId(1)));
+}
+
+#[test]
+fn among_equal_bodies_the_later_counts() {
+    let scene = scene(
+        MEDIA,
+        "(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"b\"),
+         (geometry: Sphere(centre: (1, 0, 0), radius: 1), material: \"null\", interior: \"a\")",
+    );
+    assert_eq!(medium_at(&scene, 0.5), Some(MediumId(0)));
+    assert_eq!(medium_at(&scene, -0.5), Some(MediumId(1)));
+}
+
+#[test]
+fn coincident_boundaries_are_all_found() {
+    // Two boxes with a common face, and a third with the same faces as the first.
+    let scene = scene(
+        MEDIA,
+        "(geometry: Box(min: (-1, -1, -1), max: (0, 1, 1)), material: \"null\", interior: \"a\"),
+         (geometry: Box(min: (0, -1, -1), max: (1, 1, 1)), material: \"null\", interior: \"b\"),
+         (geometry: Box(min: (-1, -1, -1), max: (0, 1, 1)), material: \"null\", interior: \"b\")",
+    );
+    let mut crossings = Vec::new();
+    assert!(scene.trace(&ALONG_X, &mut crossings).is_none());
+    let found: Vec<(f32, bool)> = crossings.iter().map(|crossing| (crossing.t, crossing.entering)).collect();
+    let expected = [(4.0, true), (4.0, true), (5.0, true), (5.0, false), (5.0, false), (6.0, false)];
+    assert_eq!(found, expected);
+    let mut connection = Vec::new();
+    assert!(scene.is_clear(&ALONG_X, &mut connection));
+    assert_eq!(connection, crossings);
+    let mut stack = scene.stack_at(ALONG_X.origin);
+    for crossing in crossings {
+        assert_eq!(stack.cross(crossing.interior, crossing.entering), upbp_media::Crossing::Done);
+    }
+    assert!(stack.is_empty());
+}
+
+#[test]
+fn a_body_on_a_wall_is_not_left_through_the_wall() {
+    let scene = scene(
+        MEDIA,
+        "(geometry: Box(min: (-1, -1, -1), max: (1, 1, 1)), material: \"null\", interior: \"a\"),
+         (geometry: Quad(origin: (1, -3, -3), edge_u: (0, 0, 6), edge_v: (0, 6, 0)), material: \"wall\")",
+    );
+    let mut crossings = Vec::new();
+    let hit = scene.trace(&ALONG_X, &mut crossings).unwrap();
+    assert_eq!((hit.t, hit.interior), (6.0, None));
+    assert_eq!(crossings.len(), 1);
+    assert!(crossings[0].entering);
+}
+
+#[test]
+fn light_in_a_glass_on_a_table_does_not_get_below() {
+    for order in [0, 1] {
+        let mut shapes = [
+            "(geometry: Box(min: (-1, -1, -1), max: (1, 1, 1)), material: \"glass\"),",
+            "(geometry: Quad(origin: (1, -3, -3), edge_u: (0, 0, 6), edge_v: (0, 6, 0)), material: \"wall\"),",
+        ];
+        shapes.rotate_left(order);
+        let scene = scene(MEDIA, &shapes.concat());
+        let inside = Ray { origin: Vec3::new(0.0, 0.1, 0.2), ..ALONG_X };
+        let hit = scene.trace(&inside, &mut Vec::new()).unwrap();
+        assert!(matches!(hit.bsdf, Some(Material::Lambert(_))));
+    }
+}
+
+#[test]
+fn a_boundary_inside_glass_has_the_index_of_the_glass() {
+    let scene = scene(
+        MEDIA,
+        "(geometry: Sphere(centre: (0, 0, 0), radius: 2), material: \"glass\"),
+         (geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"a\"),
+         (geometry: Sphere(centre: (0, 0, 0), radius: 0.5), material: \"water\"),
+         (geometry: Sphere(centre: (2, 0, 0), radius: 0.6), material: \"null\", interior: \"b\")",
+    );
+    let ior = |x: f32| scene.stack_at(Vec3::new(x, 0.0, 0.0)).ior();
+    assert_eq!((ior(0.0), ior(0.7), ior(1.2)), (1.33, 1.5, 1.5));
+    // Reaches out of the glass: index-matched to what is outside.
+    assert_eq!(ior(2.3), 1.0);
+}
+
+#[test]
+fn refracting_bodies_do_not_block_a_segment_but_are_reported() {
+    let scene = scene(MEDIA, "(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"glass\")");
+    let mut crossings = Vec::new();
+    assert!(scene.is_clear(&ALONG_X, &mut crossings));
+    assert_eq!(crossings.len(), 2);
+    assert!(crossings.iter().all(|crossing| crossing.scatters && crossing.interior.body == BodyId(0)));
+    let hit = scene.trace(&ALONG_X, &mut Vec::new()).unwrap();
+    assert_eq!(hit.interior, Some(crossings[0].interior));
+}
+
+#[test]
+fn bounds_hold_everything_finite() {
+    let scene = scene(MEDIA, "(geometry: Sphere(centre: (3, 0, 0), radius: 1), material: \"glass\")");
+    let BoundingSphere { centre, radius } = scene.bounds();
+    assert!(centre.distance(Vec3::new(0.0, 8.0, 0.0)) <= radius);
+    assert!(centre.distance(Vec3::new(4.0, 0.0, 0.0)) <= radius);
+    // A point alone has some extent around it.
+    let empty = self::scene(MEDIA, "");
+    assert!(empty.bounds().radius > 0.0);
+}

@@ -1,0 +1,120 @@
+//! The command line.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::Parser;
+use upbp_core::{LightPaths, Settings, Stop, TechniqueSet};
+use upbp_scene::description::Count;
+
+/// Seconds of rendering if nothing else says when to stop.
+const DEFAULT_SECONDS: f64 = 60.0;
+
+/// Renders light in participating media: photon points, photon beams and bidirectional paths in one estimate.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+pub(crate) struct Options {
+    /// Scene file (RON) [default: the shipped cornell_media.ron]
+    pub(crate) scene: Option<PathBuf>,
+    /// Image to write, OpenEXR; a PNG of the same name is written beside it
+    #[arg(short, long, value_name = "OUT.exr", default_value = "cornell_media.exr")]
+    pub(crate) output: PathBuf,
+    /// Size of the film in pixels instead of the scene's, such as 640x360
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<[Count; 2]>,
+    /// Stop after this many iterations
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    iterations: Option<u64>,
+    /// Stop after this many seconds of rendering [default: 60 if no other limit is given]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    time: Option<f64>,
+    /// Stop when the estimated relMSE is below this
+    #[arg(long, value_name = "E", value_parser = positive)]
+    target_error: Option<f64>,
+    /// Techniques: names joined by `+` out of bpt, pt, hit, nee, connect, lt, surf, pp3d, pb2d, bp2d, bb1d, all
+    #[arg(long, value_name = "LIST")]
+    techniques: Option<TechniqueSet>,
+    /// Most edges of a path between light and camera
+    #[arg(long, value_name = "K")]
+    max_length: Option<u32>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+    /// Threads [default: one per core]; the image does not depend on it
+    #[arg(long, value_name = "T")]
+    pub(crate) threads: Option<NonZeroUsize>,
+    /// Light sub-paths per iteration [default: one per pixel]
+    #[arg(long, value_name = "N")]
+    light_paths: Option<u32>,
+    /// Light sub-paths that leave photon beams, per iteration [default: 1 in 25]
+    #[arg(long, value_name = "N")]
+    beams: Option<u32>,
+    /// Keep the first radii instead of shrinking them
+    #[arg(long)]
+    fixed_radius: bool,
+    /// Settings file (RON); the options above override it
+    #[arg(long, value_name = "FILE")]
+    pub(crate) settings: Option<PathBuf>,
+    /// Image to compare with after every iteration; the series of errors goes to the report
+    #[arg(long, value_name = "REF.exr")]
+    pub(crate) reference: Option<PathBuf>,
+    /// Write the report as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) report: Option<PathBuf>,
+    /// Check scene and settings, render nothing
+    #[arg(long)]
+    pub(crate) check: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl Options {
+    /// When to stop.
+    pub(crate) fn stop(&self) -> Stop {
+        let unlimited = self.iterations.is_none() && self.target_error.is_none();
+        Stop {
+            iterations: self.iterations,
+            seconds: self.time.or(unlimited.then_some(DEFAULT_SECONDS)),
+            error: self.target_error,
+        }
+    }
+
+    /// Overrides settings by what was given on the command line.
+    pub(crate) fn apply(&self, settings: &mut Settings) {
+        if let Some(techniques) = self.techniques {
+            settings.techniques = techniques;
+        }
+        if let Some(length) = self.max_length {
+            settings.max_length = length;
+        }
+        if let Some(seed) = self.seed {
+            settings.seed = seed;
+        }
+        if let Some(count) = self.light_paths {
+            settings.light_paths = LightPaths::Count(count);
+        }
+        if self.beams.is_some() {
+            settings.beams = self.beams;
+        }
+        if self.fixed_radius {
+            settings.progressive = false;
+        }
+    }
+}
+
+fn size(text: &str) -> Result<[Count; 2], String> {
+    let sides: Option<Vec<Count>> =
+        text.split('x').map(|side| Count::new(side.parse().ok()?).ok()).collect();
+    match sides.as_deref() {
+        Some(&[width, height]) => Ok([width, height]),
+        _ => Err("expected width x height in pixels, such as 640x360".to_owned()),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a positive number".to_owned()),
+    }
+}

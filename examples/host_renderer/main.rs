@@ -1,0 +1,28 @@
+//! A foreign renderer's scene, rendered with nothing but `upbp-core`.
+//!
+//! `cargo run --release --example host_renderer` writes `host_renderer.exr` and `host_renderer.png`.
+
+mod scene;
+
+use std::error::Error;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use upbp_core::{Metadata, Renderer, Settings, Stop, write_exr, write_png};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let room = scene::Room::new(256)?;
+    let settings = Settings::default();
+    let mut renderer = Renderer::new(&room, settings.clone().validate()?)?;
+    let stop = Stop { seconds: Some(20.0), ..Stop::default() };
+    renderer.render(&stop, |now| {
+        println!("{:3.0} %, estimated relMSE {:.2e}", 100.0 * now.fraction, now.estimated_error);
+        ControlFlow::Continue(())
+    });
+    let report = renderer.report();
+    println!("{report}");
+    let metadata = Metadata { scene: "host room", settings: &settings, report: &report };
+    write_exr(Path::new("host_renderer.exr"), renderer.film(), &metadata)?;
+    write_png(Path::new("host_renderer.png"), &renderer.film().image(), 1.0)?;
+    Ok(())
+}

@@ -1,0 +1,325 @@
+//! Weights of real paths: every accepted sample is rebuilt from its vertices and weighed by enumeration
+//! (`docs/theory.md`, section 9, item 2).
+//!
+//! The abstract test of the recursion takes densities as given. Here they are those of the walks: wrong distances,
+//! stacks of bodies, reverse densities and thresholds show.
+
+#[path = "support/closed_form.rs"]
+mod closed_form;
+#[path = "support/rebuild.rs"]
+mod rebuild;
+
+use closed_form::{ClosedForm, Material};
+use glam::Vec3;
+use rebuild::{Trace, Vertex};
+use upbp_estimators::mis::oracle::Strategy;
+use upbp_estimators::mis::{BeamExtent, Heuristic};
+use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::walk::{Context, LightChunk, Scratch, Site, trace_camera_path, trace_light_path};
+use upbp_estimators::{
+    Counters, Kernel, Kernels, LightMap, PathLengths, Plan, PlanChoices, StreamKind, Technique, TechniqueSet, World,
+};
+
+/// Weights below this are compared with nothing: they are rounding of others.
+const SMALLEST_WEIGHT: f64 = 1e-6;
+
+/// Agreement of weights, relative, where rounding is not amplified.
+const TOLERANCE: f64 = 1e-4;
+
+const WELL_CONDITIONED: f64 = 1e-5;
+
+/// Differences of one technique.
+#[derive(Clone, Debug, Default)]
+struct Comparison {
+    seen: u64,
+    doubtful: u64,
+    differences: Vec<f64>,
+    largest_regular: f64,
+    largest_excess: f64,
+}
+
+/// Compares every sample with the enumeration, up to a number of each technique.
+struct Auditor<'a> {
+    scene: &'a ClosedForm,
+    plan: &'a Plan,
+    /// Of each technique, one in this many is compared.
+    stride: [u64; 9],
+    light_ends: Vec<Option<LightEnd>>,
+    light_vertices: Vec<Vec<Vertex>>,
+    lens: Vec3,
+    camera_vertices: Vec<Vertex>,
+    comparisons: [Comparison; 9],
+    worst: [(f64, String); 9],
+}
+
+fn vertex(observed: &ObservedVertex<Material>) -> Vertex {
+    let position = observed.position.as_dvec3();
+    Vertex {
+        light: position,
+        camera: position,
+        in_medium: matches!(observed.site, Site::Medium(_)),
+        delta: observed.delta,
+    }
+}
+
+fn joint(light: Vec3, camera: Vec3, site: &Site<Material>) -> Vertex {
+    Vertex {
+        light: light.as_dvec3(),
+        camera: camera.as_dvec3(),
+        in_medium: matches!(site, Site::Medium(_)),
+        delta: false,
+    }
+}
+
+impl<'a> Auditor<'a> {
+    fn new(scene: &'a ClosedForm, plan: &'a Plan, stride: [u64; 9]) -> Self {
+        let paths = plan.light_paths as usize;
+        Self {
+            scene,
+            plan,
+            stride,
+            light_ends: vec![None; paths],
+            light_vertices: vec![Vec::new(); paths],
+            lens: Vec3::ZERO,
+            camera_vertices: Vec::new(),
+            comparisons: Default::default(),
+            worst: Default::default(),
+        }
+    }
+
+    /// The path of a sample, and which strategy made it.
+    fn trace(&self, sample: &ObservedSample<Material>) -> (Trace, Strategy) {
+        let prefix = |path: u32, vertices: u32| {
+            let path = path as usize;
+            let light = self.light_ends[path].expect("a light sub-path has a start");
+            (light, self.light_vertices[path][..vertices as usize].to_vec())
+        };
+        let suffix = |vertices: u32| self.camera_vertices[..vertices as usize].iter().rev().copied();
+        let depth = sample.camera_depth;
+        let (light, interior, lens, strategy) = match sample.joint {
+            Joint::Hit(light) => (light, suffix(depth - 1).collect(), self.lens, Strategy::Hit),
+            Joint::Nee { light, camera: (position, site) } => {
+                let interior = [joint(position, position, &site)].into_iter().chain(suffix(depth - 1));
+                (light, interior.collect(), self.lens, Strategy::Nee)
+            }
+            Joint::Connect { path, light: (from, from_site, from_depth), camera: (to, to_site) } => {
+                let (light, mut interior) = prefix(path, from_depth - 1);
+                interior.extend([joint(from, from, &from_site), joint(to, to, &to_site)]);
+                interior.extend(suffix(depth - 1));
+                (light, interior, self.lens, Strategy::Connect(from_depth as usize + 1))
+            }
+            Joint::LightTracing { path, light: (from, site, from_depth), lens, .. } => {
+                let (light, mut interior) = prefix(path, from_depth - 1);
+                interior.push(joint(from, from, &site));
+                (light, interior, lens, Strategy::LightTracing)
+            }
+            Joint::Merge { path, light: (photon, photon_depth), camera: (query, site) } => {
+                let (light, mut interior) = prefix(path, photon_depth - 1);
+                interior.push(joint(photon, query, &site));
+                interior.extend(suffix(depth - 1));
+                let at = photon_depth as usize;
+                let strategy = match sample.technique {
+                    Technique::Surf => Strategy::Surf(at),
+                    Technique::Pp3d => Strategy::Pp3d(at),
+                    Technique::Pb2d => Strategy::Pb2d(at),
+                    Technique::Bp2d => Strategy::Bp2d(at),
+                    Technique::Bb1d => Strategy::Bb1d(at),
+                    other => panic!("{other:?} does not merge"),
+                };
+                (light, interior, self.lens, strategy)
+            }
+        };
+        (Trace { light, interior, lens }, strategy)
+    }
+
+    fn audit(&mut self, sample: &ObservedSample<Material>) {
+        let technique = sample.technique as usize;
+        self.comparisons[technique].seen += 1;
+        if !self.comparisons[technique].seen.is_multiple_of(self.stride[technique]) {
+            return;
+        }
+        assert!((0.0..=1.0 + 1e-6).contains(&sample.weight), "{sample:?}");
+        let (trace, strategy) = self.trace(sample);
+        assert!(self.plan.lengths.contain(trace.length() as u32), "{sample:?}");
+        let Ok(path) = trace.rebuild(self.scene) else {
+            self.comparisons[technique].doubtful += 1;
+            return;
+        };
+        let weights = path.weights(&self.plan.mis);
+        let sum: f64 = weights.iter().map(|w| w.1).sum();
+        assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+        let expected = weights.iter().find(|(other, _)| *other == strategy).map_or(0.0, |w| w.1);
+        if expected.max(sample.weight) < SMALLEST_WEIGHT {
+            return;
+        }
+        let difference = (sample.weight / expected - 1.0).abs();
+        let conditioning = Trace::conditioning(&path);
+        let comparison = &mut self.comparisons[technique];
+        comparison.differences.push(difference);
+        if conditioning < WELL_CONDITIONED {
+            comparison.largest_regular = comparison.largest_regular.max(difference);
+        }
+        comparison.largest_excess = comparison.largest_excess.max(difference / (TOLERANCE + conditioning));
+        if difference / (TOLERANCE + conditioning) > self.worst[technique].0 {
+            let text = format!("{strategy:?}: {} expected {expected} {conditioning}\n{trace:#?}\n{path:#?}", sample.weight);
+            self.worst[technique] = (difference / (TOLERANCE + conditioning), text);
+        }
+    }
+}
+
+impl Observer<Material> for Auditor<'_> {
+    fn light_end(&mut self, path: u32, end: &LightEnd) {
+        self.light_ends[path as usize] = Some(*end);
+    }
+
+    fn light_vertex(&mut self, path: u32, observed: &ObservedVertex<Material>) {
+        let vertices = &mut self.light_vertices[path as usize];
+        vertices.push(vertex(observed));
+        assert_eq!(vertices.len(), observed.depth as usize);
+    }
+
+    fn camera_end(&mut self, lens: Vec3, _: Vec3, _: f32) {
+        self.lens = lens;
+        self.camera_vertices.clear();
+    }
+
+    fn camera_vertex(&mut self, observed: &ObservedVertex<Material>) {
+        self.camera_vertices.push(vertex(observed));
+        assert_eq!(self.camera_vertices.len(), observed.depth as usize);
+    }
+
+    fn sample(&mut self, sample: &ObservedSample<Material>) {
+        self.audit(sample);
+    }
+}
+
+/// Radii of about two per cent of the part of the scene where things are.
+fn kernels(scale: f32) -> Kernels {
+    Kernels {
+        surf: Kernel::disc(0.04 * scale),
+        pp3d: Kernel::ball(0.08 * scale),
+        pb2d: Kernel::parabolic_disc(0.04 * scale),
+        bp2d: Kernel::parabolic_disc(0.04 * scale),
+        bb1d: Kernel::parabolic_line(0.03 * scale),
+    }
+}
+
+fn choices() -> PlanChoices {
+    PlanChoices {
+        seed: 1,
+        iteration: 0,
+        techniques: TechniqueSet::ALL,
+        light_paths: 6000,
+        beam_paths: 500,
+        connections: 2,
+        vertices_per_light_path: 2.3,
+        lengths: PathLengths { min: 1, max: 8 },
+        roulette: true,
+        kernels: kernels(1.0),
+        heuristic: Heuristic::Balance,
+        photon_beams: BeamExtent::Short,
+        query_beams: BeamExtent::Long,
+    }
+}
+
+/// Outside of all bodies, and in the fog.
+const CAMERAS: [Vec3; 2] = [Vec3::new(0.2, 0.3, 3.0), Vec3::new(0.1, 0.4, 1.0)];
+
+/// Renders once, compares, and returns how many weights of each technique were compared.
+fn audit(name: &str, camera: Vec3, size: u32, stride: [u64; 9], choices: PlanChoices) -> [usize; 9] {
+    let scene = ClosedForm::new(camera, size);
+    let world = World::new(&scene).expect("the scene is in order");
+    let plan = Plan::new(&scene, choices);
+    let context = Context { world: &world, plan: &plan };
+    let mut auditor = Auditor::new(&scene, &plan, stride);
+    let mut scratch = Scratch::default();
+    let mut chunk = LightChunk::default();
+    for index in 0..plan.light_paths {
+        trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, &mut auditor);
+    }
+    let LightChunk { vertices, beams, counters: light_counters, .. } = chunk;
+    let map = LightMap::build(&plan, vertices, beams);
+    let mut counters = Counters::default();
+    for y in 0..size {
+        for x in 0..size {
+            let index = u64::from(y * size + x);
+            let _ = trace_camera_path(
+                &context,
+                &map,
+                StreamKind::Camera,
+                [x, y],
+                index,
+                &mut scratch,
+                &mut counters,
+                &mut auditor,
+            );
+        }
+    }
+    counters.add(&light_counters);
+    assert_eq!(counters.dropped, 0, "{counters:?}");
+    let walks = u64::from(plan.light_paths + size * size);
+    assert!(counters.lost_walks * 1000 < walks, "{counters:?}");
+
+    println!("{name}");
+    let mut compared = [0; 9];
+    for technique in Technique::ALL {
+        let Comparison { seen, doubtful, mut differences, largest_regular, largest_excess } =
+            std::mem::take(&mut auditor.comparisons[technique as usize]);
+        if !plan.techniques.has(technique) {
+            assert_eq!(seen, 0, "{technique:?} is off");
+            continue;
+        }
+        differences.sort_by(f64::total_cmp);
+        let count = differences.len();
+        compared[technique as usize] = count;
+        let quantile = |q: f64| differences.get((q * count as f64) as usize).copied().unwrap_or_default();
+        let largest = differences.last().copied().unwrap_or_default();
+        println!(
+            "  {:8} {count:6} of {seen:7} compared, {doubtful:3} in doubt; median {:.1e}, 99 % {:.1e}, 99.9 % {:.1e}, largest {largest:.1e}, regular {largest_regular:.1e}, excess {largest_excess:.1e}",
+            technique.name(),
+            quantile(0.5),
+            quantile(0.99),
+            quantile(0.999),
+        );
+        if std::env::var_os("TRACE_WORST").is_some() && largest_excess > 3.0 {
+            println!("{}", auditor.worst[technique as usize].1);
+        }
+    }
+    compared
+}
+
+#[test]
+fn all_techniques_with_the_balance_heuristic() {
+    for (i, camera) in CAMERAS.into_iter().enumerate() {
+        audit(&format!("all, camera {i}"), camera, 96, [1; 9], PlanChoices { light_paths: 24_000, beam_paths: 1000, ..choices() });
+    }
+}
+
+#[test]
+fn the_power_heuristic() {
+    audit("power", CAMERAS[1], 48, [1; 9], PlanChoices { heuristic: Heuristic::Power, ..choices() });
+}
+
+#[test]
+fn all_extents_of_beams() {
+    let (short, long) = (BeamExtent::Short, BeamExtent::Long);
+    for (photon_beams, query_beams) in [(short, short), (long, short), (long, long)] {
+        let name = format!("{photon_beams:?} photon beams, {query_beams:?} query beams");
+        audit(&name, CAMERAS[1], 48, [1; 9], PlanChoices { photon_beams, query_beams, ..choices() });
+    }
+}
+
+#[test]
+fn few_path_lengths() {
+    let lengths = PathLengths { min: 3, max: 4 };
+    audit("lengths 3 to 4", CAMERAS[1], 48, [1; 9], PlanChoices { lengths, ..choices() });
+}
+
+#[test]
+fn sets_of_techniques() {
+    for techniques in ["hit+nee+surf", "nee+connect+lt+pb2d", "hit+lt+pp3d+bb1d", "connect+bp2d+bb1d+surf", "bpt", "pb2d+pp3d+surf"] {
+        let set: TechniqueSet = techniques.parse().expect("names");
+        audit(techniques, CAMERAS[1], 48, [1; 9], PlanChoices { techniques: set, ..choices() });
+    }
+    audit("no roulette", CAMERAS[0], 48, [1; 9], PlanChoices { roulette: false, ..choices() });
+}
