@@ -99,6 +99,8 @@ fn render(renderer: &mut Renderer<'_, ReadyScene>, stop: &Stop, reference: Optio
     if let Ok(style) = ProgressStyle::with_template("[{elapsed_precise}] {bar:40} {percent:>3} %  {msg}") {
         bar.set_style(style);
     }
+    // Iterations take seconds: the clock moves meanwhile.
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let terminal = std::io::stderr().is_terminal();
     let mut points = Vec::new();
     renderer.render(stop, |now: &Progress<'_>| {
@@ -121,7 +123,9 @@ fn render(renderer: &mut Renderer<'_, ReadyScene>, stop: &Stop, reference: Optio
         ControlFlow::Continue(())
     });
     bar.finish();
-    points.into_iter().for_each(|point| renderer.record_error(point));
+    for point in points {
+        renderer.record_error(point);
+    }
 }
 
 /// Iterations, time left, and the error so far.

@@ -14,7 +14,7 @@ const DEFAULT_SECONDS: f64 = 60.0;
 #[derive(Debug, Parser)]
 #[command(version, about)]
 pub(crate) struct Options {
-    /// Scene file (RON) [default: the shipped cornell_media.ron]
+    /// Scene file (RON) [default: the one that comes with the project]
     pub(crate) scene: Option<PathBuf>,
     /// Image to write, OpenEXR; a PNG of the same name is written beside it
     #[arg(short, long, value_name = "OUT.exr", default_value = "cornell_media.exr")]

@@ -184,7 +184,13 @@ impl Material {
     pub(crate) fn continuation(self, from: f64) -> f64 {
         match self {
             Self::Diffuse | Self::Coated => 0.6 + 0.3 * from.abs(),
-            Self::Paper => if from > 0.0 { 0.95 } else { 0.7 },
+            Self::Paper => {
+                if from > 0.0 {
+                    0.95
+                } else {
+                    0.7
+                }
+            }
             Self::Mirror | Self::Glass => 0.95,
         }
     }
@@ -220,7 +226,14 @@ impl Bsdf for Material {
         Material::pdf(*self, f64::from(from.z), f64::from(to.z)) as f32
     }
 
-    fn sample(&self, from: Vec3, walk: Walk, interface: Interface, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+    fn sample(
+        &self,
+        from: Vec3,
+        walk: Walk,
+        interface: Interface,
+        u_lobe: f32,
+        u: [f32; 2],
+    ) -> Option<BsdfSample> {
         let z = f64::from(from.z);
         let (eta_from, eta_other) = indices(from.z, interface);
         let mirrored = Vec3::new(-from.x, -from.y, from.z);
@@ -459,7 +472,13 @@ impl Emitter for Light {
         })
     }
 
-    fn hit(&self, bounds: &BoundingSphere, point: &EmitterPoint, direction: Vec3, receiver: Vec3) -> Option<HitDensities> {
+    fn hit(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        receiver: Vec3,
+    ) -> Option<HitDensities> {
         let cos = f64::from(point.normal.dot(direction));
         let shines = match self.source {
             Source::Area(_) => cos > 0.0,
@@ -477,7 +496,14 @@ impl Emitter for Light {
         })
     }
 
-    fn pdf_incident(&self, _: &BoundingSphere, point: &EmitterPoint, direction: Vec3, receiver: Vec3, _: f32) -> f32 {
+    fn pdf_incident(
+        &self,
+        _: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        receiver: Vec3,
+        _: f32,
+    ) -> f32 {
         let receiver = receiver.as_dvec3();
         self.source.pdf_incident(point.position.as_dvec3(), direction.as_dvec3(), receiver) as f32
     }

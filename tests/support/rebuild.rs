@@ -25,6 +25,16 @@ pub(crate) struct Vertex {
     pub(crate) delta: bool,
 }
 
+impl Vertex {
+    /// Whether rounding decides on which side of a boundary without a surface the vertex is.
+    fn is_at_boundary(&self, scene: &ClosedForm) -> bool {
+        let boundaries = scene.objects.iter().filter(|object| object.material.is_none());
+        boundaries
+            .flat_map(|object| [self.light, self.camera].map(|p| object.shape.distance(p)))
+            .any(|d| d < TINY)
+    }
+}
+
 /// A path as it was observed, from the light to the camera.
 #[derive(Clone, Debug)]
 pub(crate) struct Trace {
@@ -128,23 +138,26 @@ fn index_beside(scene: &ClosedForm, point: DVec3, normal: DVec3, direction: DVec
     scene.body_at(beside).map_or(1.0, |body: Interior| f64::from(body.ior))
 }
 
-fn at_surface(scene: &ClosedForm, vertex: &Vertex, to_light: DVec3, to_camera: DVec3) -> Scattering {
+fn at_surface(
+    scene: &ClosedForm,
+    roulette: bool,
+    vertex: &Vertex,
+    to_light: DVec3,
+    to_camera: DVec3,
+) -> Scattering {
     let (object, distance) = scene.surface_at(vertex.camera);
     assert!(distance < 2e-6, "{vertex:?} is {distance} off its surface");
     let material = object.material.expect("a surface");
     let normal = object.shape.normal(vertex.camera);
     let shading = object.shading_normal(vertex.camera);
     let (light, camera) = (to_light.dot(shading), to_camera.dot(shading));
-    let survival = |cos| Material::continuation(material, cos);
+    let survival = |cos| if roulette { Material::continuation(material, cos) } else { 1.0 };
     let (rho_light, rho_camera) = if vertex.delta {
         let reflects = light * camera > 0.0;
         let index = |direction| index_beside(scene, vertex.camera, normal, direction);
         let (eta_light, eta_camera) = (index(to_light), index(to_camera));
-        let (beyond_light, beyond_camera) = if reflects {
-            (index(-to_light), index(-to_camera))
-        } else {
-            (eta_camera, eta_light)
-        };
+        let (beyond_light, beyond_camera) =
+            if reflects { (index(-to_light), index(-to_camera)) } else { (eta_camera, eta_light) };
         let from_light = material.dirac(light, reflects, eta_light, beyond_light);
         let from_camera = material.dirac(camera, reflects, eta_camera, beyond_camera);
         // (4.6), with the light walk's own probability as it is.
@@ -166,9 +179,16 @@ fn at_surface(scene: &ClosedForm, vertex: &Vertex, to_light: DVec3, to_camera: D
     }
 }
 
-fn in_medium(scene: &ClosedForm, medium: MediumId, to_light: DVec3, to_camera: DVec3) -> Scattering {
+fn in_medium(
+    scene: &ClosedForm,
+    roulette: bool,
+    medium: MediumId,
+    to_light: DVec3,
+    to_camera: DVec3,
+) -> Scattering {
     let coefficients = &scene.coefficients[medium.0 as usize];
-    let rho = henyey_greenstein(f64::from(coefficients.g), -to_light.dot(to_camera)) * continuation(coefficients);
+    let survival = if roulette { continuation(coefficients) } else { 1.0 };
+    let rho = henyey_greenstein(f64::from(coefficients.g), -to_light.dot(to_camera)) * survival;
     Scattering {
         kind: VertexKind::Medium(medium),
         rho_light: rho,
@@ -185,23 +205,36 @@ impl Trace {
         self.interior.len() + 1
     }
 
-    /// By how much rounding may turn a direction, relative to its cosine with a surface; the largest along the path.
+    /// By how much rounding may change a density, relative; the largest along the path.
     ///
-    /// A ray starts off its surface by some roundings, so that a short edge is not quite the line between its vertices, and
-    /// where that line is close to a surface the density there follows its cosine.
+    /// A ray starts off its surface by some roundings, so that a short edge is not quite the line between its vertices;
+    /// where that line is close to a surface the densities there follow its cosine, and refraction is steep. Beams that are
+    /// almost parallel have a sine of few digits.
     pub(crate) fn conditioning(path: &Path) -> f64 {
-        // Four roundings of coordinates up to 2.
-        const OFFSET: f64 = 1e-6;
+        // What rays start off their surfaces by, 32 roundings of coordinates up to 2.
+        const OFFSET: f64 = 8e-6;
         let pairs = path.edges.iter().zip(path.vertices.windows(2));
-        pairs
-            .map(|(edge, ends)| OFFSET / (edge.distance * ends[0].cos_camera.min(ends[1].cos_light)))
-            .fold(0.0, f64::max)
+        let turned =
+            pairs.map(|(edge, ends)| OFFSET / (edge.distance * ends[0].cos_camera.min(ends[1].cos_light)));
+        let bent = path.vertices.iter().filter(|vertex| vertex.kind == VertexKind::Delta);
+        let bent = bent.map(|vertex| OFFSET / vertex.cos_camera.min(vertex.cos_light).powi(2));
+        let crossed =
+            path.vertices[1..].iter().zip(path.edges.windows(2)).map(|(vertex, edges)| match vertex.kind {
+                VertexKind::Medium(_) => {
+                    OFFSET / (edges[0].distance.min(edges[1].distance) * vertex.sin_theta)
+                }
+                _ => 0.0,
+            });
+        turned.chain(bent).chain(crossed).fold(0.0, f64::max)
     }
 
     /// All densities of the path.
-    pub(crate) fn rebuild(&self, scene: &ClosedForm) -> Result<Path, Doubt> {
+    pub(crate) fn rebuild(&self, scene: &ClosedForm, roulette: bool) -> Result<Path, Doubt> {
         let k = self.length();
         let lens = self.lens.as_dvec3();
+        if self.interior.iter().any(|vertex| vertex.is_at_boundary(scene)) {
+            return Err(Doubt::Boundary);
+        }
         let light = &scene.lights[self.light.emitter.0 as usize];
         let infinite = matches!(light.source, Source::Directional(_) | Source::Environment);
         let receiver = self.interior.first().map_or(lens, |vertex| vertex.light);
@@ -238,9 +271,9 @@ impl Trace {
             let scattering = if vertex.in_medium {
                 let (here, there) = (passed[i].last, passed[i + 1].first);
                 let Some(medium) = here.filter(|_| here == there) else { return Err(Doubt::Boundary) };
-                in_medium(scene, medium, to_light, to_camera)
+                in_medium(scene, roulette, medium, to_light, to_camera)
             } else {
-                at_surface(scene, vertex, to_light, to_camera)
+                at_surface(scene, roulette, vertex, to_light, to_camera)
             };
             let Scattering { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta } = scattering;
             vertices.push(PathVertex { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta });

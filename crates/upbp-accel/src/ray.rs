@@ -40,7 +40,8 @@ impl Ray {
 /// Offset from the surface in units of the rounding error of the largest coordinate.
 ///
 /// A [`SurfacePoint`](crate::SurfacePoint) is off its surface by at most `√3/2` such units, as is the sum
-/// that is returned; the rest is margin for the neighbours in a mesh.
+/// that is returned; 4 would do for the shapes of this crate. The rest is margin for hosts, whose own
+/// intersections may be good to fewer digits.
 const OFFSET_ULPS: f32 = 32.0;
 
 /// Moves a surface point off its surface, to the side that `direction` points to.

@@ -20,7 +20,7 @@ pub use error::{OutputError, RenderError, SettingsError};
 pub use film::{Film, Image, Pixel};
 pub use output::{Metadata, check_writable, read_exr, write_exr, write_png};
 pub use radius::{Radii, Radius, RadiusSchedule};
-pub use render::{Outcome, Progress, Renderer, Stop, StopReason};
+pub use render::{Canceller, Outcome, Progress, Renderer, Stop, StopReason};
 pub use report::{ErrorPoint, PassSeconds, Report};
 pub use settings::{CheckedSettings, LightPaths, Settings};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic};

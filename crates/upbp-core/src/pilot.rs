@@ -72,7 +72,7 @@ pub(crate) fn run<S: Scene>(
     let nominal = 1e-3 * world.bounds.radius;
     let plan = Plan::new(
         world.scene,
-        PlanChoices {
+        &PlanChoices {
             seed: settings.seed,
             iteration: 0,
             // Connections make the walks store their vertices; light tracing is of no use here.

@@ -1,7 +1,8 @@
 //! The scheduler: iterations, each a plan and three passes, until a rule says stop.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use upbp_estimators::scene::{Camera, PixelRect, Scene};
@@ -50,6 +51,17 @@ pub struct Outcome {
     pub reason: StopReason,
 }
 
+/// Stops a render from any thread: the iteration in hand ends as soon as possible and leaves no trace.
+#[derive(Clone, Debug)]
+pub struct Canceller(Arc<AtomicBool>);
+
+impl Canceller {
+    /// Stops the render, for good.
+    pub fn cancel(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Where a render is, after an iteration.
 pub struct Progress<'a> {
     /// Iterations done.
@@ -82,7 +94,7 @@ pub struct Renderer<'a, S: Scene> {
     seconds: PassSeconds,
     counters: Counters,
     map_bytes: u64,
-    cancelled: AtomicBool,
+    cancelled: Arc<AtomicBool>,
     series: Vec<ErrorPoint>,
 }
 
@@ -136,7 +148,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
             seconds: PassSeconds::default(),
             counters: Counters::default(),
             map_bytes: 0,
-            cancelled: AtomicBool::new(false),
+            cancelled: Arc::default(),
             series: Vec::new(),
         };
         renderer.seconds.pilot = start.elapsed().as_secs_f64();
@@ -149,7 +161,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
         let settings = &self.settings;
         Plan::new(
             self.world.scene,
-            PlanChoices {
+            &PlanChoices {
                 seed: settings.seed,
                 iteration,
                 techniques: self.census.techniques,
@@ -182,7 +194,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
         let build_seconds = clock.lap();
         let counters = camera_pass(&context, &map, self.rect, &mut self.pixels, &self.cancelled);
         let camera_seconds = clock.lap();
-        if self.cancelled.load(std::sync::atomic::Ordering::Relaxed) {
+        if self.cancelled.load(Ordering::Relaxed) {
             return false;
         }
         add_splats(self.rect, &light.splats, &mut self.pixels);
@@ -254,10 +266,10 @@ impl<'a, S: Scene> Renderer<'a, S> {
         by_iterations.max(by_time).max(by_error).clamp(0.0, 1.0)
     }
 
-    /// Stops the iteration in hand as soon as possible, from any thread.
+    /// A handle that stops the render from any thread.
     #[must_use]
-    pub const fn cancel_flag(&self) -> &AtomicBool {
-        &self.cancelled
+    pub fn canceller(&self) -> Canceller {
+        Canceller(Arc::clone(&self.cancelled))
     }
 
     /// Adds a point to the report's series of errors.

@@ -55,12 +55,7 @@ impl Kernel {
     pub fn parabolic_line(radius: f32) -> Self {
         let r = f64::from(radius);
         let peak = 0.75 / r;
-        Self {
-            radius,
-            peak: peak as f32,
-            slope: (peak / (r * r)) as f32,
-            effective_volume: 5.0 / 3.0 * r,
-        }
+        Self { radius, peak: peak as f32, slope: (peak / (r * r)) as f32, effective_volume: 5.0 / 3.0 * r }
     }
 
     /// The kernel's radius, scene units.

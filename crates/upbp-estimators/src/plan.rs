@@ -111,8 +111,8 @@ pub struct PlanChoices {
 impl Plan {
     /// Derives the weights' constants, so that counts and what runs cannot disagree.
     #[must_use]
-    pub fn new<S: Scene>(scene: &S, choices: PlanChoices) -> Self {
-        let PlanChoices { techniques, light_paths, kernels, .. } = choices;
+    pub fn new<S: Scene>(scene: &S, choices: &PlanChoices) -> Self {
+        let PlanChoices { techniques, light_paths, kernels, .. } = *choices;
         let beam_paths = choices.beam_paths.min(light_paths);
         let on = |technique, value: f64| if techniques.has(technique) { value } else { 0.0 };
         let paths = f64::from(light_paths);

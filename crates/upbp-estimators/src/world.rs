@@ -41,7 +41,8 @@ impl<'a, S: Scene> World<'a, S> {
             return Err(WorldError::Crop { width, height });
         }
         // Light from infinity does not get through an infinite medium: such emitters are never chosen.
-        let closed = scene.outside().is_some_and(|m| scene.media()[m.0 as usize].mean_free_path().is_finite());
+        let closed =
+            scene.outside().is_some_and(|m| scene.media()[m.0 as usize].mean_free_path().is_finite());
         let mut powers = Vec::with_capacity(scene.emitters().len());
         let mut environments = Vec::new();
         for (index, emitter) in scene.emitters().iter().enumerate() {
@@ -140,7 +141,9 @@ impl Selection {
 #[non_exhaustive]
 pub enum WorldError {
     /// Bounds.
-    #[error("bounds of the scene: expected a finite centre and a positive finite radius, found {centre:?} and {radius}")]
+    #[error(
+        "bounds of the scene: expected a finite centre and a positive finite radius, found {centre:?} and {radius}"
+    )]
     Bounds {
         /// Centre that was given.
         centre: [f32; 3],

@@ -34,17 +34,22 @@ impl Bsdf for Glass {
         0.0
     }
 
-    fn sample(&self, from: Vec3, _: Walk, interface: Interface, u_lobe: f32, _: [f32; 2]) -> Option<BsdfSample> {
+    fn sample(
+        &self,
+        from: Vec3,
+        _: Walk,
+        interface: Interface,
+        u_lobe: f32,
+        _: [f32; 2],
+    ) -> Option<BsdfSample> {
         let refract = Self::REFRACT[side(from.z)];
-        let sample = |to, pdf, pdf_reverse| BsdfSample { to, weight: Spectrum::ONE, pdf, pdf_reverse, delta: true };
+        let sample =
+            |to, pdf, pdf_reverse| BsdfSample { to, weight: Spectrum::ONE, pdf, pdf_reverse, delta: true };
         if u_lobe >= refract {
             return Some(sample(Vec3::new(-from.x, -from.y, from.z), 1.0 - refract, 1.0 - refract));
         }
-        let ratio = if from.z > 0.0 {
-            interface.above / interface.below
-        } else {
-            interface.below / interface.above
-        };
+        let ratio =
+            if from.z > 0.0 { interface.above / interface.below } else { interface.below / interface.above };
         let sin = -from.truncate() * ratio;
         let cos2 = 1.0 - sin.length_squared();
         let to = sin.extend(cos2.sqrt().copysign(-from.z));
@@ -168,9 +173,13 @@ fn compare(geometric_normal: Vec3, shading_normal: Vec3) -> u32 {
                 * jacobian(-from.as_dvec3(), shading_normal.as_dvec3(), ratio);
             let ratio = found.rho_opposite / found.rho_own;
             // A small cosine is what is left of one minus the square of a sine in single precision.
-            let cos = f64::from(found.direction.dot(shading_normal).abs().min(from.dot(shading_normal).abs()));
+            let cos =
+                f64::from(found.direction.dot(shading_normal).abs().min(from.dot(shading_normal).abs()));
             let tolerance = 3e-7 / (cos * cos);
-            assert!((ratio / expected - 1.0).abs() < tolerance, "{from}: {ratio}, expected {expected}, cos {cos}");
+            assert!(
+                (ratio / expected - 1.0).abs() < tolerance,
+                "{from}: {ratio}, expected {expected}, cos {cos}"
+            );
             // The reversed walk sees the inverse.
             let back = transmitted(&site, walk, found.direction).expect("what was refracted can return");
             let product = ratio * (back.rho_opposite / back.rho_own);

@@ -10,7 +10,9 @@ use proptest::test_runner::TestRunner;
 use support::{TECHNIQUES, masked, modes, path, plan};
 use upbp_estimators::MediumId;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
-use upbp_estimators::mis::{BeamExtent, Edge, End, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges};
+use upbp_estimators::mis::{
+    BeamExtent, Edge, End, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges,
+};
 use upbp_estimators::scene::Walk;
 
 /// Weights by the recursion, with exactly the calls that the walks make.
@@ -45,7 +47,14 @@ fn distance_squared(edge: &PathEdge) -> f64 {
 }
 
 /// What a vertex passes on after it has scattered.
-fn pend(plan: &MisPlan, vertex: &PathVertex, tip: &Tip, rho: f64, rho_opposite: f64, cos_out: f64) -> Pending {
+fn pend(
+    plan: &MisPlan,
+    vertex: &PathVertex,
+    tip: &Tip,
+    rho: f64,
+    rho_opposite: f64,
+    cos_out: f64,
+) -> Pending {
     let tip = if is_ok(vertex) { *tip } else { Tip { connect: 0.0, ..*tip } };
     Pending {
         before: tip.before(plan, rho_opposite),
@@ -97,7 +106,8 @@ impl<'a> Recursion<'a> {
                 break;
             }
             let connections = if i + 1 == k { plan.light_tracing } else { plan.connect };
-            camera[i] = pending.arrive(plan, Walk::Camera, &edge, if is_ok(&v[i]) { connections } else { 0.0 });
+            camera[i] =
+                pending.arrive(plan, Walk::Camera, &edge, if is_ok(&v[i]) { connections } else { 0.0 });
             pending = pend(plan, &v[i], &camera[i], v[i].rho_camera, v[i].rho_light, v[i].cos_light);
         }
         Self { plan, path, light, camera, at_light }
@@ -250,7 +260,10 @@ impl Reached {
                 // The recursion is only asked by techniques that run; zero counts must give zero all the same, unless
                 // nothing makes the path or this sub-path does not exist.
                 let found = recursion.weight(way);
-                prop_assert!(found == 0.0 || !found.is_finite() || way == Way::Hit, "{way:?} is off: {found}");
+                prop_assert!(
+                    found == 0.0 || !found.is_finite() || way == Way::Hit,
+                    "{way:?} is off: {found}"
+                );
             }
         }
         Ok(())
@@ -539,9 +552,9 @@ fn the_golden_densities_and_partial_sums() {
     assert_close(recursion.light[3].below, 473.232_878_125, "light E_3");
     assert_close(recursion.camera[3].connect, 200.0, "camera D_3");
     assert_close(recursion.camera[2].below, 896.212_908_766, "camera E_2");
-    assert_close(recursion.camera[1].below, 1498.068_498_52, "camera E_1");
+    assert_close(recursion.camera[1].below, 1_498.068_498_52, "camera E_1");
     assert_close(recursion.at_light.connect, 115.690_082_564, "camera D_0");
-    assert_close(recursion.at_light.below, 1676.582_942_50, "camera E_0");
+    assert_close(recursion.at_light.below, 1_676.582_942_50, "camera E_0");
     let zero = [
         recursion.light[2].connect,
         recursion.light[3].connect,

@@ -5,9 +5,9 @@
 //! pixel through the point where the chief ray meets the plane of focus.
 //!
 //! On a film at distance `D = width / (2 tan(fov/2))` a pixel has unit area, so that a ray at angle θ has the
-//! density `(D / cos θ)² / cos θ` (`docs/theory.md`, section 1.2). With a lens the film is mapped onto the plane
-//! of focus at distance f, where a pixel has the area `(f/D)²` and is `f / cos θ` away from the lens point: the
-//! same formula, with the angle of the actual ray.
+//! density `(D / cos θ)² / cos θ` (`docs/theory.md`, section 1.2). With a lens the film is mapped onto the
+//! plane of focus at distance f, where a pixel has the area `(f/D)²` and is `f / cos θ` away from the lens
+//! point: the same formula, with the angle of the actual ray.
 
 use glam::{Vec2, Vec3};
 use upbp_estimators::scene::{Camera, CameraConnection, CameraRay, PixelRect};
@@ -48,9 +48,9 @@ pub struct PerspectiveCamera {
 }
 
 impl PerspectiveCamera {
-    /// A camera with a film of `width` × `height` square pixels, of which `crop` is rendered. `None` if the view
-    /// has no direction or is upright along it, if a number is out of its range, if the film is empty, or if
-    /// the crop is empty or leaves the film.
+    /// A camera with a film of `width` × `height` square pixels, of which `crop` is rendered. `None` if the
+    /// view has no direction or is upright along it, if a number is out of its range, if the film is empty,
+    /// or if the crop is empty or leaves the film.
     #[must_use]
     pub fn new(view: &PerspectiveView, width: u32, height: u32, crop: PixelRect) -> Option<Self> {
         let forward = (view.target.as_dvec3() - view.origin.as_dvec3()).try_normalize()?;

@@ -1,7 +1,7 @@
 //! Triangle meshes from Wavefront OBJ files.
 //!
-//! Read are vertices (`v`), normals (`vn`) and faces (`f`); polygons become fans of triangles. Everything else
-//! (texture coordinates, groups, materials) is skipped. Memory is bounded by the size of the file.
+//! Read are vertices (`v`), normals (`vn`) and faces (`f`); polygons become fans of triangles. Everything
+//! else (texture coordinates, groups, materials) is skipped. Memory is bounded by the size of the file.
 
 use std::collections::BTreeMap;
 
@@ -119,10 +119,11 @@ fn vector<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Vec3, String> 
 
 fn index(word: &str, count: usize, what: &str) -> Result<u32, String> {
     let number: i64 = word.parse().map_err(|_| format!("expected the number of a {what}, found `{word}`"))?;
-    let index = if number < 0 { count as i64 + number } else { number - 1 };
-    u32::try_from(index)
-        .ok()
-        .filter(|&index| (index as usize) < count)
+    let place = usize::try_from(number.unsigned_abs()).unwrap_or(usize::MAX);
+    let index = if number < 0 { count.checked_sub(place) } else { place.checked_sub(1) };
+    index
+        .filter(|&index| index < count)
+        .and_then(|index| u32::try_from(index).ok())
         .ok_or_else(|| format!("there is no {what} {number} among the {count} before this line"))
 }
 

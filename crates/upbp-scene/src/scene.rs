@@ -58,8 +58,8 @@ impl ReadyScene {
         &self.geometry
     }
 
-    /// A number that is the same for equal scenes: the [hash of the description](crate::SceneDescription::hash),
-    /// mixed with the contents of the files that it refers to.
+    /// A number that is the same for equal scenes: the [hash of the
+    /// description](crate::SceneDescription::hash), mixed with the contents of the files that it refers to.
     #[must_use]
     pub const fn hash(&self) -> u64 {
         self.hash
@@ -96,8 +96,8 @@ impl ReadyScene {
     }
 }
 
-/// By distance; at the same distance into a body before out of one, so that a body that is only touched is left
-/// again.
+/// By distance; at the same distance into a body before out of one, so that a body that is only touched is
+/// left again.
 fn sort(crossings: &mut [Crossing]) {
     crossings.sort_unstable_by(|a, b| {
         let by_body = || a.interior.body.cmp(&b.interior.body);
@@ -167,8 +167,8 @@ impl Scene for ReadyScene {
             (opaque, refracting) => opaque.or(refracting),
         };
         if let Some(nearest) = &nearest {
-            // What is reflected by an opaque surface stays on this side of a boundary that coincides with it. At a
-            // refracting surface most goes through.
+            // What is reflected by an opaque surface stays on this side of a boundary that coincides with
+            // it. At a refracting surface most goes through.
             let refracts = self.record(nearest).interior.is_some();
             let end = if refracts { nearest.t } else { nearest.t * (1.0 - COINCIDENT) };
             crossings.retain(|crossing| crossing.t <= end);

@@ -39,12 +39,8 @@ pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf>>(
         };
         if let Some(medium) = span.medium {
             let merges = plan.mis.merges_in(medium);
-            let ray = Ray {
-                origin: passage.origin,
-                direction: passage.direction,
-                t_min: span.start,
-                t_max: end,
-            };
+            let ray =
+                Ray { origin: passage.origin, direction: passage.direction, t_min: span.start, t_max: end };
             let query = Query { context, passage, span, edge, medium };
             if queries_points(&merges) {
                 map.medium.around_ray(&ray, plan.kernels.pb2d.radius(), |index, t, distance2| {
@@ -210,14 +206,9 @@ impl<S: Scene> Query<'_, '_, S> {
             Technique::Bb1d => factors.bb1d,
             _ => factors.pb2d,
         };
-        let weight = mis.merge_weight(
-            factor,
-            factors.sum(),
-            light.tip.before(mis, rho),
-            foot.tip.before(mis, rho),
-        );
-        let value =
-            foot.throughput * light.throughput * medium.sigma_s(foot.position) * (phase * kernel);
+        let weight =
+            mis.merge_weight(factor, factors.sum(), light.tip.before(mis, rho), foot.tip.before(mis, rho));
+        let value = foot.throughput * light.throughput * medium.sigma_s(foot.position) * (phase * kernel);
         if out.add(light.technique, value, weight) {
             out.observer.sample(&ObservedSample {
                 technique: light.technique,

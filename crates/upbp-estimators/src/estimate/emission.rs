@@ -71,17 +71,7 @@ pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf>>(
     let away = world.bounds.centre + passage.direction * (2.0 * world.bounds.radius);
     let point = EmitterPoint { position: away, normal: -passage.direction };
     for &emitter in world.environments() {
-        shine(
-            context,
-            emitter,
-            &point,
-            -passage.direction,
-            passage.origin,
-            &mis_edge,
-            throughput,
-            edge,
-            out,
-        );
+        shine(context, emitter, &point, -passage.direction, passage.origin, &mis_edge, throughput, edge, out);
     }
 }
 

@@ -67,8 +67,8 @@ pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
     } else {
         0.0
     };
-    let camera_density = f64::from(incident.pdf_direction) * scattering.cos / distance2
-        * density.backward(in_medium);
+    let camera_density =
+        f64::from(incident.pdf_direction) * scattering.cos / distance2 * density.backward(in_medium);
     let c_light =
         if in_medium { mis.distance_factor(Walk::Light, density.reach, density.backward(true)) } else { 0.0 };
     let end = End {
@@ -80,13 +80,8 @@ pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
         ),
         before: vertex.tip.before(mis, scattering.rho_opposite),
     };
-    let weight = mis.nee_weight(
-        pdf,
-        probability * f64::from(incident.pdf_position),
-        hit_density,
-        end,
-        camera_density,
-    );
+    let weight =
+        mis.nee_weight(pdf, probability * f64::from(incident.pdf_position), hit_density, end, camera_density);
     let value = vertex.throughput
         * scattering.value
         * density.transmittance

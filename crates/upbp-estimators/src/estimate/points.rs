@@ -96,8 +96,7 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
             (&plan.kernels.surf, factor, factor)
         }
         Site::Medium(medium) => {
-            let factors =
-                mis.volume_factors(*medium, photon.tip.c, vertex.tip.c, scattering.sin_theta);
+            let factors = mis.volume_factors(*medium, photon.tip.c, vertex.tip.c, scattering.sin_theta);
             (&plan.kernels.pp3d, factors.pp3d, factors.sum())
         }
     };
@@ -150,12 +149,8 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf>>(
         let sin = f64::from(towards_light.cross(vertex.towards_camera).length()).min(1.0);
         let Some((tip, light)) = beam_tip(context, beam, t) else { return };
         let factors = mis.volume_factors(medium_id, tip.c, vertex.tip.c, sin);
-        let weight = mis.merge_weight(
-            factors.bp2d,
-            factors.sum(),
-            tip.before(mis, rho),
-            vertex.tip.before(mis, rho),
-        );
+        let weight =
+            mis.merge_weight(factors.bp2d, factors.sum(), tip.before(mis, rho), vertex.tip.before(mis, rho));
         let value = vertex.throughput
             * light
             * medium.sigma_s(vertex.position)

@@ -6,8 +6,8 @@
 
 use upbp_media::MediumId;
 
-use super::plan::{BeamExtent, Heuristic, MisPlan};
 use super::PARALLEL_SIN2;
+use super::plan::{BeamExtent, Heuristic, MisPlan};
 
 /// What a vertex is.
 #[derive(Clone, Copy, Debug, PartialEq)]

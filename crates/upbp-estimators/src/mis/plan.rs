@@ -106,7 +106,13 @@ impl MisPlan {
     /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1).
     #[inline]
     #[must_use]
-    pub fn volume_factors(&self, medium: MediumId, c_light: f64, c_camera: f64, sin_theta: f64) -> VolumeMerges {
+    pub fn volume_factors(
+        &self,
+        medium: MediumId,
+        c_light: f64,
+        c_camera: f64,
+        sin_theta: f64,
+    ) -> VolumeMerges {
         let v = self.merges_in(medium);
         let sin_theta = if sin_theta * sin_theta < PARALLEL_SIN2 { 0.0 } else { sin_theta };
         VolumeMerges {

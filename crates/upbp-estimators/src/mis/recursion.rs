@@ -72,7 +72,13 @@ impl Pending {
     /// The light end of a light sub-path (section 4.2). `hit` is the count of emission hits, 0 if the emitter
     /// cannot be hit; `pdf_position` and `pdf_direction` are `L_0` and `ρL_0`.
     #[must_use]
-    pub fn at_light(plan: &MisPlan, hittable: bool, cos_out: f64, pdf_position: f64, pdf_direction: f64) -> Self {
+    pub fn at_light(
+        plan: &MisPlan,
+        hittable: bool,
+        cos_out: f64,
+        pdf_position: f64,
+        pdf_direction: f64,
+    ) -> Self {
         let hit = if hittable { plan.hit } else { 0.0 };
         Self {
             before: plan.pow(hit / pdf_position),

@@ -64,7 +64,13 @@ impl MisPlan {
     /// connections; `pdf_incident` is `p_nee`, the others `L_0` and `ρL_0`.
     #[inline]
     #[must_use]
-    pub fn hit_weight(&self, tip: &super::Tip, pdf_incident: f64, pdf_position: f64, pdf_direction: f64) -> f64 {
+    pub fn hit_weight(
+        &self,
+        tip: &super::Tip,
+        pdf_incident: f64,
+        pdf_position: f64,
+        pdf_direction: f64,
+    ) -> f64 {
         let own = self.pow(self.hit);
         own / (own
             + self.pow(pdf_incident) * tip.connect

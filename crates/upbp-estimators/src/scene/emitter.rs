@@ -111,8 +111,12 @@ pub trait Emitter: Send + Sync {
     fn power(&self, bounds: &BoundingSphere) -> f32;
 
     /// Starts a light sub-path. The four random numbers are uniform in `[0, 1)`.
-    fn sample_emission(&self, bounds: &BoundingSphere, u_position: [f32; 2], u_direction: [f32; 2])
-    -> Option<Emission>;
+    fn sample_emission(
+        &self,
+        bounds: &BoundingSphere,
+        u_position: [f32; 2],
+        u_direction: [f32; 2],
+    ) -> Option<Emission>;
 
     /// Chooses a point of the emitter for next event estimation at `receiver`.
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident>;

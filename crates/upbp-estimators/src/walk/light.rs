@@ -192,8 +192,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
         let connections =
             if connectible { flight.source.connections(context, flight.direction, position) } else { 0.0 };
         let tip = flight.pending.arrive(&plan.mis, Walk::Light, &edge, connections);
-        let vertex =
-            LightVertex { position, towards_light: from, throughput, tip, depth, path: index, site };
+        let vertex = LightVertex { position, towards_light: from, throughput, tip, depth, path: index, site };
         if connectible {
             if plan.mis.light_tracing > 0.0 && plan.lengths.contain(depth + 1) {
                 splat(context, &vertex, &stack, &behind, &mut stream, &mut scratch.crossings, out, observer);
@@ -208,10 +207,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
         else {
             return;
         };
-        observer.light_vertex(
-            index,
-            &ObservedVertex { depth, position, site, delta: scattered.delta },
-        );
+        observer.light_vertex(index, &ObservedVertex { depth, position, site, delta: scattered.delta });
         flight = Flight {
             origin: ray_origin(&site, position, scattered.direction),
             direction: scattered.direction,
@@ -270,7 +266,9 @@ fn emit<S: Scene, O: Observer<S::Bsdf>>(
     }
     observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
     let origin = match kind {
-        EmitterKind::Area => offset_origin(emission.point.position, emission.point.normal, emission.direction),
+        EmitterKind::Area => {
+            offset_origin(emission.point.position, emission.point.normal, emission.direction)
+        }
         _ => emission.point.position,
     };
     let stack = if kind.is_infinite() {
@@ -327,6 +325,10 @@ pub(super) struct Arrived<B> {
     pub(super) behind: MediumStack,
 }
 
+#[expect(
+    clippy::large_enum_variant,
+    reason = "lives on the stack for a moment, and is nearly always the large one"
+)]
 pub(super) enum Arrival<B> {
     /// At a vertex.
     Vertex(Arrived<B>),
@@ -480,8 +482,7 @@ fn splat<S: Scene, O: Observer<S::Bsdf>>(
     let crosses = vertex.site.crosses(vertex.towards_light, direction);
     let origin = ray_origin(&vertex.site, vertex.position, direction);
     let target = Target { direction, distance, surface: None };
-    let Some(density) =
-        clear_edge(scene, if crosses { behind } else { stack }, origin, &target, crossings)
+    let Some(density) = clear_edge(scene, if crosses { behind } else { stack }, origin, &target, crossings)
     else {
         return;
     };

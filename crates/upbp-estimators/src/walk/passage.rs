@@ -70,7 +70,13 @@ impl<B: Copy> Passage<B> {
     }
 
     /// Follows a ray from `origin`, which lies in the bodies of `stack`.
-    pub fn trace<S: Scene<Bsdf = B>>(&mut self, scene: &S, origin: Vec3, direction: Vec3, stack: &MediumStack) {
+    pub fn trace<S: Scene<Bsdf = B>>(
+        &mut self,
+        scene: &S,
+        origin: Vec3,
+        direction: Vec3,
+        stack: &MediumStack,
+    ) {
         self.origin = origin;
         self.direction = direction;
         self.start = *stack;
@@ -93,7 +99,12 @@ impl<B: Copy> Passage<B> {
                     if !is_hidden(&now, &interior, entering) {
                         break hit;
                     }
-                    self.cross(scene, &mut now, &mut span, Crossing { t, interior, entering, scatters: true });
+                    self.cross(
+                        scene,
+                        &mut now,
+                        &mut span,
+                        Crossing { t, interior, entering, scatters: true },
+                    );
                     ray.t_min = t * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
                 }
                 _ => break hit,

@@ -75,7 +75,12 @@ impl<B: Bsdf> Site<B> {
     /// The surface of a hit; `before` are the bodies on the side that the ray comes from.
     ///
     /// Returns the site and the bodies on the other side. `None` if the surface is grazed.
-    pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, before: &MediumStack) -> Option<(Self, MediumStack)> {
+    pub fn at_hit(
+        hit: &Hit<B>,
+        bsdf: B,
+        direction: Vec3,
+        before: &MediumStack,
+    ) -> Option<(Self, MediumStack)> {
         let cos = direction.dot(hit.geometric_normal);
         if cos.abs() < MIN_COSINE || !hit.shading_normal.is_finite() {
             return None;
@@ -279,8 +284,7 @@ impl<B: Bsdf> SurfaceSite<B> {
             weight *= ((local_from.z * cos_to) / (cos_from * sample.to.z)).abs();
         }
         let own = f64::from(sample.pdf) * f64::from(survival);
-        let mut opposite =
-            f64::from(sample.pdf_reverse) * f64::from(self.continuation(sample.to, roulette));
+        let mut opposite = f64::from(sample.pdf_reverse) * f64::from(self.continuation(sample.to, roulette));
         let transmitted = cos_from * cos_to < 0.0;
         if sample.delta && transmitted {
             // Radiance is compressed and the beam widened: (4.6), about the normal that bends. Reflection has

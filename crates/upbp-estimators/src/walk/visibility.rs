@@ -55,14 +55,12 @@ pub fn clear_edge<S: Scene>(
     let mut density = EdgeDensity::EMPTY;
     let mut start = 0.0;
     let mut push = |medium: Option<upbp_media::MediumId>, start: f32, end: f32| match medium {
-        Some(medium) => density.push(
-            &scene.media()[medium.0 as usize].segment(&RaySegment {
-                origin: ray.origin,
-                direction: ray.direction,
-                start,
-                end,
-            }),
-        ),
+        Some(medium) => density.push(&scene.media()[medium.0 as usize].segment(&RaySegment {
+            origin: ray.origin,
+            direction: ray.direction,
+            start,
+            end,
+        })),
         None => density.push_vacuum(),
     };
     for crossing in crossings.iter() {

@@ -76,7 +76,8 @@ pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
         Just(Light::Directional),
         Just(Light::Environment)
     ];
-    let ends = (light, around_one(spread), around_one(spread), around_one(spread), around_one(spread), cosine());
+    let ends =
+        (light, around_one(spread), around_one(spread), around_one(spread), around_one(spread), cosine());
     (vec((vertex(spread), edge(spread)), 0..longest), edge(spread), ends).prop_map(|(steps, last, ends)| {
         let (light, rho_light, rho_camera, pdf_position, pdf_incident, cos) = ends;
         let end = PathVertex {
@@ -167,6 +168,8 @@ pub(crate) fn masked(plan: &MisPlan, mask: u32) -> MisPlan {
 pub(crate) fn modes() -> impl Iterator<Item = (Heuristic, BeamExtent, BeamExtent)> {
     let extents = [BeamExtent::Short, BeamExtent::Long];
     [Heuristic::Balance, Heuristic::Power].into_iter().flat_map(move |heuristic| {
-        extents.into_iter().flat_map(move |photon| extents.into_iter().map(move |query| (heuristic, photon, query)))
+        extents
+            .into_iter()
+            .flat_map(move |photon| extents.into_iter().map(move |query| (heuristic, photon, query)))
     })
 }

@@ -1,8 +1,8 @@
 //! Which of several bodies counts where they overlap.
 //!
-//! At load all bodies get a total order, so that what is inside of what never depends on the way that a path took:
-//! by the given priority, then the smaller volume above the larger, then the later in the file above the earlier. The
-//! second rule makes nested bodies work without any number: what is inside is smaller.
+//! At load all bodies get a total order, so that what is inside of what never depends on the way that a
+//! path took: by the given priority, then the smaller volume above the larger, then the later in the file
+//! above the earlier. The second rule makes nested bodies work without any number: what is inside is smaller.
 
 use upbp_accel::{Shape, ShapeId};
 use upbp_media::{BodyId, Interior, MediumId};
@@ -30,21 +30,26 @@ pub(super) fn rank<'a>(drafts: impl Iterator<Item = BodyDraft<'a>>) -> Vec<Body>
         a.priority.cmp(&b.priority).then_with(larger_first).then(a.index.cmp(&b.index))
     });
     let mut bodies: Vec<Body> = Vec::with_capacity(drafts.len());
-    for (place, draft) in drafts.iter().enumerate() {
+    for ((place, draft), priority) in drafts.iter().enumerate().zip(0..) {
         let ior = draft.ior.unwrap_or_else(|| surrounding_ior(draft, &drafts[..place], &bodies));
-        let interior =
-            Interior { body: BodyId(place as u32), medium: draft.medium, priority: place as i32, ior };
+        let interior = Interior { body: BodyId(place as u32), medium: draft.medium, priority, ior };
         bodies.push(Body { shape: ShapeId(draft.index as u32), aabb: draft.shape.aabb(), interior });
     }
     bodies
 }
 
-/// The index of refraction around an index-matched body: that of the highest body below it that contains points all over its
-/// surface. A cloud in a glass block has the index of the glass, or a bubble in the cloud would refract wrongly.
+/// The index of refraction around an index-matched body: that of the highest body below it that contains
+/// points all over its surface. A cloud in a glass block has the index of the glass, or a bubble in the
+/// cloud would refract wrongly.
 fn surrounding_ior(draft: &BodyDraft<'_>, lower: &[BodyDraft<'_>], placed: &[Body]) -> f32 {
     let surface =
         |i: u8| draft.shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]).0;
-    let contains = |shape: &Shape| (0..16).all(|i| shape.contains(surface(i)) == Some(true));
+    let (min, max) = draft.shape.aabb();
+    let contains = |shape: &Shape| {
+        let (outer_min, outer_max) = shape.aabb();
+        let boxed = outer_min.cmple(min).all() && max.cmple(outer_max).all();
+        boxed && (0..16).all(|i| shape.contains(surface(i)) == Some(true))
+    };
     lower
         .iter()
         .zip(placed)

@@ -104,5 +104,5 @@ impl Builder<'_> {
 
 /// In double precision: short and long vectors alike.
 fn unit(v: Vec3) -> Option<Vec3> {
-    v.as_dvec3().try_normalize().map(|v| v.as_vec3())
+    v.as_dvec3().try_normalize().map(glam::DVec3::as_vec3)
 }

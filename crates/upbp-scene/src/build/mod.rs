@@ -92,7 +92,7 @@ impl ReadyScene {
     }
 }
 
-impl<'a> Builder<'a> {
+impl Builder<'_> {
     /// `None` only if there are problems.
     fn build(&mut self) -> Option<ReadyScene> {
         let description = self.description;
@@ -128,6 +128,8 @@ impl<'a> Builder<'a> {
                 priority: body.priority,
             })
         }));
+        let interiors: BTreeMap<usize, _> =
+            bodies.iter().map(|body| (body.shape.0 as usize, body.interior)).collect();
         let mut surfaces: Vec<Surface> = Vec::with_capacity(drafts.len());
         for (index, draft) in drafts.iter().enumerate() {
             let emitter = if draft.emission.is_black() {
@@ -139,8 +141,7 @@ impl<'a> Builder<'a> {
                 self.problem(self.shape_item(index), "its area is too small or too large for a light");
                 None
             };
-            let interior =
-                bodies.iter().find(|body| body.shape.0 as usize == index).map(|body| body.interior);
+            let interior = interiors.get(&index).copied();
             surfaces.push(Surface { bsdf: draft.bsdf, interior, emitter });
         }
         let shapes = drafts.into_iter().map(|draft| draft.shape).collect();
@@ -248,7 +249,8 @@ fn phase_function(phase: &Phase) -> Result<PhaseFunction, MediaError> {
     }
 }
 
-/// A sphere around all shapes and finite lights: around the centre of their box, as small as their own boxes allow.
+/// A sphere around all shapes and finite lights: around the centre of their box, as small as their own
+/// boxes allow.
 fn bounds<'s>(
     shapes: impl Iterator<Item = &'s upbp_accel::Shape> + Clone,
     lights: &[Light],

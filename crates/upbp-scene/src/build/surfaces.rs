@@ -186,7 +186,8 @@ impl Builder<'_> {
     }
 }
 
-/// Names the first triangle that is no triangle. Files may have some, which are left out; what is written by hand is a mistake.
+/// Names the first triangle that is no triangle. Files may have some, which are left out; what is written
+/// by hand is a mistake.
 fn check_triangles(positions: &[Vec3], indices: &[[u32; 3]]) -> Result<(), String> {
     for (number, triangle) in indices.iter().enumerate() {
         let [Some(a), Some(b), Some(c)] = triangle.map(|corner| positions.get(corner as usize)) else {

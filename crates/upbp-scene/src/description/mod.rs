@@ -1,8 +1,9 @@
 //! What a scene file says, as plain data.
 //!
-//! One type per part of the file; the crate's README documents the format. Numbers are checked by their types while a file
-//! is read, so that an error has a line and a column; what needs two places of the file to be wrong (a name
-//! that nobody defines, a quad without area) is checked when the scene is [built](crate::ReadyScene::build).
+//! One type per part of the file; the crate's README documents the format. Numbers are checked by their
+//! types while a file is read, so that an error has a line and a column; what needs two places of the file
+//! to be wrong (a name that nobody defines, a quad without area) is checked when the scene is
+//! [built](crate::ReadyScene::build).
 //!
 //! The types can also be put together by hand, and written back with [`SceneDescription::to_ron`].
 

@@ -7,8 +7,8 @@ use std::marker::PhantomData;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// A map from names to things. A file that gives one name twice is refused: the plain map would silently keep the
-/// second.
+/// A map from names to things. A file that gives one name twice is refused: the plain map would silently
+/// keep the second.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Named<T>(BTreeMap<String, T>);

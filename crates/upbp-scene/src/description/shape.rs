@@ -19,7 +19,8 @@ pub struct Shape {
     /// Name of the medium inside of a body; vacuum if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interior: Option<String>,
-    /// Where bodies overlap, the one with the higher priority counts; among equals the one with the smaller volume.
+    /// Where bodies overlap, the one with the higher priority counts; among equals the one with the smaller
+    /// volume.
     #[serde(default, skip_serializing_if = "is_default")]
     pub priority: i32,
     /// Radiance of the side that the normal points to.
@@ -38,7 +39,8 @@ pub enum Geometry {
         /// Radius.
         radius: Positive,
     },
-    /// The parallelogram `origin + a edge_u + b edge_v`, a and b in `[0, 1]`, with the normal `edge_u × edge_v`.
+    /// The parallelogram `origin + a edge_u + b edge_v`, a and b in `[0, 1]`, with the normal `edge_u ×
+    /// edge_v`.
     Quad {
         /// A corner.
         origin: Vector,

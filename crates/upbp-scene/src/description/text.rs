@@ -52,7 +52,8 @@ fn syntax_error(error: &SpannedError) -> SceneError {
     SceneError::Syntax { path: None, line: start.line, column: start.col, message: error.code.to_string() }
 }
 
-/// Fowler, Noll and Vo's hash, variant 1a with 64 bits: stable across versions, unlike the standard library's.
+/// Fowler, Noll and Vo's hash, variant 1a with 64 bits: stable across versions, unlike the standard
+/// library's.
 pub(crate) struct Fnv1a(pub(crate) u64);
 
 impl Default for Fnv1a {

@@ -1,7 +1,7 @@
 //! Numbers that are checked where they are read.
 //!
-//! Each type accepts one range and refuses the rest, NaN and infinities included, with a message that says what
-//! was expected; the reader adds line and column.
+//! Each type accepts one range and refuses the rest, NaN and infinities included, with a message that says
+//! what was expected; the reader adds line and column.
 
 use std::fmt;
 

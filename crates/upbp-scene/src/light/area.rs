@@ -42,8 +42,8 @@ impl AreaLight {
         self.radiance
     }
 
-    /// The cone of directions in which `receiver` sees the light, if points are chosen by it: its axis, and one
-    /// minus the cosine of its half angle.
+    /// The cone of directions in which `receiver` sees the light, if points are chosen by it: its axis, and
+    /// one minus the cosine of its half angle.
     fn cone(&self, receiver: Vec3) -> Option<(&Sphere, Vec3, f32)> {
         let Shape::Sphere(sphere) = &self.shape else { return None };
         let to_centre = sphere.centre() - receiver;

@@ -1,8 +1,8 @@
 //! Light from all directions by a latitude-longitude image.
 //!
-//! The radiance is constant over each pixel, and directions are drawn with a density in exact proportion to its
-//! luminance: by row, then by column, then uniformly by solid angle within the pixel. With the polar angle θ
-//! from +y, a pixel of an image of w columns covers `(2π/w) (cos θ₀ − cos θ₁)` steradians.
+//! The radiance is constant over each pixel, and directions are drawn with a density in exact proportion to
+//! its luminance: by row, then by column, then uniformly by solid angle within the pixel. With the polar
+//! angle θ from +y, a pixel of an image of w columns covers `(2π/w) (cos θ₀ − cos θ₁)` steradians.
 //!
 //! Oracle: `tests::the_density_of_an_image_integrates_to_one`.
 
@@ -157,7 +157,8 @@ impl EnvironmentImage {
         (self.width, self.height)
     }
 
-    /// Radiance from `direction` (of the image, unit vector) and the density of [`sample`](Self::sample) there.
+    /// Radiance from `direction` (of the image, unit vector) and the density of [`sample`](Self::sample)
+    /// there.
     ///
     /// The middle of the image is at −z, its top at +y, and its right half, as seen from inside, at +x.
     pub(super) fn lookup(&self, direction: Vec3) -> (Spectrum, f32) {

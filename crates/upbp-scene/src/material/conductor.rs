@@ -1,6 +1,7 @@
 //! A rough metal: mirrors with Trowbridge-Reitz normals that reflect by Fresnel's equations.
 //!
-//! `f = F D G / (4 |l_z| |c_z|)`, one bounce between the small mirrors. Source: Walter et al. 2007, equation 20.
+//! `f = F D G / (4 |l_z| |c_z|)`, one bounce between the small mirrors. Source: Walter et al. 2007,
+//! equation 20.
 
 use glam::Vec3;
 use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};

@@ -11,9 +11,9 @@ use super::fresnel::refraction;
 use super::indices;
 use super::trowbridge_reitz::TrowbridgeReitz;
 
-/// Indices that differ by less than this share do not bend light: the surface passes it straight, whatever its
-/// roughness. The reflectance that is left out is below 10⁻⁶; the normal that would refract between two given
-/// directions has no digits left there.
+/// Indices that differ by less than this share do not bend light: the surface passes it straight, whatever
+/// its roughness. The reflectance that is left out is below 10⁻⁶; the normal that would refract between two
+/// given directions has no digits left there.
 const MATCHED: f32 = 1e-3;
 
 /// Rough glass. The indices come from the bodies on both sides.
@@ -52,8 +52,8 @@ impl RoughDielectric {
         if cos_from <= 0.0 || (cos_to > 0.0) != reflects || cos_to == 0.0 {
             return None;
         }
-        // At a refraction both cosines are known: from the denser side the share has no digits near the critical
-        // angle.
+        // At a refraction both cosines are known: from the denser side the share has no digits near the
+        // critical angle.
         let reflectance = if reflects || eta_from < eta_to {
             refraction(cos_from.min(1.0), eta_from, eta_to).reflectance
         } else {

@@ -43,7 +43,8 @@ fn materials() -> Vec<(&'static str, Material)> {
     ]
 }
 
-/// A fixed sequence that fills the unit cube evenly: multiples of powers of the plastic number's cousin (Roberts 2018).
+/// A fixed sequence that fills the unit cube evenly: multiples of powers of the plastic number's cousin
+/// (Roberts 2018).
 fn points(count: u32) -> impl Iterator<Item = (f32, [f32; 2])> {
     let step = |i: u32, alpha: f64| ((0.5 + f64::from(i) * alpha).fract() as f32).min(1.0 - f32::EPSILON);
     (0..count).map(move |i| {

@@ -1,0 +1,194 @@
+//! The contract checkers find what they are there to find: each fault below would bias an image.
+
+use glam::{Vec2, Vec3};
+use upbp_estimators::check::{check_bsdf, check_camera, check_emitter};
+use upbp_estimators::scene::{
+    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
+    EmitterPoint, HitDensities, Incident, Interface, PixelRect, Walk,
+};
+use upbp_media::Spectrum;
+use upbp_scene::light::ConstantEnvironment;
+use upbp_scene::material::{Lambert, Phong};
+use upbp_scene::{PerspectiveCamera, PerspectiveView};
+
+#[derive(Clone, Copy, PartialEq)]
+enum Fault {
+    None,
+    PdfScaled,
+    ReverseSwapped,
+    WeightScaled,
+    NotReciprocal,
+    WrongLobe,
+    Roulette,
+}
+
+#[derive(Clone, Copy)]
+struct Faulty(Phong, Fault);
+
+impl Bsdf for Faulty {
+    fn eval(&self, towards_light: Vec3, towards_camera: Vec3, interface: Interface) -> Spectrum {
+        let value = self.0.eval(towards_light, towards_camera, interface);
+        if self.1 == Fault::NotReciprocal { value * towards_light.z.abs() } else { value }
+    }
+
+    fn pdf(&self, from: Vec3, to: Vec3, interface: Interface) -> f32 {
+        let lobe = Phong { exponent: 12.0, ..self.0 };
+        match self.1 {
+            Fault::PdfScaled => 0.9 * self.0.pdf(from, to, interface),
+            Fault::WrongLobe => lobe.pdf(from, to, interface),
+            _ => self.0.pdf(from, to, interface),
+        }
+    }
+
+    fn sample(
+        &self,
+        from: Vec3,
+        walk: Walk,
+        interface: Interface,
+        u_lobe: f32,
+        u: [f32; 2],
+    ) -> Option<BsdfSample> {
+        let mut sample = self.0.sample(from, walk, interface, u_lobe, u)?;
+        sample.pdf = self.pdf(from, sample.to, interface);
+        sample.pdf_reverse = self.pdf(sample.to, from, interface);
+        let (light, camera) = if walk == Walk::Light { (from, sample.to) } else { (sample.to, from) };
+        sample.weight = self.eval(light, camera, interface) * (sample.to.z.abs() / sample.pdf);
+        if self.1 == Fault::ReverseSwapped {
+            sample.pdf_reverse = sample.pdf;
+        }
+        if self.1 == Fault::WeightScaled {
+            sample.weight *= 1.01;
+        }
+        Some(sample)
+    }
+
+    fn is_connectible(&self) -> bool {
+        true
+    }
+
+    fn continuation(&self, from: Vec3) -> f32 {
+        if self.1 == Fault::Roulette { 0.0 } else { self.0.continuation(from) }
+    }
+}
+
+#[test]
+fn faults_of_a_surface_are_found() {
+    let phong = Phong { diffuse: Spectrum::splat(0.4), specular: Spectrum::splat(0.5), exponent: 8.0 };
+    let cases = [
+        (Fault::PdfScaled, "frequencies follow the density"),
+        (Fault::ReverseSwapped, "pdf_reverse is pdf of the reversed event"),
+        (Fault::WeightScaled, "weight is eval · |cos| / pdf"),
+        (Fault::NotReciprocal, "eval is reciprocal up to the squared index"),
+        (Fault::WrongLobe, "frequencies follow the density"),
+        (Fault::Roulette, "continuation is in (0, 1]"),
+    ];
+    check_bsdf(&Faulty(phong, Fault::None), Interface::MATCHED).unwrap();
+    for (fault, expected) in cases {
+        assert_eq!(check_bsdf(&Faulty(phong, fault), Interface::MATCHED).unwrap_err().what, expected);
+    }
+}
+
+#[test]
+fn a_density_above_one_is_found() {
+    /// Reflects to both sides by a cosine, each with the density of one.
+    #[derive(Clone, Copy)]
+    struct Doubled(Lambert);
+    impl Bsdf for Doubled {
+        fn eval(&self, l: Vec3, c: Vec3, interface: Interface) -> Spectrum {
+            self.0.eval(l, c, interface)
+        }
+        fn pdf(&self, _: Vec3, to: Vec3, _: Interface) -> f32 {
+            to.z.abs() * std::f32::consts::FRAC_1_PI
+        }
+        fn sample(
+            &self,
+            from: Vec3,
+            walk: Walk,
+            interface: Interface,
+            lobe: f32,
+            u: [f32; 2],
+        ) -> Option<BsdfSample> {
+            self.0.sample(from, walk, interface, lobe, u)
+        }
+        fn is_connectible(&self) -> bool {
+            true
+        }
+    }
+    let doubled = Doubled(Lambert { reflectance: Spectrum::splat(0.5) });
+    let violation = check_bsdf(&doubled, Interface::MATCHED).unwrap_err();
+    assert_eq!(violation.what, "pdf integrates to at most one");
+}
+
+/// An environment that tells a wrong density when it is hit.
+struct WrongHit(ConstantEnvironment);
+
+impl Emitter for WrongHit {
+    fn kind(&self) -> EmitterKind {
+        self.0.kind()
+    }
+    fn power(&self, bounds: &BoundingSphere) -> f32 {
+        self.0.power(bounds)
+    }
+    fn sample_emission(&self, bounds: &BoundingSphere, a: [f32; 2], b: [f32; 2]) -> Option<Emission> {
+        self.0.sample_emission(bounds, a, b)
+    }
+    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
+        self.0.sample_incident(bounds, receiver, u)
+    }
+    fn hit(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        to: Vec3,
+    ) -> Option<HitDensities> {
+        let hit = self.0.hit(bounds, point, direction, to)?;
+        Some(HitDensities { pdf_position: hit.pdf_position * 2.0, ..hit })
+    }
+}
+
+#[test]
+fn a_light_with_a_wrong_density_is_found() {
+    let bounds = BoundingSphere { centre: Vec3::ZERO, radius: 2.0 };
+    let light = WrongHit(ConstantEnvironment { radiance: Spectrum::ONE });
+    let violation = check_emitter(&light, &bounds, &[Vec3::ZERO]).unwrap_err();
+    assert_eq!(violation.what, "hit agrees with sample_emission");
+}
+
+/// A camera whose density is off, or whose connections are.
+struct WrongCamera(PerspectiveCamera, f32, Vec2);
+
+impl Camera for WrongCamera {
+    fn resolution(&self) -> (u32, u32) {
+        self.0.resolution()
+    }
+    fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Option<CameraRay> {
+        let ray = self.0.ray(film, u_lens)?;
+        Some(CameraRay { pdf: ray.pdf * self.1, ..ray })
+    }
+    fn connect(&self, point: Vec3, u_lens: [f32; 2]) -> Option<CameraConnection> {
+        let connection = self.0.connect(point, u_lens)?;
+        Some(CameraConnection { film: connection.film + self.2, pdf: connection.pdf * self.1, ..connection })
+    }
+    fn is_pinhole(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn faults_of_a_camera_are_found() {
+    let view = PerspectiveView {
+        origin: Vec3::Z,
+        target: Vec3::ZERO,
+        up: Vec3::Y,
+        horizontal_fov: 1.0,
+        lens_radius: 0.0,
+        focus_distance: 1.0,
+    };
+    let camera =
+        PerspectiveCamera::new(&view, 32, 32, PixelRect { x: 0, y: 0, width: 32, height: 32 }).unwrap();
+    let check = |factor, shift| check_camera(&WrongCamera(camera, factor, shift));
+    check(1.0, Vec2::ZERO).unwrap();
+    assert_eq!(check(1.02, Vec2::ZERO).unwrap_err().what, "a pixel's density is one over its solid angle");
+    assert_eq!(check(1.0, Vec2::splat(0.5)).unwrap_err().what, "connect inverts ray");
+}

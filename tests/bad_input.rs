@@ -1,0 +1,179 @@
+//! Bad input to the program: a clear error that names the place, exit code 2, and no output file.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The example program. A run of this test alone does not build it; if it is up to date this takes a moment.
+fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--quiet", "--example", "cornell_media"])
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .status()
+            .expect("cargo runs");
+        assert!(built.success());
+        let mut path = std::env::current_exe().expect("the path of this test");
+        path.pop();
+        path.pop();
+        path.join("examples").join(format!("cornell_media{}", std::env::consts::EXE_SUFFIX))
+    })
+}
+
+/// A folder of its own for each test.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a writable target folder");
+    folder
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(program()).args(arguments).current_dir(folder).output().expect("the program runs")
+}
+
+/// Runs, and checks that it was refused with all of `words` and left nothing behind.
+fn refused(folder: &Path, arguments: &[&str], words: &[&str]) {
+    let before: Vec<_> = list(folder);
+    let output = run(folder, arguments);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
+    for word in words {
+        assert!(text.contains(word), "{arguments:?}: expected `{word}` in: {text}");
+    }
+    assert!(!text.contains("panicked"), "{text}");
+    assert_eq!(list(folder), before, "{arguments:?} left a file");
+}
+
+fn list(folder: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<_> =
+        fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files
+}
+
+const SMALL: &str = r#"(
+  version: 1,
+  camera: Perspective(origin: (0, 1, 3), target: (0, 1, 0), fov_degrees: 40),
+  film: (width: 8, height: 8),
+  media: { "m": Homogeneous(sigma_a: 0.1, sigma_s: 0.5) },
+  materials: { "white": Lambert(0.7), "null": Null },
+  shapes: [
+    (name: "floor", material: "white", geometry: Quad(origin: (-2, 0, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0))),
+    (name: "ball", material: "null", interior: "m", geometry: Sphere(centre: (0, 1, 0), radius: 0.5)),
+  ],
+  lights: [ Point(position: (0, 3, 0), intensity: (5, 5, 5)) ],
+)"#;
+
+#[test]
+fn a_good_scene_renders_and_writes_its_files() {
+    let folder = folder("good");
+    fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
+    let arguments =
+        ["scene.ron", "-o", "out.exr", "--iterations", "2", "--report", "report.json", "--quiet"];
+    let output = run(&folder, &arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stdout.is_empty() && output.stderr.is_empty(), "--quiet prints nothing");
+    for name in ["out.exr", "out.png", "report.json"] {
+        assert!(fs::metadata(folder.join(name)).expect(name).len() > 100, "{name}");
+    }
+    assert_eq!(list(&folder).len(), 4, "nothing else is left");
+    let report: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.join("report.json")).expect("the report")).expect("JSON");
+    assert_eq!(report["iterations"], 2);
+    assert_eq!(report["counters"]["dropped"], 0);
+
+    let check = run(&folder, &["scene.ron", "--check", "-o", "not_written.exr"]);
+    assert!(check.status.success());
+    assert_eq!(list(&folder).len(), 4, "--check writes nothing");
+
+    // The reference is the image itself: no error, and a series with one point per iteration.
+    let arguments = [
+        "scene.ron", "-o", "again.exr", "--iterations", "2", "--reference", "out.exr", "--report", "b.json",
+    ];
+    assert!(run(&folder, &arguments).status.success());
+    let report: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.join("b.json")).expect("the report")).expect("JSON");
+    let series = report["series"].as_array().expect("a series");
+    assert_eq!(series.len(), 2);
+    assert_eq!(series[1]["relative_mse"], 0.0);
+    assert!(series[0]["relative_mse"].as_f64() > Some(0.0));
+}
+
+#[test]
+fn scenes_that_cannot_be_rendered_are_refused_by_place() {
+    let folder = folder("scenes");
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("a writable folder");
+    refused(&folder, &["missing.ron"], &["missing.ron"]);
+    let cases = [
+        ("syntax", SMALL.replace("version: 1,", "version: 1"), "3:3"),
+        ("unknown_field", SMALL.replace("film:", "films:"), "films"),
+        ("nan", SMALL.replace("sigma_s: 0.5", "sigma_s: NaN"), "5:"),
+        ("negative", SMALL.replace("sigma_a: 0.1", "sigma_a: -0.1"), "5:"),
+        ("unknown_material", SMALL.replace("material: \"white\"", "material: \"whit\""), "`whit`"),
+        ("unknown_medium", SMALL.replace("interior: \"m\"", "interior: \"n\""), "`n`"),
+        ("flat_quad", SMALL.replace("edge_v: (4, 0, 0)", "edge_v: (0, 0, 1)"), "floor"),
+        ("flat_sphere", SMALL.replace("radius: 0.5", "radius: 0"), "9:"),
+        ("no_light", SMALL.replace("Point(position: (0, 3, 0), intensity: (5, 5, 5))", ""), "light"),
+        ("no_film", SMALL.replace("width: 8", "width: 0"), "4:"),
+        (
+            "triangle",
+            SMALL.replace(
+                "Sphere(centre: (0, 1, 0), radius: 0.5)",
+                "Mesh(positions: [(0, 0, 0), (1, 0, 0), (2, 0, 0)], indices: [(0, 1, 2)])",
+            ),
+            "ball",
+        ),
+        (
+            "camera_in_wall",
+            SMALL.replace("material: \"null\", interior: \"m\"", "material: \"white\"").replace(
+                "origin: (0, 1, 3), target: (0, 1, 0)",
+                "origin: (0, 1, 0.2), target: (0, 1, 0)",
+            ),
+            "ball",
+        ),
+    ];
+    for (name, text, word) in cases {
+        assert_ne!(text, SMALL, "{name}");
+        let file = format!("{name}.ron");
+        write(&file, &text);
+        refused(&folder, &[&file, "-o", "out.exr"], &[&file, word]);
+    }
+}
+
+#[test]
+fn settings_and_options_that_make_no_sense_are_refused() {
+    let folder = folder("settings");
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("a writable folder");
+    write("scene.ron", SMALL);
+    write("zero.ron", "(radii: (pb2d: Absolute(0)))");
+    write("infinite.ron", "(radii: (bb1d: Scene(inf)))");
+    write("typo.ron", "(\n  sed: 1,\n)");
+    write("image.exr", "this is no image");
+    for (arguments, words) in [
+        (&["--settings", "zero.ron"][..], &["radii.pb2d", "positive"][..]),
+        (&["--settings", "infinite.ron"], &["radii.bb1d"]),
+        (&["--settings", "typo.ron"], &["typo.ron", "2:", "sed"]),
+        (&["--settings", "none.ron"], &["none.ron"]),
+        (&["--size", "0x5"], &["--size"]),
+        (&["--size", "12"], &["--size", "640x360"]),
+        (&["--techniques", "bpt+beam"], &["beam", "bb1d"]),
+        (&["--light-paths", "0"], &["light_paths"]),
+        (&["--max-length", "0"], &["max_length"]),
+        (&["--time=-1"], &["--time"]),
+        (&["--time", "NaN"], &["--time"]),
+        (&["--iterations", "0"], &["--iterations"]),
+        (&["--target-error", "0"], &["--target-error"]),
+        (&["--threads", "0"], &["--threads"]),
+        (&["--reference", "image.exr"], &["image.exr"]),
+        (&["--frobnicate"], &["--frobnicate"]),
+        (&["-o", "no/such/folder/out.exr"], &["no/such/folder/out.exr"]),
+        (&["--report", "no/such/folder/report.json"], &["no/such/folder/report.json"]),
+    ] {
+        let mut all = vec!["scene.ron"];
+        all.extend(arguments);
+        refused(&folder, &all, words);
+    }
+}
