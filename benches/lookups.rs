@@ -151,9 +151,8 @@ impl<E, T, Q> Question<E, T, Q> {
                 let tree = LazyCell::new(|| (self.build)((self.elements)(elements, spread)));
                 let queries = LazyCell::new(|| (self.queries)(elements, spread));
                 for hits in HITS {
-                    let radius = LazyCell::new(|| {
-                        radius_for(f64::from(hits), |r| self.count(&tree, &queries, r))
-                    });
+                    let radius =
+                        LazyCell::new(|| radius_for(f64::from(hits), |r| self.count(&tree, &queries, r)));
                     group.throughput(Throughput::Elements(QUERIES as u64));
                     let id = BenchmarkId::new(format!("tree/{size}/{}", spread.name()), hits);
                     group.bench_function(id, |bencher| {

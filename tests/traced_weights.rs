@@ -1,8 +1,8 @@
 //! Weights of real paths: every accepted sample is rebuilt from its vertices and weighed by enumeration
 //! (`docs/theory.md`, section 9, item 2).
 //!
-//! The abstract test of the recursion takes densities as given. Here they are those of the walks: wrong distances,
-//! stacks of bodies, reverse densities and thresholds show.
+//! The abstract test of the recursion takes densities as given. Here they are those of the walks: wrong
+//! distances, stacks of bodies, reverse densities and thresholds show.
 
 #[path = "support/closed_form.rs"]
 mod closed_form;
@@ -269,8 +269,8 @@ fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: u
         }
         let quantile = |q: f64| differences[((q * count as f64) as usize).min(count - 1)];
         println!(
-            "  {:8} {count:6} weights, {doubtful} in doubt; median {:.1e}, 99 % {:.1e}, 99.9 % {:.1e}, largest {:.1e}, \
-             {excess:.1} times what rounding explains",
+            "  {:8} {count:6} weights, {doubtful} in doubt; median {:.1e}, 99 % {:.1e}, 99.9 % {:.1e}, \
+             largest {:.1e}, {excess:.1} times what rounding explains",
             technique.name(),
             quantile(0.5),
             quantile(0.99),
@@ -278,7 +278,9 @@ fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: u
             quantile(1.0),
         );
         assert!(doubtful * 10_000 <= 10_000 + seen, "{technique:?}: {doubtful} of {seen} in doubt");
-        assert!(quantile(REGULAR) < TOLERANCE, "{technique:?}: {:e}", quantile(REGULAR));
+        // Squared densities have twice the relative error.
+        let tolerance = if plan.mis.heuristic == Heuristic::Power { 2.0 * TOLERANCE } else { TOLERANCE };
+        assert!(quantile(REGULAR) < tolerance, "{technique:?}: {:e}", quantile(REGULAR));
         assert!(excess < LARGEST_EXCESS, "{technique:?}, {excess}: {path}");
     }
 }
@@ -287,7 +289,7 @@ fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: u
 fn all_techniques_with_the_balance_heuristic() {
     for (i, camera) in CAMERAS.into_iter().enumerate() {
         let choices = PlanChoices { light_paths: 24_000, beam_paths: 1000, ..choices() };
-        audit(&format!("all techniques, camera {i}"), camera, 96, &choices, 4000);
+        audit(&format!("all techniques, camera {i}"), camera, 96, &choices, 3000);
     }
 }
 
@@ -340,7 +342,8 @@ fn walks_without_roulette() {
 
 #[test]
 fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
-    // The fog's boundary runs through the glass, where it is hidden: it changes no medium, but what is behind the glass.
+    // The fog's boundary runs through the glass, where it is hidden: it changes no medium, but what is behind
+    // the glass.
     let scene = ClosedForm::new(CAMERAS[0], 1);
     let mut passage = Passage::new();
     let mut random = Stream::new(1, 0, StreamKind::Camera, 0);

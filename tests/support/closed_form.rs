@@ -1,8 +1,9 @@
 //! A host of the estimators that owes nothing to the other crates: spheres and rectangles in closed form.
 //!
-//! It holds what weights can go wrong on: refraction, bodies that overlap and nest without a surface, media of all
-//! kinds, mirrors, mixtures of smooth and Dirac lobes, transmission at a diffuse surface, shading normals, roulette that
-//! depends on the side, emitters of every kind whose points are chosen for the receiver.
+//! It holds what weights can go wrong on: refraction, bodies that overlap and nest without a surface, media
+//! of all kinds, mirrors, mixtures of smooth and Dirac lobes, transmission at a diffuse surface, shading
+//! normals, roulette that depends on the side, emitters of every kind whose points are chosen for the
+//! receiver.
 
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
@@ -12,7 +13,7 @@ use upbp_estimators::scene::{
     EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
 use upbp_estimators::{BodyId, Interior, MediumId, Ray, Spectrum};
-use upbp_media::{Homogeneous, PhaseFunction, orthonormal_basis};
+use upbp_media::{Medium, PhaseFunction, RaySegment, SegmentDensity, orthonormal_basis};
 
 /// Cosine of the shading normal's largest tilt is well above zero: it never leaves the hemisphere.
 const BUMP: f64 = 0.25;
@@ -553,45 +554,101 @@ impl Camera for Pinhole {
     }
 }
 
-/// Coefficients of a medium, for those who do not ask the medium itself.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Coefficients {
+/// A homogeneous medium that chooses among its channels with probabilities of its own.
+#[derive(Clone, Debug)]
+pub(crate) struct Fog {
     pub(crate) sigma_a: [f32; 3],
     pub(crate) sigma_s: [f32; 3],
     pub(crate) g: f32,
+    phase: PhaseFunction,
+}
+
+impl Fog {
+    /// How often distances follow each channel.
+    pub(crate) const ALPHA: [f64; 3] = [0.5, 0.2, 0.3];
+
+    /// Probability to go on after a collision.
+    pub(crate) const CONTINUATION: f64 = 0.9;
+
+    fn new(sigma_a: [f32; 3], sigma_s: [f32; 3], g: f32) -> Self {
+        let phase = PhaseFunction::henyey_greenstein(g).expect("in range");
+        Self { sigma_a, sigma_s, g, phase }
+    }
+
+    pub(crate) fn extinction(&self) -> [f64; 3] {
+        [0, 1, 2].map(|channel| f64::from(self.sigma_a[channel] + self.sigma_s[channel]))
+    }
+}
+
+impl Medium for Fog {
+    fn scatters(&self) -> bool {
+        self.sigma_s != [0.0; 3]
+    }
+
+    fn segment(&self, segment: &RaySegment) -> SegmentDensity {
+        let sigma = self.extinction();
+        let passing = sigma.map(|sigma| (-sigma * segment.length_f64().min(f64::MAX)).exp());
+        let transmittance = Spectrum::from_array(passing.map(|t| t as f32));
+        if !self.scatters() {
+            return SegmentDensity::passing(transmittance);
+        }
+        let mean = |f: [f64; 3]| f.iter().zip(Self::ALPHA).map(|(f, alpha)| f * alpha).sum::<f64>();
+        let stop = mean([0, 1, 2].map(|channel| sigma[channel] * passing[channel]));
+        SegmentDensity { transmittance, reach: mean(passing), stop_at_end: stop, stop_at_start: stop }
+    }
+
+    fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32> {
+        let [first, second, _] = Self::ALPHA;
+        let u = f64::from(u_channel);
+        let sigma = self.extinction()[usize::from(u >= first) + usize::from(u >= first + second)];
+        let t = f64::from(segment.start) - f64::ln_1p(-f64::from(u_distance)) / sigma;
+        (self.scatters() && t < f64::from(segment.end)).then(|| (t as f32).min(segment.end.next_down()))
+    }
+
+    fn sigma_s(&self, _: Vec3) -> Spectrum {
+        self.sigma_s.into()
+    }
+
+    fn sigma_t(&self, _: Vec3) -> Spectrum {
+        Spectrum::from_array(self.extinction().map(|sigma| sigma as f32))
+    }
+
+    fn phase(&self) -> &PhaseFunction {
+        &self.phase
+    }
+
+    fn continuation(&self, _: Vec3) -> f32 {
+        Self::CONTINUATION as f32
+    }
+
+    fn mean_free_path(&self) -> f32 {
+        1.0 / self.sigma_t(Vec3::ZERO).mean()
+    }
 }
 
 /// All of it.
 pub(crate) struct ClosedForm {
     pub(crate) objects: Vec<Object>,
     pub(crate) lights: Vec<Light>,
-    pub(crate) coefficients: Vec<Coefficients>,
+    pub(crate) media: Vec<Fog>,
     pub(crate) camera: Pinhole,
-    media: Vec<Homogeneous>,
 }
 
 impl ClosedForm {
     /// The scene, with a film of `size` pixels a side, the camera at `centre`.
     pub(crate) fn new(centre: Vec3, size: u32) -> Self {
-        let coefficients = vec![
-            // Fog, chromatic and forward.
-            Coefficients { sigma_a: [0.05, 0.02, 0.1], sigma_s: [0.4, 0.6, 0.9], g: 0.6 },
+        let media = vec![
+            // Chromatic and forward.
+            Fog::new([0.05, 0.02, 0.1], [0.4, 0.6, 0.9], 0.6),
             // Dense, grey, backward.
-            Coefficients { sigma_a: [0.2; 3], sigma_s: [1.8; 3], g: -0.3 },
+            Fog::new([0.2; 3], [1.8; 3], -0.3),
             // Absorbs only.
-            Coefficients { sigma_a: [0.5, 1.0, 2.0], sigma_s: [0.0; 3], g: 0.0 },
+            Fog::new([0.5, 1.0, 2.0], [0.0; 3], 0.0),
             // In the glass.
-            Coefficients { sigma_a: [0.3, 0.1, 0.1], sigma_s: [0.2, 0.8, 0.5], g: 0.3 },
+            Fog::new([0.3, 0.1, 0.1], [0.2, 0.8, 0.5], 0.3),
             // In the paper lantern.
-            Coefficients { sigma_a: [0.1; 3], sigma_s: [1.2; 3], g: 0.0 },
+            Fog::new([0.1; 3], [1.2; 3], 0.0),
         ];
-        let media = coefficients
-            .iter()
-            .map(|c| {
-                let phase = PhaseFunction::henyey_greenstein(c.g).expect("in range");
-                Homogeneous::new(c.sigma_a.into(), c.sigma_s.into(), phase).expect("not negative")
-            })
-            .collect();
         let lamp = Shape::rectangle([-0.4, 1.9, -0.4], [0.8, 0.0, 0.0], [0.0, 0.0, 0.8]);
         let lamp_in_fog = Shape::rectangle([0.3, 0.95, -0.2], [0.3, 0.0, 0.0], [0.0, 0.0, 0.3]);
         // Both shine downwards: u × v = −y.
@@ -631,7 +688,7 @@ impl ClosedForm {
             light(Source::Environment, 2.0),
         ];
         let camera = Pinhole { centre, size, film_distance: size as f32 };
-        Self { objects, lights, coefficients, camera, media }
+        Self { objects, lights, media, camera }
     }
 
     /// The body that counts at a point, by asking all of them.
@@ -654,7 +711,7 @@ impl ClosedForm {
 impl Scene for ClosedForm {
     type Bsdf = Material;
     type Emitter = Light;
-    type Medium = Homogeneous;
+    type Medium = Fog;
     type Camera = Pinhole;
 
     fn intersect(&self, ray: &Ray) -> Option<Hit<Material>> {
@@ -692,7 +749,7 @@ impl Scene for ClosedForm {
         &self.lights
     }
 
-    fn media(&self) -> &[Homogeneous] {
+    fn media(&self) -> &[Fog] {
         &self.media
     }
 

@@ -8,34 +8,51 @@ use upbp_core::{Image, Renderer, Settings};
 /// A mean over independent iterations, with its standard error.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
-    /// Mean of the image, mean of the three channels.
+    /// Mean of the image: of the three channels, or of one.
     pub mean: f64,
     /// Standard error of it, from the spread of the iterations.
     pub error: f64,
 }
 
 impl Estimate {
+    /// Mean and standard error of independent values.
+    pub fn of(values: &[f64]) -> Self {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        Self { mean, error: (variance / n).sqrt() }
+    }
+
     /// Difference to another independent estimate in standard errors.
     pub fn sigmas(&self, other: &Self) -> f64 {
         (self.mean - other.mean) / self.error.hypot(other.error)
     }
 }
 
-/// Renders `iterations` iterations and returns the estimate of the image mean, and the image.
-pub fn render<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Estimate, Image) {
+/// Renders `iterations` iterations and returns the image mean of each, per channel, and the image.
+pub fn iterate<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Vec<[f64; 3]>, Image) {
     let checked = settings.clone().validate().expect("valid settings");
     let mut renderer = Renderer::new(scene, checked).expect("a scene that can be rendered");
-    let mut sums = Vec::new();
-    let mut before = 0.0;
+    let mut means = Vec::new();
+    let mut before = [0.0; 3];
     for n in 1..=iterations {
         assert!(renderer.iterate());
-        let image = renderer.film().image();
-        let total = image.mean().iter().sum::<f64>() / 3.0 * n as f64;
-        sums.push(total - before);
-        before = total;
+        let sum = renderer.film().image().mean().map(|v| v * n as f64);
+        means.push(std::array::from_fn(|c| sum[c] - before[c]));
+        before = sum;
     }
-    let n = iterations as f64;
-    let mean = before / n;
-    let variance = sums.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (Estimate { mean, error: (variance / n).sqrt() }, renderer.film().image())
+    (means, renderer.film().image())
+}
+
+/// Renders `iterations` iterations and returns the estimate of the image mean, and the image.
+pub fn render<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Estimate, Image) {
+    let (means, image) = iterate(scene, settings, iterations);
+    let grey: Vec<f64> = means.iter().map(|m| m.iter().sum::<f64>() / 3.0).collect();
+    (Estimate::of(&grey), image)
+}
+
+/// Renders `iterations` iterations and returns the estimate of the image mean per channel.
+pub fn render_channels<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> [Estimate; 3] {
+    let (means, _) = iterate(scene, settings, iterations);
+    std::array::from_fn(|c| Estimate::of(&means.iter().map(|m| m[c]).collect::<Vec<_>>()))
 }

@@ -8,9 +8,10 @@ use upbp_estimators::observer::LightEnd;
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Interior, MediumId};
 
-use crate::closed_form::{ClosedForm, Coefficients, Material, Source};
+use crate::closed_form::{ClosedForm, Fog, Material, Source};
 
-/// Closer to a boundary or an end than this, double precision does not say on which side single precision was.
+/// Closer to a boundary or an end than this, double precision does not say on which side single precision
+/// was.
 const TINY: f64 = 3e-6;
 
 /// An interior vertex as it was observed.
@@ -61,17 +62,14 @@ struct Passed {
     last: Option<MediumId>,
 }
 
-fn extinction(medium: &Coefficients) -> [f64; 3] {
-    [0, 1, 2].map(|channel| f64::from(medium.sigma_a[channel] + medium.sigma_s[channel]))
-}
-
 /// The mixture of the channels over a stretch: probability to pass and density to stop.
-fn stretch(medium: &Coefficients, length: f64) -> (f64, f64) {
+fn stretch(medium: &Fog, length: f64) -> (f64, f64) {
     if medium.sigma_s == [0.0; 3] {
         return (1.0, 0.0);
     }
-    let sigma = extinction(medium);
-    let mean = |f: &dyn Fn(f64) -> f64| sigma.iter().map(|&s| f(s)).sum::<f64>() / 3.0;
+    let mean = |f: &dyn Fn(f64) -> f64| -> f64 {
+        medium.extinction().into_iter().zip(Fog::ALPHA).map(|(sigma, alpha)| alpha * f(sigma)).sum()
+    };
     (mean(&|s| (-s * length).exp()), mean(&|s| s * (-s * length).exp()))
 }
 
@@ -99,7 +97,7 @@ fn pass(scene: &ClosedForm, from: DVec3, to: DVec3) -> Result<Passed, Doubt> {
         }
     }
     let of = |(medium, length): &(Option<MediumId>, f64)| {
-        medium.map_or((1.0, 0.0), |id| stretch(&scene.coefficients[id.0 as usize], *length))
+        medium.map_or((1.0, 0.0), |id| stretch(&scene.media[id.0 as usize], *length))
     };
     let reach = |stretches: &[_]| stretches.iter().map(|s| of(s).0).product::<f64>();
     let (first, last) = (stretches[0], stretches[stretches.len() - 1]);
@@ -116,13 +114,8 @@ fn henyey_greenstein(g: f64, cos: f64) -> f64 {
     0.25 * FRAC_1_PI * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos).powf(1.5)
 }
 
-fn continuation(medium: &Coefficients) -> f64 {
-    let sigma_t = extinction(medium);
-    (0..3).map(|c| f64::from(medium.sigma_s[c]) / sigma_t[c]).fold(0.0, f64::max)
-}
-
-/// Densities of scattering from one direction to another and back, as the oracle wants them, for a walk that comes
-/// from the light's side.
+/// Densities of scattering from one direction to another and back, as the oracle wants them, for a walk that
+/// comes from the light's side.
 struct Scattering {
     kind: VertexKind,
     rho_light: f64,
@@ -186,9 +179,9 @@ fn in_medium(
     to_light: DVec3,
     to_camera: DVec3,
 ) -> Scattering {
-    let coefficients = &scene.coefficients[medium.0 as usize];
-    let survival = if roulette { continuation(coefficients) } else { 1.0 };
-    let rho = henyey_greenstein(f64::from(coefficients.g), -to_light.dot(to_camera)) * survival;
+    let fog = &scene.media[medium.0 as usize];
+    let survival = if roulette { Fog::CONTINUATION } else { 1.0 };
+    let rho = henyey_greenstein(f64::from(fog.g), -to_light.dot(to_camera)) * survival;
     Scattering {
         kind: VertexKind::Medium(medium),
         rho_light: rho,
@@ -207,9 +200,9 @@ impl Trace {
 
     /// By how much rounding may change a density, relative; the largest along the path.
     ///
-    /// A ray starts off its surface by some roundings, so that a short edge is not quite the line between its vertices;
-    /// where that line is close to a surface the densities there follow its cosine, and refraction is steep. Beams that are
-    /// almost parallel have a sine of few digits.
+    /// A ray starts off its surface by some roundings, so that a short edge is not quite the line between its
+    /// vertices; where that line is close to a surface the densities there follow its cosine, and refraction
+    /// is steep. Beams that are almost parallel have a sine of few digits.
     pub(crate) fn conditioning(path: &Path) -> f64 {
         // What rays start off their surfaces by, 32 roundings of coordinates up to 2.
         const OFFSET: f64 = 8e-6;

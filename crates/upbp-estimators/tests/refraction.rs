@@ -1,5 +1,5 @@
-//! The ratio of the two walks' densities at a smooth interface (`docs/theory.md`, section 4.6): oracle is the Jacobian of
-//! refraction by finite differences.
+//! The ratio of the two walks' densities at a smooth interface (`docs/theory.md`, section 4.6): oracle is the
+//! Jacobian of refraction by finite differences.
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
 use upbp_estimators::scene::{

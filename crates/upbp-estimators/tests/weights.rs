@@ -1,4 +1,5 @@
-//! The weights of the recursion against their enumeration, on abstract paths (`docs/theory.md`, sections 4.9 and 11).
+//! The weights of the recursion against their enumeration, on abstract paths (`docs/theory.md`, sections 4.9
+//! and 11).
 
 mod support;
 
@@ -231,8 +232,8 @@ struct Reached {
 impl Reached {
     /// Compares all weights of one path under one plan.
     ///
-    /// A weight is known to the rounding of the sum that it is a part of: differences count relative to the weight
-    /// down to `1e-200`, below which squares of densities leave the range of normal numbers.
+    /// A weight is known to the rounding of the sum that it is a part of: differences count relative to the
+    /// weight down to `1e-200`, below which squares of densities leave the range of normal numbers.
     fn compare(&mut self, plan: &MisPlan, path: &Path, mask: u32) -> Result<(), TestCaseError> {
         let expected = path.weights(plan);
         let recursion = Recursion::new(plan, path);
@@ -257,8 +258,8 @@ impl Reached {
             if mask >> bit & 1 == 0 {
                 prop_assert!(expected.iter().all(|(other, _)| *other != way), "{way:?} is off");
                 prop_assert_eq!(path.weight(plan, way), 0.0);
-                // The recursion is only asked by techniques that run; zero counts must give zero all the same, unless
-                // nothing makes the path or this sub-path does not exist.
+                // The recursion is only asked by techniques that run; zero counts must give zero all the
+                // same, unless nothing makes the path or this sub-path does not exist.
                 let found = recursion.weight(way);
                 prop_assert!(
                     found == 0.0 || !found.is_finite() || way == Way::Hit,
@@ -277,8 +278,8 @@ impl Reached {
     }
 }
 
-/// Longest path and spread of the densities. The power heuristic squares densities: a chain of ratios of `e^{±16}` must
-/// be short to stay within double precision.
+/// Longest path and spread of the densities. The power heuristic squares densities: a chain of ratios of
+/// `e^{±16}` must be short to stay within double precision.
 const RANGES: [(usize, f64); 5] = [(20, 3.0), (20, 5.0), (9, 8.0), (6, 12.0), (4, 16.0)];
 
 #[test]

@@ -1,16 +1,17 @@
 //! The same coefficients everywhere.
 //!
 //! Distances are drawn from a mixture of the channels' exponentials, anew on every segment:
-//! `S = ⅓ Σ e^{−σ_c ℓ}`, `p = ⅓ Σ σ_c e^{−σ_c ℓ}`. The estimate divides by the mixture, so that the
-//! throughput of a segment never exceeds three, whatever the ratio of the channels. A purely absorbing
-//! medium is passed with probability one.
+//! `S = Σ α_c e^{−σ_c ℓ}`, `p = Σ α_c σ_c e^{−σ_c ℓ}`. The estimate divides by the mixture, so that the
+//! throughput of a segment never exceeds `1/α_c`, whatever the ratio of the channels. The probabilities `α` are
+//! those of `mixture.rs`. A purely absorbing medium is passed with probability one.
 //!
-//! Source: `docs/theory.md`, section 1.4, policy B with `α = ⅓`. Oracles: quadrature and
+//! Source: `docs/theory.md`, section 1.4, policy B. Oracles: quadrature and
 //! `tests::grey_equals_the_mixture_of_three_equal_channels`.
 
 use glam::Vec3;
 
 use crate::error::check_non_negative;
+use crate::mixture::channel_probabilities;
 use crate::{MediaError, Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 
 /// Floor of [`Medium::continuation`]: keeps the probability positive where hardly anything scatters. A
@@ -18,14 +19,14 @@ use crate::{MediaError, Medium, PhaseFunction, RaySegment, SegmentDensity, Spect
 const MIN_CONTINUATION: f32 = 0.01;
 
 /// How distances are drawn; follows from the coefficients.
-#[derive(Copy, Clone, Debug, PartialEq, Eq)]
+#[derive(Copy, Clone, Debug, PartialEq)]
 enum Sampling {
     /// No channel scatters: walks always pass.
     Never,
     /// All channels have the same extinction: one exponential, the same numbers as the mixture of three.
     Grey,
-    /// The mixture of the channels.
-    Chromatic,
+    /// The mixture of the channels, each with its probability.
+    Chromatic([f64; 3]),
 }
 
 /// A medium with the same coefficients everywhere.
@@ -54,7 +55,7 @@ impl Homogeneous {
         } else if sigma_t == Spectrum::splat(sigma_t.r()) {
             Sampling::Grey
         } else {
-            Sampling::Chromatic
+            Sampling::Chromatic(channel_probabilities(sigma_s, sigma_t))
         };
         Ok(Self { sigma_a, sigma_s, sigma_t, emission: Spectrum::ZERO, phase, sampling })
     }
@@ -128,13 +129,17 @@ fn grey_density(sigma: f64, length: f64) -> SegmentDensity {
     }
 }
 
-/// The mixture of three exponentials with equal shares.
+/// The mixture of three exponentials.
 #[inline]
-fn chromatic_density(sigma: Spectrum, length: f64) -> SegmentDensity {
-    let [r, g, b] = attenuation(sigma, length);
-    let reach = (r + g + b) / 3.0;
-    let stop = (f64::from(sigma.r()) * r + f64::from(sigma.g()) * g + f64::from(sigma.b()) * b) / 3.0;
-    SegmentDensity { transmittance: to_spectrum([r, g, b]), reach, stop_at_end: stop, stop_at_start: stop }
+fn chromatic_density(alpha: &[f64; 3], sigma: Spectrum, length: f64) -> SegmentDensity {
+    let channels = attenuation(sigma, length);
+    let (mut reach, mut stop) = (0.0, 0.0);
+    for c in 0..3 {
+        let share = alpha[c] * channels[c];
+        reach += share;
+        stop += share * f64::from(sigma[c]);
+    }
+    SegmentDensity { transmittance: to_spectrum(channels), reach, stop_at_end: stop, stop_at_start: stop }
 }
 
 impl Medium for Homogeneous {
@@ -149,7 +154,7 @@ impl Medium for Homogeneous {
         match self.sampling {
             Sampling::Never => SegmentDensity::passing(to_spectrum(attenuation(self.sigma_t, length))),
             Sampling::Grey => grey_density(f64::from(self.sigma_t.r()), length),
-            Sampling::Chromatic => chromatic_density(self.sigma_t, length),
+            Sampling::Chromatic(alpha) => chromatic_density(&alpha, self.sigma_t, length),
         }
     }
 
@@ -158,10 +163,11 @@ impl Medium for Homogeneous {
         let sigma = match self.sampling {
             Sampling::Never => return None,
             Sampling::Grey => self.sigma_t.r(),
-            Sampling::Chromatic => {
-                if u_channel < 1.0 / 3.0 {
+            Sampling::Chromatic(alpha) => {
+                let u_channel = f64::from(u_channel);
+                if u_channel < alpha[0] {
                     self.sigma_t.r()
-                } else if u_channel < 2.0 / 3.0 {
+                } else if u_channel < alpha[0] + alpha[1] {
                     self.sigma_t.g()
                 } else {
                     self.sigma_t.b()
@@ -246,6 +252,14 @@ mod tests {
         Homogeneous::new(sigma_a.into(), sigma_s.into(), PhaseFunction::Isotropic).unwrap()
     }
 
+    /// The probabilities with which a medium chooses its channels.
+    fn alpha(medium: &Homogeneous) -> [f64; 3] {
+        match medium.sampling {
+            Sampling::Chromatic(alpha) => alpha,
+            _ => [1.0 / 3.0; 3],
+        }
+    }
+
     fn segment(start: f32, end: f32) -> RaySegment {
         RaySegment { origin: Vec3::new(1.0, 2.0, 3.0), direction: Vec3::Y, start, end }
     }
@@ -268,7 +282,7 @@ mod tests {
             for length in [1e-3, 0.1, 1.0, 20.0] {
                 let density = |length| match medium.sampling {
                     Sampling::Grey => grey_density(f64::from(medium.sigma_t.r()), length),
-                    _ => chromatic_density(medium.sigma_t, length),
+                    _ => chromatic_density(&alpha(&medium), medium.sigma_t, length),
                 };
                 let stops = integrate(|t| density(t).stop_at_end, 0.0, length, 2000);
                 let total = stops + density(length).reach;
@@ -321,7 +335,8 @@ mod tests {
     fn a_fixed_channel_draws_from_that_channel_alone() {
         let medium = medium([0.0; 3], [0.5, 1.0, 2.0]);
         for channel in 0..3 {
-            let u_channel = (channel as f32 + 0.5) / 3.0;
+            let before: f64 = alpha(&medium)[..channel].iter().sum();
+            let u_channel = (before + 0.5 * alpha(&medium)[channel]) as f32;
             let free_path = medium.sample_distance(&segment(0.0, 100.0), u_channel, 0.5).unwrap();
             let expected = std::f32::consts::LN_2 / medium.sigma_t[channel];
             assert!((free_path / expected - 1.0).abs() < 1e-6);
@@ -334,7 +349,7 @@ mod tests {
         for sigma in [1e-12_f32, 1e-3, 0.7, 40.0] {
             let grey = medium([0.25 * sigma; 3], [0.75 * sigma; 3]);
             assert_eq!(grey.sampling, Sampling::Grey);
-            let mixed = Homogeneous { sampling: Sampling::Chromatic, ..grey.clone() };
+            let mixed = Homogeneous { sampling: Sampling::Chromatic([1.0 / 3.0; 3]), ..grey.clone() };
             for optical_depth in [0.0, 1e-12, 1e-3, 1.0, 30.0] {
                 let segment = segment(0.0, optical_depth / sigma);
                 let (one, other) = (grey.segment(&segment), mixed.segment(&segment));
@@ -358,10 +373,11 @@ mod tests {
         let medium = medium([0.5, 0.0, 0.0], [0.5, 0.0, 1e-12]);
         let density = medium.segment(&segment(0.0, f32::INFINITY));
         assert_eq!(density.transmittance, Spectrum::new(0.0, 1.0, 0.0));
-        assert_eq!((density.reach, density.stop_at_end, density.stop_at_start), (1.0 / 3.0, 0.0, 0.0));
-        // The clear channel is the middle third of the choice.
+        let [first, clear, _] = alpha(&medium);
+        assert_eq!((density.reach, density.stop_at_end, density.stop_at_start), (clear, 0.0, 0.0));
+        let in_clear = (first + 0.5 * clear) as f32;
         for u_distance in [0.0, 0.5, LARGEST_BELOW_ONE] {
-            assert_eq!(medium.sample_distance(&segment(0.0, f32::INFINITY), 0.5, u_distance), None);
+            assert_eq!(medium.sample_distance(&segment(0.0, f32::INFINITY), in_clear, u_distance), None);
             assert!(medium.sample_distance(&segment(0.0, f32::INFINITY), 0.1, u_distance).is_some());
         }
     }
@@ -378,7 +394,8 @@ mod tests {
         for medium in scattering_media() {
             for (start, end) in [(2.0, 2.0), (3.0, 2.0), (f32::NAN, 1.0)] {
                 let density = medium.segment(&segment(start, end));
-                let mean = medium.sigma_t.to_array().into_iter().map(f64::from).sum::<f64>() / 3.0;
+                let sigmas = medium.sigma_t.to_array().map(f64::from);
+                let mean: f64 = alpha(&medium).iter().zip(sigmas).map(|(a, sigma)| a * sigma).sum();
                 assert_eq!((density.transmittance, density.reach), (Spectrum::ONE, 1.0));
                 assert!((density.stop_at_end / mean - 1.0).abs() < 1e-14);
                 assert_eq!(density.stop_at_end, density.stop_at_start);
@@ -408,7 +425,7 @@ mod tests {
                 } else {
                     medium([0.0; 3], [sigma; 3])
                 };
-                let share = if chromatic { 1.0 / 3.0 } else { 1.0 };
+                let share = if chromatic { alpha(&medium)[0] } else { 1.0 };
                 for exponent in -12..=3 {
                     let length = 10.0_f32.powi(exponent) / sigma;
                     let depth = f64::from(sigma) * f64::from(length);
@@ -435,7 +452,8 @@ mod tests {
         for medium in scattering_media() {
             for exponent in -12..7 {
                 let density = medium.segment(&segment(0.0, (exponent as f32).exp2()));
-                let bound = 3.0 * (1.0 + 1e-6);
+                let rarest = alpha(&medium).into_iter().fold(1.0, f64::min);
+                let bound = (1.0 + 1e-6) / rarest;
                 assert!(f64::from(density.transmittance.max_component()) <= bound * density.reach);
                 let collision = medium.sigma_t * density.transmittance;
                 assert!(f64::from(collision.max_component()) <= bound * density.stop_at_end);

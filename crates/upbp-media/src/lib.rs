@@ -4,6 +4,7 @@ mod error;
 mod frame;
 mod homogeneous;
 mod medium;
+mod mixture;
 mod phase;
 mod segment;
 mod spectrum;

@@ -67,8 +67,8 @@ enum Light {
     Environment,
 }
 
-/// A path of 1 to `longest` edges whose densities lie between `e^{-spread}` and `e^{spread}`, independent in the two
-/// directions.
+/// A path of 1 to `longest` edges whose densities lie between `e^{-spread}` and `e^{spread}`, independent in
+/// the two directions.
 pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
     let light = prop_oneof![
         Just(Light::Area),

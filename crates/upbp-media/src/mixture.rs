@@ -1,0 +1,93 @@
+//! With which probability each colour channel chooses the distance in a chromatic medium.
+//!
+//! Under the per-segment mixture (`docs/theory.md`, section 1.4, policy B) every collision multiplies the throughput of channel
+//! `c` by `σ_s,c e^{−σ_c t} / p(t)`. Its second moment `M_c = ∫ (σ_s,c e^{−σ_c t})² / p dt` is the factor by which the variance of
+//! that channel grows from collision to collision, so the probabilities that make the largest `M_c` as small as
+//! possible suit long paths best. They are a function of the medium only, which lets the other walk compute them too.
+
+use crate::Spectrum;
+
+/// No channel is chosen less often: its throughput on passing a segment is bounded by the inverse.
+const FLOOR: f64 = 0.05;
+
+/// Points of the quadrature.
+const POINTS: u32 = 256;
+
+/// The probabilities of the channels; they sum to one.
+pub(crate) fn channel_probabilities(sigma_s: Spectrum, sigma_t: Spectrum) -> [f64; 3] {
+    let mut alpha = [1.0 / 3.0; 3];
+    for _ in 0..64 {
+        // A channel whose variance grows faster than others gets more of the samples: the fixed point has equal growth
+        // in all channels that are above the floor.
+        let growth: [f64; 3] = std::array::from_fn(|c| growth(c, &alpha, sigma_s, sigma_t));
+        let raised: [f64; 3] = std::array::from_fn(|c| alpha[c] * growth[c].sqrt());
+        let sum: f64 = raised.iter().sum();
+        if !(sum > 0.0 && sum.is_finite()) {
+            break;
+        }
+        let floored = raised.map(|a| (a / sum).max(FLOOR));
+        let sum: f64 = floored.iter().sum();
+        alpha = floored.map(|a| a / sum);
+    }
+    // With few bits the three sum to one without rounding: a segment of length zero is passed with certainty.
+    let scale = f64::from(1_u32 << 20);
+    let [r, g, _] = alpha.map(|a| (a * scale).round() / scale);
+    [r, g, 1.0 - r - g]
+}
+
+/// `M_c`, with the distance substituted by `u = 1 − e^{−σ_c t}`.
+fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum) -> f64 {
+    let sigma = f64::from(sigma_t[channel]);
+    let scattering = f64::from(sigma_s[channel]);
+    if scattering == 0.0 {
+        return 0.0;
+    }
+    let sum: f64 = (0..POINTS)
+        .map(|i| {
+            let passed = 1.0 - (f64::from(i) + 0.5) / f64::from(POINTS);
+            let t = -passed.ln() / sigma;
+            let p: f64 = (0..3)
+                .map(|c| alpha[c] * f64::from(sigma_t[c]) * (-f64::from(sigma_t[c]) * t).exp())
+                .sum();
+            passed / p
+        })
+        .sum();
+    scattering * scattering / sigma * sum / f64::from(POINTS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn largest(alpha: [f64; 3], sigma_s: Spectrum, sigma_t: Spectrum) -> f64 {
+        (0..3).map(|c| growth(c, &alpha, sigma_s, sigma_t)).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn no_other_probabilities_are_better() {
+        for (sigma_a, sigma_s) in [
+            (Spectrum::new(0.05, 0.5, 2.5), Spectrum::new(8.0, 2.0, 0.3)),
+            (Spectrum::new(0.1, 0.1, 0.1), Spectrum::new(1.0, 3.0, 9.0)),
+            (Spectrum::new(0.0, 1.0, 0.0), Spectrum::new(1.0, 0.0, 0.5)),
+        ] {
+            let sigma_t = sigma_a + sigma_s;
+            let chosen = channel_probabilities(sigma_s, sigma_t);
+            assert_eq!(chosen.iter().sum::<f64>(), 1.0);
+            let best = largest(chosen, sigma_s, sigma_t);
+            // All probabilities on a grid that respects the floor.
+            for r in 1..20 {
+                for g in 1..20 - r {
+                    let alpha = [r, g, 20 - r - g].map(|n| f64::from(n) / 20.0);
+                    let other = largest(alpha, sigma_s, sigma_t);
+                    assert!(best < other * 1.01, "{chosen:?}: {best}, {alpha:?}: {other}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn equal_channels_are_chosen_alike() {
+        let alpha = channel_probabilities(Spectrum::splat(2.0), Spectrum::splat(3.0));
+        assert!(alpha.iter().all(|a| (a - 1.0 / 3.0).abs() < 1e-6));
+    }
+}
