@@ -72,7 +72,7 @@ fn a_good_scene_renders_and_writes_its_files() {
     let folder = folder("good");
     fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
     let arguments =
-        ["scene.ron", "-o", "out.exr", "--iterations", "2", "--report", "report.json", "--quiet"];
+        ["scene.ron", "-o", "out.exr", "--iterations", "2", "--threads", "2", "--report", "report.json", "--quiet"];
     let output = run(&folder, &arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(output.stdout.is_empty() && output.stderr.is_empty(), "--quiet prints nothing");

@@ -6,6 +6,7 @@ mod options;
 
 use std::error::Error;
 use std::io::IsTerminal;
+use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -25,18 +26,30 @@ const BAD_INPUT: u8 = 2;
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    match run(&options) {
+    // A pool of its own: reading the scene works in parallel too.
+    let threads = options.threads.map_or(0, NonZeroUsize::get);
+    let result = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(|| run(&options).map_err(|error| describe(&*error))),
+        Err(error) => Err(error.to_string()),
+    };
+    match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            let mut source = error.source();
-            while let Some(cause) = source {
-                eprintln!("  because: {cause}");
-                source = cause.source();
-            }
+        Err(message) => {
+            eprintln!("error: {message}");
             ExitCode::from(BAD_INPUT)
         }
     }
+}
+
+/// An error with all its causes.
+fn describe(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text += &format!("\n  because: {cause}");
+        source = cause.source();
+    }
+    text
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -50,9 +63,6 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         }
     })?;
     let reference = options.reference.as_deref().map(read_exr).transpose()?;
-    if let Some(threads) = options.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
-    }
     let mut renderer = Renderer::new(&scene, settings.clone().validate()?)?;
     if let Some(reference) = &reference {
         let rect = renderer.film().rect();

@@ -7,16 +7,16 @@ use upbp_core::{Image, Renderer, Settings};
 
 /// A mean over independent iterations, with its standard error.
 #[derive(Clone, Copy, Debug)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     /// Mean of the image: of the three channels, or of one.
-    pub mean: f64,
+    pub(crate) mean: f64,
     /// Standard error of it, from the spread of the iterations.
-    pub error: f64,
+    pub(crate) error: f64,
 }
 
 impl Estimate {
     /// Mean and standard error of independent values.
-    pub fn of(values: &[f64]) -> Self {
+    pub(crate) fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -24,13 +24,13 @@ impl Estimate {
     }
 
     /// Difference to another independent estimate in standard errors.
-    pub fn sigmas(&self, other: &Self) -> f64 {
+    pub(crate) fn sigmas(&self, other: &Self) -> f64 {
         (self.mean - other.mean) / self.error.hypot(other.error)
     }
 }
 
 /// Renders `iterations` iterations and returns the image mean of each, per channel, and the image.
-pub fn iterate<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Vec<[f64; 3]>, Image) {
+pub(crate) fn iterate<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Vec<[f64; 3]>, Image) {
     let checked = settings.clone().validate().expect("valid settings");
     let mut renderer = Renderer::new(scene, checked).expect("a scene that can be rendered");
     let mut means = Vec::new();
@@ -45,14 +45,14 @@ pub fn iterate<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Ve
 }
 
 /// Renders `iterations` iterations and returns the estimate of the image mean, and the image.
-pub fn render<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Estimate, Image) {
+pub(crate) fn render<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Estimate, Image) {
     let (means, image) = iterate(scene, settings, iterations);
     let grey: Vec<f64> = means.iter().map(|m| m.iter().sum::<f64>() / 3.0).collect();
     (Estimate::of(&grey), image)
 }
 
 /// Renders `iterations` iterations and returns the estimate of the image mean per channel.
-pub fn render_channels<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> [Estimate; 3] {
+pub(crate) fn render_channels<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> [Estimate; 3] {
     let (means, _) = iterate(scene, settings, iterations);
     std::array::from_fn(|c| Estimate::of(&means.iter().map(|m| m[c]).collect::<Vec<_>>()))
 }

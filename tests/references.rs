@@ -1,0 +1,111 @@
+//! Every reference scene, by bidirectional path tracing and by the default mixture, against an image of an
+//! independent renderer: short renders, errors in standard deviations. `examples/validate` does the same with more
+//! time and all techniques.
+
+#[path = "../examples/validate/compare.rs"]
+mod compare;
+
+use std::path::Path;
+
+use compare::{Comparison, Reference, Spread};
+use upbp_core::{Renderer, Settings};
+use upbp_scene::ReadyScene;
+
+/// Iterations of each render: enough for the spread to be known.
+const ITERATIONS: u64 = 24;
+
+/// Standard errors that the mean of an image may be off. Of 20 renders with independent errors one is beyond with a
+/// probability of 0.1 %.
+const MEAN: f64 = 4.0;
+
+/// The same for one of some 100 tiles of 3 channels in 20 renders. The spread is that of 24 iterations with a skew
+/// distribution: its tails are heavier than normal ones.
+const TILE: f64 = 6.0;
+
+/// Share of the pixels beyond 3.5 standard errors, for the same reason more than the normal 0.05 %.
+const OUTLIERS: f64 = 0.04;
+
+fn check(scene_name: &str, iterations: u64) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let scene = ReadyScene::load(root.join(format!("examples/scenes/reference/{scene_name}.ron")))
+        .expect("a valid scene");
+    let reference = Reference::read(&root.join(format!("tests/data/references/{scene_name}.exr")))
+        .expect("an image with standard errors");
+    let mut failures = Vec::new();
+    for techniques in ["bpt", "bpt+surf+pp3d+pb2d+bb1d"] {
+        let settings =
+            Settings { techniques: techniques.parse().expect("technique names"), ..Settings::default() };
+        let settings = settings.validate().expect("valid settings");
+        let mut renderer = Renderer::new(&scene, settings).expect("a scene that can be rendered");
+        let mut spread = Spread::default();
+        for _ in 0..iterations {
+            assert!(renderer.iterate());
+            spread.add(renderer.film());
+        }
+        let result = Comparison::new(renderer.film(), &spread, &reference);
+        let [r, g, b] = result.sigmas;
+        println!(
+            "{scene_name:18} {techniques:24} mean {r:+.2} {g:+.2} {b:+.2} sigma ({:.2} %), tiles {:.2}, {:.2} % outliers, \
+             relMSE {:.1e} (floor {:.1e})",
+            result.worst_percent(),
+            result.tile,
+            100.0 * result.outliers,
+            result.relative_mse,
+            reference.floor(),
+        );
+        if result.worst_sigmas() > MEAN || result.tile > TILE || result.outliers > OUTLIERS {
+            failures.push(techniques);
+        }
+    }
+    assert!(failures.is_empty(), "{scene_name}: {failures:?} differ from the reference");
+}
+
+#[test]
+fn absorb_only() {
+    check("absorb_only", ITERATIONS);
+}
+
+#[test]
+fn chromatic_sphere() {
+    check("chromatic_sphere", ITERATIONS);
+}
+
+#[test]
+fn emission_grey() {
+    check("emission_grey", ITERATIONS);
+}
+
+#[test]
+fn fog_cornell() {
+    check("fog_cornell", ITERATIONS);
+}
+
+#[test]
+fn fog_two_spheres() {
+    check("fog_two_spheres", ITERATIONS);
+}
+
+#[test]
+fn forward_hg_box() {
+    check("forward_hg_box", ITERATIONS);
+}
+
+#[test]
+fn glass_env() {
+    check("glass_env", ITERATIONS);
+}
+
+#[test]
+fn high_albedo_cube() {
+    check("high_albedo_cube", ITERATIONS);
+}
+
+#[test]
+fn mirror_fog() {
+    check("mirror_fog", ITERATIONS);
+}
+
+#[test]
+fn point_bubble_fog() {
+    check("point_bubble_fog", ITERATIONS);
+}
