@@ -71,8 +71,18 @@ const SMALL: &str = r#"(
 fn a_good_scene_renders_and_writes_its_files() {
     let folder = folder("good");
     fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
-    let arguments =
-        ["scene.ron", "-o", "out.exr", "--iterations", "2", "--threads", "2", "--report", "report.json", "--quiet"];
+    let arguments = [
+        "scene.ron",
+        "-o",
+        "out.exr",
+        "--iterations",
+        "2",
+        "--threads",
+        "2",
+        "--report",
+        "report.json",
+        "--quiet",
+    ];
     let output = run(&folder, &arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(output.stdout.is_empty() && output.stderr.is_empty(), "--quiet prints nothing");
@@ -90,9 +100,8 @@ fn a_good_scene_renders_and_writes_its_files() {
     assert_eq!(list(&folder).len(), 4, "--check writes nothing");
 
     // The reference is the image itself: no error, and a series with one point per iteration.
-    let arguments = [
-        "scene.ron", "-o", "again.exr", "--iterations", "2", "--reference", "out.exr", "--report", "b.json",
-    ];
+    let arguments =
+        ["scene.ron", "-o", "again.exr", "--iterations", "2", "--reference", "out.exr", "--report", "b.json"];
     assert!(run(&folder, &arguments).status.success());
     let report: serde_json::Value =
         serde_json::from_slice(&fs::read(folder.join("b.json")).expect("the report")).expect("JSON");
@@ -128,10 +137,9 @@ fn scenes_that_cannot_be_rendered_are_refused_by_place() {
         ),
         (
             "camera_in_wall",
-            SMALL.replace("material: \"null\", interior: \"m\"", "material: \"white\"").replace(
-                "origin: (0, 1, 3), target: (0, 1, 0)",
-                "origin: (0, 1, 0.2), target: (0, 1, 0)",
-            ),
+            SMALL
+                .replace("material: \"null\", interior: \"m\"", "material: \"white\"")
+                .replace("origin: (0, 1, 3), target: (0, 1, 0)", "origin: (0, 1, 0.2), target: (0, 1, 0)"),
             "ball",
         ),
     ];

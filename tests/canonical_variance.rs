@@ -152,7 +152,7 @@ impl Scene for Space {
     }
 }
 
-/// Sums over samples of one technique, weights checked.
+/// Sums over samples of one technique.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     count: f64,
@@ -227,8 +227,8 @@ impl Setup {
     }
 
     fn space(&self) -> Space {
-        let medium =
-            Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, PhaseFunction::Isotropic).expect("valid coefficients");
+        let medium = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, PhaseFunction::Isotropic)
+            .expect("valid coefficients");
         let start = self.crossing as f32;
         Space { light: [Laser { start }], medium: [medium], camera: Tube { start } }
     }
@@ -247,7 +247,13 @@ impl Setup {
                 vertices_per_light_path: 1.0,
                 lengths: PathLengths { min: 2, max: 2 },
                 roulette: false,
-                kernels: Kernels { surf: Kernel::NONE, pp3d: kernel, pb2d: kernel, bp2d: kernel, bb1d: kernel },
+                kernels: Kernels {
+                    surf: Kernel::NONE,
+                    pp3d: kernel,
+                    pb2d: kernel,
+                    bp2d: kernel,
+                    bb1d: kernel,
+                },
                 heuristic: Heuristic::Balance,
                 photon_beams: self.photon_beams,
                 query_beams: self.query_beams,
@@ -317,7 +323,7 @@ impl Setup {
     }
 }
 
-/// Second moments over squared means of one ray; `q` and `e` as in the theory.
+/// Second moments over squared means of one ray.
 mod closed {
     pub(super) fn point(w: f64, a: f64) -> f64 {
         a.exp() / (1.0 - (-w).exp())
@@ -359,7 +365,7 @@ mod closed {
 
 const WIDTHS: [f64; 4] = [0.1, 1.0, 3.0, 10.0];
 
-/// Fails if any row is more than 1 % off. Widths whose samples are too rare to tell are stated by their error.
+/// Keeps rows that are more than 1 % off.
 fn check(failures: &mut Vec<String>, name: &str, w: f64, a: f64, measured: Moment, expected: f64) {
     let difference = measured.value / expected - 1.0;
     let row = format!(
@@ -388,7 +394,14 @@ fn one_random_end() {
         check(&mut failures, "BP2D, constant disc, long beam", w, a, points, closed::point(w, a));
         let beams = Setup::new("bb1d", Kernel::parabolic_line, w, a);
         check(&mut failures, "BB1D, long, long", w, a, beams.measure(2, 10, 10), 1.0);
-        check(&mut failures, "short beam, overlap", w, a, beams.short_photon().overlap(100, 20_000), closed::overlap(w, a));
+        check(
+            &mut failures,
+            "short beam, overlap",
+            w,
+            a,
+            beams.short_photon().overlap(100, 20_000),
+            closed::overlap(w, a),
+        );
         if !far || a == 0.0 {
             let batches = if far { 1000 } else { 200 };
             let short = beams.short_photon().measure(batches, 10_000, 1);
@@ -411,13 +424,34 @@ fn two_random_ends() {
         check(&mut failures, "BB1D, short, short", w, 0.0, beams.measure(200, 500, 500), short * short);
         let points = Setup::new("pb2d", Kernel::disc, w, 0.0).short_query();
         let expected = closed::point(w, 0.0) * short;
-        check(&mut failures, "PB2D, constant disc, short query", w, 0.0, points.measure(200, 500, 500), expected);
+        check(
+            &mut failures,
+            "PB2D, constant disc, short query",
+            w,
+            0.0,
+            points.measure(200, 500, 500),
+            expected,
+        );
         let balls = Setup::new("pp3d", Kernel::ball, w, 0.0);
-        check(&mut failures, "PP3D, ball", w, 0.0, balls.measure(200, 500, 500), closed::points_in_ball(w, 0.0));
+        check(
+            &mut failures,
+            "PP3D, ball",
+            w,
+            0.0,
+            balls.measure(200, 500, 500),
+            closed::points_in_ball(w, 0.0),
+        );
     }
     // The closed form of rare pairs is reached for wide kernels too.
     let balls = Setup::new("pp3d", Kernel::ball, 10.0, 0.0);
-    check(&mut failures, "PP3D, ball", 10.0, 0.0, balls.measure(400, 700, 700), closed::points_in_ball(10.0, 0.0));
+    check(
+        &mut failures,
+        "PP3D, ball",
+        10.0,
+        0.0,
+        balls.measure(400, 700, 700),
+        closed::points_in_ball(10.0, 0.0),
+    );
     assert!(failures.is_empty(), "more than 1 % off:\n{}", failures.join("\n"));
 }
 
@@ -443,7 +477,7 @@ fn points_and_beams_change_places_at_one_mean_free_path() {
     });
     println!("PB2D with a constant disc against BB1D: {found:.4}, expected 0.9624");
     assert!((found - 0.9624).abs() < 0.05);
-    // The renderer's own kernel is narrower than its radius tells, so that its points get worse earlier.
+    // The renderer's own kernel weighs the rim little: it needs a larger radius for the same.
     let found = crossover(1.0..=1.3, |w| {
         let points = Setup::new("pb2d", Kernel::parabolic_disc, w, 0.0).measure(40, 10_000, 1);
         points.value / short(w).measure(40, 10_000, 1).value

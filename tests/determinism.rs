@@ -28,7 +28,12 @@ fn bits(threads: usize, techniques: &str) -> Vec<u32> {
         }
         let film = renderer.film();
         let layers = film.layers().iter().filter_map(|layer| film.layer(*layer));
-        layers.chain([film.image(), film.variance()]).flat_map(|i| i.pixels).flatten().map(f32::to_bits).collect()
+        layers
+            .chain([film.image(), film.variance()])
+            .flat_map(|i| i.pixels)
+            .flatten()
+            .map(f32::to_bits)
+            .collect()
     })
 }
 

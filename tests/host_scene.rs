@@ -42,7 +42,8 @@ fn all_subsets_agree() {
         let sigmas = estimate.sigmas(&reference);
         println!("{techniques:12} {:.5} ± {:.5}  {sigmas:+.2} sigma", estimate.mean, estimate.error);
         worst = worst.max(sigmas.abs());
-    }    assert!(worst < 4.0, "worst: {worst:.2} sigma");
+    }
+    assert!(worst < 4.0, "worst: {worst:.2} sigma");
 }
 
 /// The same room as a scene file: other geometry code, other materials, lights and camera.
@@ -83,7 +84,9 @@ fn the_ready_made_scene_looks_the_same() {
         let (ours, our_image) = render(&ready_made, &settings(techniques), 150);
         let sigmas = theirs.sigmas(&ours);
         let difference = their_image.relative_mse(&our_image);
-        println!("{techniques}: {theirs:?} {ours:?} {sigmas:+.2} sigma, relMSE between them {difference:.2e}");
+        println!(
+            "{techniques}: {theirs:?} {ours:?} {sigmas:+.2} sigma, relMSE between them {difference:.2e}"
+        );
         assert!(sigmas.abs() < 4.0, "{techniques}: {theirs:?} against {ours:?}");
         // Two independent images with a relMSE of about 3e-3 each: a shifted or mirrored one is far beyond.
         assert!(difference < 2e-2, "{techniques}: {difference}");

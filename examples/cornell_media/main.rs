@@ -43,13 +43,10 @@ fn main() -> ExitCode {
 
 /// An error with all its causes.
 fn describe(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text += &format!("\n  because: {cause}");
-        source = cause.source();
+    match error.source() {
+        Some(cause) => format!("{error}\n  because: {}", describe(cause)),
+        None => error.to_string(),
     }
-    text
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {

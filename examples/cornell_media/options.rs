@@ -46,7 +46,7 @@ pub(crate) struct Options {
     /// Light sub-paths per iteration [default: one per pixel]
     #[arg(long, value_name = "N")]
     light_paths: Option<u32>,
-    /// Light sub-paths that leave photon beams, per iteration [default: 1 in 25]
+    /// Light sub-paths that leave photon beams, per iteration [default: a few per query beam]
     #[arg(long, value_name = "N")]
     beams: Option<u32>,
     /// Keep the first radii instead of shrinking them
@@ -104,8 +104,7 @@ impl Options {
 }
 
 fn size(text: &str) -> Result<[Count; 2], String> {
-    let sides: Option<Vec<Count>> =
-        text.split('x').map(|side| Count::new(side.parse().ok()?).ok()).collect();
+    let sides: Option<Vec<Count>> = text.split('x').map(|side| Count::new(side.parse().ok()?).ok()).collect();
     match sides.as_deref() {
         Some(&[width, height]) => Ok([width, height]),
         _ => Err("expected width x height in pixels, such as 640x360".to_owned()),

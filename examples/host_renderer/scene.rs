@@ -8,8 +8,8 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use upbp_core::glam::{Vec2, Vec3};
 use upbp_core::media::{Homogeneous, MediaError, PhaseFunction, orthonormal_basis};
 use upbp_core::scene::{
-    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterId, EmitterKind,
-    EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
+    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterId,
+    EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
 use upbp_core::{BodyId, Interior, MediumId, Ray, Spectrum};
 
@@ -103,7 +103,13 @@ impl Emitter for Lamp {
         })
     }
 
-    fn hit(&self, _: &BoundingSphere, point: &EmitterPoint, direction: Vec3, _: Vec3) -> Option<HitDensities> {
+    fn hit(
+        &self,
+        _: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        _: Vec3,
+    ) -> Option<HitDensities> {
         let cos = point.normal.dot(direction);
         (cos > 0.0).then(|| HitDensities {
             radiance: self.radiance,
@@ -150,11 +156,7 @@ impl Camera for Pinhole {
         let film = (place / self.half_width + Vec2::ONE) * (0.5 * self.size as f32);
         let size = self.size as f32;
         let seen = between.z < 0.0 && film.x >= 0.0 && film.y >= 0.0 && film.x < size && film.y < size;
-        seen.then(|| CameraConnection {
-            lens: self.position,
-            film,
-            pdf: self.pdf(between.normalize()),
-        })
+        seen.then(|| CameraConnection { lens: self.position, film, pdf: self.pdf(between.normalize()) })
     }
 
     fn is_pinhole(&self) -> bool {
@@ -229,8 +231,7 @@ impl Scene for Room {
         }
         let (centre, radius) = self.milk;
         for t in ball(ray, centre, radius) {
-            let interior =
-                Interior { body: BodyId(0), medium: Some(MediumId(1)), priority: 0, ior: 1.0 };
+            let interior = Interior { body: BodyId(0), medium: Some(MediumId(1)), priority: 0, ior: 1.0 };
             keep(t, &|p| hit(t, p, (p - centre) / radius, None, Some(interior), None));
         }
         let lamp = &self.lamp[0];

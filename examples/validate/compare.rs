@@ -12,7 +12,7 @@ use upbp_core::{Film, Image};
 const TILE: usize = 8;
 
 /// A converged picture and its standard error per pixel. The channels of a pixel share their noise.
-pub struct Reference {
+pub(crate) struct Reference {
     width: usize,
     pixels: Vec<[f64; 3]>,
     errors: Vec<[f64; 3]>,
@@ -20,7 +20,7 @@ pub struct Reference {
 
 impl Reference {
     /// Reads the channels `R`, `stderr.R` and so on.
-    pub fn read(path: &Path) -> Result<Self, exr::error::Error> {
+    pub(crate) fn read(path: &Path) -> Result<Self, exr::error::Error> {
         let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
         let layer = image.all_attributes().from_file(path)?.layer_data;
         let width = layer.size.width();
@@ -42,7 +42,7 @@ impl Reference {
     }
 
     /// The picture alone.
-    pub fn image(&self) -> Image {
+    pub(crate) fn image(&self) -> Image {
         Image {
             width: self.width as u32,
             height: (self.pixels.len() / self.width) as u32,
@@ -51,7 +51,7 @@ impl Reference {
     }
 
     /// Mean of the picture per channel. Its pixels are independent of each other.
-    pub fn mean(&self) -> [Estimate; 3] {
+    pub(crate) fn mean(&self) -> [Estimate; 3] {
         let n = self.pixels.len() as f64;
         std::array::from_fn(|c| Estimate {
             mean: self.pixels.iter().map(|pixel| pixel[c]).sum::<f64>() / n,
@@ -60,7 +60,7 @@ impl Reference {
     }
 
     /// relMSE of the reference itself, due to its noise: what a perfect render seems to have.
-    pub fn floor(&self) -> f64 {
+    pub(crate) fn floor(&self) -> f64 {
         let pixels = self.pixels.iter().flatten().zip(self.errors.iter().flatten());
         pixels.map(|(r, s)| s * s / (r * r + 0.01)).sum::<f64>() / (3 * self.pixels.len()) as f64
     }
@@ -68,9 +68,9 @@ impl Reference {
 
 /// A mean with its standard error.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Estimate {
-    pub mean: f64,
-    pub error: f64,
+pub(crate) struct Estimate {
+    pub(crate) mean: f64,
+    pub(crate) error: f64,
 }
 
 impl Estimate {
@@ -80,17 +80,17 @@ impl Estimate {
         Self { mean, error: ((squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt() }
     }
 
-    /// Difference to an independent estimate in standard errors; 0 for two that are the same and exact.
-    pub fn sigmas(&self, other: &Self) -> f64 {
+    /// Difference to an independent estimate in standard errors.
+    pub(crate) fn sigmas(&self, other: &Self) -> f64 {
         let difference = self.mean - other.mean;
-        // What is the same in every iteration, such as an environment that is seen directly, is exact up to the
-        // rounding of single precision.
-        let rounding = 1e-5 * other.mean.abs();
-        difference / self.error.hypot(other.error).max(rounding).max(f64::MIN_POSITIVE)
+        // What was the same in every iteration, such as an environment that is seen directly, is exact only up to
+        // rounding and to what is too rare to have happened, such as the corner of a body in the corner of a pixel.
+        let unseen = 1e-4 * other.mean.abs();
+        difference / self.error.max(unseen).hypot(other.error).max(f64::MIN_POSITIVE)
     }
 
     /// Difference relative to `other`, in percent.
-    pub fn percent(&self, other: &Self) -> f64 {
+    pub(crate) fn percent(&self, other: &Self) -> f64 {
         100.0 * (self.mean / other.mean - 1.0)
     }
 }
@@ -124,7 +124,7 @@ fn tiles(image: &Image) -> Vec<[f64; 3]> {
 
 /// Gathers the spread of a render's iterations.
 #[derive(Default)]
-pub struct Spread {
+pub(crate) struct Spread {
     iterations: u64,
     before: Vec<[f64; 3]>,
     squares: Vec<[f64; 3]>,
@@ -132,7 +132,7 @@ pub struct Spread {
 
 impl Spread {
     /// To be called after every iteration.
-    pub fn add(&mut self, film: &Film) {
+    pub(crate) fn add(&mut self, film: &Film) {
         let n = film.iterations();
         assert_eq!(n, self.iterations + 1, "every iteration is looked at");
         let mut sums = tiles(&film.image());
@@ -150,7 +150,7 @@ impl Spread {
     }
 
     /// Mean of the picture per channel.
-    pub fn mean(&self) -> [Estimate; 3] {
+    pub(crate) fn mean(&self) -> [Estimate; 3] {
         self.before.last().map_or([Estimate::default(); 3], |_| self.tile(self.before.len() - 1))
     }
 
@@ -162,25 +162,25 @@ impl Spread {
 
 /// A render and a reference, each value the worst of the three channels.
 #[derive(Clone, Copy, Debug)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// Mean of the picture.
-    pub mean: [Estimate; 3],
+    pub(crate) mean: [Estimate; 3],
     /// Its difference to the reference in standard errors.
-    pub sigmas: [f64; 3],
+    pub(crate) sigmas: [f64; 3],
     /// The same in percent.
-    pub percent: [f64; 3],
+    pub(crate) percent: [f64; 3],
     /// Mean square of the pixels' differences in standard errors, expected 1.
-    pub chi_square: f64,
+    pub(crate) chi_square: f64,
     /// Share of the pixels beyond 3.5 standard errors, `[0, 1]`.
-    pub outliers: f64,
+    pub(crate) outliers: f64,
     /// Largest difference of a tile in standard errors.
-    pub tile: f64,
+    pub(crate) tile: f64,
     /// relMSE, over all channels.
-    pub relative_mse: f64,
+    pub(crate) relative_mse: f64,
 }
 
 impl Comparison {
-    pub fn new(film: &Film, spread: &Spread, reference: &Reference) -> Self {
+    pub(crate) fn new(film: &Film, spread: &Spread, reference: &Reference) -> Self {
         let (image, variance) = (film.image(), film.variance());
         assert_eq!(image.pixels.len(), reference.pixels.len(), "the reference has the film's size");
         let mean = spread.mean();
@@ -225,12 +225,12 @@ impl Comparison {
     }
 
     /// Largest difference of the mean in standard errors.
-    pub fn worst_sigmas(&self) -> f64 {
+    pub(crate) fn worst_sigmas(&self) -> f64 {
         worst(self.sigmas)
     }
 
     /// Largest difference of the mean in percent.
-    pub fn worst_percent(&self) -> f64 {
+    pub(crate) fn worst_percent(&self) -> f64 {
         worst(self.percent)
     }
 }

@@ -1,21 +1,278 @@
+//! Renders the reference scenes with many sets of techniques and compares them with images of an independent renderer.
+//!
+//! `cargo run --release --example validate` takes the better part of an hour; `-- --quick` some minutes. Prints a table and
+//! ends with exit code 1 if a bar was missed.
+//!
+//! Sets without merges are unbiased: mean of the picture, tiles and pixels must agree within the noise, and the noise of
+//! the mean must be low. With merges there is kernel bias, which the default settings must keep below 1 %. Merges alone
+//! (`hit` sees lights directly, merging at any vertex that is not specular covers the rest) are stated, and rendered
+//! once more with fixed radii r, r/2, r/4: where kernels lie inside of their medium bias falls like r², what sticks out
+//! of it is a loss that falls like r.
+
 mod compare;
-use compare::*;
-use std::path::Path;
-use upbp_core::*;
-use upbp_scene::ReadyScene;
+
+use std::error::Error;
+use std::fmt::Write as _;
 use std::ops::ControlFlow;
-fn main(){
-    let args: Vec<String> = std::env::args().collect();
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Parser;
+use upbp_core::{Radii, Radius, Renderer, Settings, Stop, Technique, TechniqueSet};
+use upbp_scene::ReadyScene;
+
+use compare::{Comparison, Estimate, Reference, Spread};
+
+const SCENES: [&str; 10] = [
+    "absorb_only",
+    "chromatic_sphere",
+    "emission_grey",
+    "fog_cornell",
+    "fog_two_spheres",
+    "forward_hg_box",
+    "glass_env",
+    "high_albedo_cube",
+    "mirror_fog",
+    "point_bubble_fog",
+];
+
+const SETS: [&str; 8] = [
+    "pt",
+    "bpt",
+    "bpt+surf+pp3d+pb2d+bb1d",
+    "all",
+    "hit+surf+pp3d",
+    "hit+surf+pb2d",
+    "hit+surf+bp2d",
+    "hit+surf+bb1d",
+];
+
+/// Scenes for the exponents: no specular surfaces, so that `hit` is needed for nothing but the lights themselves.
+const EXPONENT_SCENES: [&str; 2] = ["fog_cornell", "point_bubble_fog"];
+
+/// Largest of the three radii, relative to the scene.
+const EXPONENT_RADIUS: f32 = 0.04;
+
+/// Standard errors that the mean may be off.
+const MEAN_SIGMAS: f64 = 4.0;
+/// Percent that the mean of an unbiased set may be off.
+const UNBIASED_PERCENT: f64 = 0.5;
+/// Percent that the mean of the default mixture may be off.
+const MIXED_PERCENT: f64 = 1.0;
+/// Standard errors that a tile of an unbiased set may be off.
+const TILE_SIGMAS: f64 = 4.5;
+/// Share of the pixels of an unbiased set that may be beyond 3.5 standard errors.
+const OUTLIERS: f64 = 0.01;
+/// With fewer iterations the spread of a pixel is known too badly for that.
+const PIXEL_ITERATIONS: u64 = 256;
+/// With fewer iterations no error is known.
+const LEAST_ITERATIONS: u64 = 16;
+
+/// Compares renders of the reference scenes with images of an independent renderer.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+struct Options {
+    /// Seconds of rendering per scene and set
+    #[arg(long, default_value_t = 60.0)]
+    time: f64,
+    /// Scenes [default: all]
+    #[arg(long, value_delimiter = ',')]
+    scenes: Vec<String>,
+    /// Sets of techniques [default: a selection]
+    #[arg(long, value_delimiter = ',')]
+    sets: Vec<TechniqueSet>,
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// 4 seconds each, the bars in percent and the exponents left out
+    #[arg(long)]
+    quick: bool,
+    /// Write the table as CSV too
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
+    let scenes: Vec<&str> = if options.scenes.is_empty() {
+        SCENES.to_vec()
+    } else {
+        options.scenes.iter().map(String::as_str).collect()
+    };
+    let sets = if options.sets.is_empty() {
+        SETS.iter().map(|set| set.parse()).collect::<Result<_, _>>()?
+    } else {
+        options.sets.clone()
+    };
+    let seconds = if options.quick { 4.0 } else { options.time };
+    let mut csv = "scene,techniques,iterations,mean_r,mean_g,mean_b,error_r,error_g,error_b,sigmas_r,sigmas_g,sigmas_b,\
+        percent_r,percent_g,percent_b,chi_square,outliers,tile_sigmas,relative_mse,missed\n"
+        .to_owned();
+    let mut good = true;
+    println!(
+        "| scene | techniques | iterations | mean: % (σ) R | G | B | χ² | pixels > 3.5 σ | worst tile | relMSE | |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for name in &scenes {
+        let (scene, reference) = open(name)?;
+        for techniques in &sets {
+            let settings = Settings { techniques: *techniques, seed: options.seed, ..Settings::default() };
+            let stop = Stop { seconds: Some(seconds), ..Stop::default() };
+            let (renderer, spread) = render(&scene, settings, &stop)?;
+            let film = renderer.film();
+            let result = Comparison::new(film, &spread, &reference);
+            let missed = judge(&result, *techniques, film.iterations(), options.quick);
+            good &= missed.is_none();
+            let missed = missed.unwrap_or_default();
+            let mean = [0, 1, 2].map(|c| format!("{:+.3} ({:+.2})", result.percent[c], result.sigmas[c]));
+            println!(
+                "| {name} | {techniques} | {} | {} | {:.2} | {:.2} % | {:.2} σ | {:.1e} | {missed} |",
+                film.iterations(),
+                mean.join(" | "),
+                result.chi_square,
+                100.0 * result.outliers,
+                result.tile,
+                result.relative_mse,
+            );
+            let list = |values: [f64; 3]| values.map(|v| v.to_string()).join(",");
+            writeln!(
+                csv,
+                "{name},{techniques},{},{},{},{},{},{},{},{},{},{missed}",
+                film.iterations(),
+                list(result.mean.map(|m| m.mean)),
+                list(result.mean.map(|m| m.error)),
+                list(result.sigmas),
+                list(result.percent),
+                result.chi_square,
+                result.outliers,
+                result.tile,
+                result.relative_mse,
+            )?;
+        }
+        println!("| {name} | *the reference itself* | | | | | | | | {:.1e} | |", reference.floor());
+    }
+    if !options.quick {
+        let chosen = scenes.iter().filter(|name| EXPONENT_SCENES.contains(name));
+        exponents(chosen.copied(), seconds)?;
+    }
+    if let Some(path) = &options.csv {
+        std::fs::write(path, csv).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+    }
+    Ok(good)
+}
+
+fn open(name: &str) -> Result<(ReadyScene, Reference), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let time: f64 = args[1].parse().unwrap();
-    for scene in args[2].split(',') { for set in args[3].split(',') {
-        let s = ReadyScene::load(root.join(format!("examples/scenes/reference/{scene}.ron"))).unwrap();
-        let r = Reference::read(&root.join(format!("tests/data/references/{scene}.exr"))).unwrap();
-        let settings = Settings{techniques:set.parse().unwrap(), seed: args.get(4).map_or(0,|s|s.parse().unwrap()), min_length: args.get(5).map_or(1,|s|s.parse().unwrap()), max_length: args.get(6).map_or(1000,|s|s.parse().unwrap()), ..Settings::default()};
-        let mut renderer = Renderer::new(&s, settings.validate().unwrap()).unwrap();
-        let mut spread = Spread::default();
-        renderer.render(&Stop{seconds:Some(time),..Stop::default()}, |p| {spread.add(p.film); ControlFlow::Continue(())});
-        let m=spread.mean(); println!("  mean {:.6} {:.6} {:.6} err {:.6} {:.6} {:.6}",m[0].mean,m[1].mean,m[2].mean,m[0].error,m[1].error,m[2].error); let c = Comparison::new(renderer.film(), &spread, &r);
-        println!("{scene:18} {set:24} n={:5} sig {:+.2} {:+.2} {:+.2}  % {:+.3} {:+.3} {:+.3} e% {:.3} chi2 {:.3} out% {:.2} tile {:.2} relmse {:.2e} floor {:.1e}", renderer.film().iterations(), c.sigmas[0],c.sigmas[1],c.sigmas[2],c.percent[0],c.percent[1],c.percent[2], 100.0*c.mean[1].error/c.mean[1].mean, c.chi_square, 100.0*c.outliers, c.tile, c.relative_mse, r.floor());
-    }}
+    let scene = ReadyScene::load(root.join(format!("examples/scenes/reference/{name}.ron")))?;
+    let path = root.join(format!("tests/data/references/{name}.exr"));
+    let reference = Reference::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok((scene, reference))
+}
+
+fn render<'s>(
+    scene: &'s ReadyScene,
+    settings: Settings,
+    stop: &Stop,
+) -> Result<(Renderer<'s, ReadyScene>, Spread), Box<dyn Error>> {
+    let mut renderer = Renderer::new(scene, settings.validate()?)?;
+    let mut spread = Spread::default();
+    renderer.render(stop, |now| {
+        spread.add(now.film);
+        ControlFlow::Continue(())
+    });
+    // Errors need a number of iterations, however long they take.
+    while renderer.film().iterations() < LEAST_ITERATIONS && renderer.iterate() {
+        spread.add(renderer.film());
+    }
+    Ok((renderer, spread))
+}
+
+/// The bar that was missed, if any.
+fn judge(result: &Comparison, techniques: TechniqueSet, iterations: u64, quick: bool) -> Option<String> {
+    let merges = techniques.intersects(TechniqueSet::VOLUME_MERGES.with(Technique::Surf));
+    let (sigmas, percent) = (result.worst_sigmas(), result.worst_percent());
+    if !merges {
+        if sigmas > MEAN_SIGMAS {
+            return Some(format!("mean {sigmas:.1} σ"));
+        }
+        if percent > UNBIASED_PERCENT && !quick {
+            return Some(format!("mean {percent:.2} %"));
+        }
+        if result.tile > TILE_SIGMAS && !quick {
+            return Some(format!("tile {:.1} σ", result.tile));
+        }
+        if result.outliers > OUTLIERS && iterations >= PIXEL_ITERATIONS && !quick {
+            return Some(format!("{:.1} % of the pixels", 100.0 * result.outliers));
+        }
+    } else if techniques.has(Technique::Nee) && percent > MIXED_PERCENT {
+        // A short render is allowed its noise.
+        let noise = (0..3).all(|c| result.sigmas[c].abs() < MEAN_SIGMAS);
+        if !(quick && noise) {
+            return Some(format!("mean {percent:.2} %"));
+        }
+    }
+    None
+}
+
+/// Bias of merges alone with three fixed radii, and the exponents between them.
+fn exponents<'n>(scenes: impl Iterator<Item = &'n str>, seconds: f64) -> Result<(), Box<dyn Error>> {
+    println!(
+        "\nFixed radii r = {EXPONENT_RADIUS} of the scene's, merges alone, paths of two edges and more, green:\n"
+    );
+    println!("| scene | techniques | bias % at r | r/2 | r/4 | exponent r to r/2 | r/2 to r/4 |");
+    println!("|---|---|---|---|---|---|---|");
+    for name in scenes {
+        let (scene, reference) = open(name)?;
+        let stop = Stop { seconds: Some(seconds), ..Stop::default() };
+        // What is left of the reference without the lights themselves.
+        let direct = Settings { techniques: "hit".parse()?, max_length: 1, ..Settings::default() };
+        let direct = match render(&scene, direct, &stop) {
+            Ok((_, spread)) => spread.mean()[1],
+            Err(error) => return Err(error),
+        };
+        let expected = reference.mean()[1] - direct;
+        for techniques in ["surf+pp3d", "surf+pb2d", "surf+bb1d"] {
+            let mut bias: Vec<Estimate> = Vec::new();
+            for divisor in [1.0, 2.0, 4.0] {
+                let radius = Radius::Scene(EXPONENT_RADIUS / divisor);
+                let settings = Settings {
+                    techniques: techniques.parse()?,
+                    radii: Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius },
+                    progressive: false,
+                    min_length: 2,
+                    ..Settings::default()
+                };
+                let (_, spread) = render(&scene, settings, &stop)?;
+                bias.push(spread.mean()[1] - expected);
+            }
+            let percent: Vec<String> = bias
+                .iter()
+                .map(|b| {
+                    format!("{:+.3} ± {:.3}", 100.0 * b.mean / expected.mean, 100.0 * b.error / expected.mean)
+                })
+                .collect();
+            let exponent = |coarse: &Estimate, fine: &Estimate| {
+                let error =
+                    (coarse.error / coarse.mean).hypot(fine.error / fine.mean) / std::f64::consts::LN_2;
+                format!("{:.2} ± {error:.2}", (coarse.mean / fine.mean).abs().log2())
+            };
+            println!(
+                "| {name} | {techniques} | {} | {} | {} |",
+                percent.join(" | "),
+                exponent(&bias[0], &bias[1]),
+                exponent(&bias[1], &bias[2]),
+            );
+        }
+    }
+    Ok(())
 }

@@ -9,7 +9,8 @@ fn ball_nonscattering() {
     for case in cases("ball_nonscattering") {
         let radius = case.input("radius");
         let null = case.word("interface") == "null";
-        let material = if null { "Null".to_owned() } else { format!("Dielectric(ior: {:?})", case.input("ior_inside")) };
+        let material =
+            if null { "Null".to_owned() } else { format!("Dielectric(ior: {:?})", case.input("ior_inside")) };
         let environment = case.input("environment_radiance");
         let lights =
             if environment > 0.0 { format!("lights: [Constant({environment:?})],") } else { String::new() };

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `white_furnace` | 8 | mean radiance of an image, several sets of techniques |
 //! | `ball_nonscattering` | 7 × 5 rays | one ray per impact parameter; deterministic without refraction |
-//! | `single_scatter_point_light` | 18 | paths of two edges, each volumetric technique alone on a fixed ray |
+//! | `single_scatter_point_light` | 16 | paths of two edges on a fixed ray: next event estimation; 7 also by each merge alone, one with the exponent of its bias |
 //! | `single_scatter_slab_reflection` | 4 | paths of two edges, next event estimation |
 //! | `slab_RT` | 54 × 2 angles, and diffuse | camera walks that end on a wall that shines: red above the slab, green below |
 //! | `slab_RT_dielectric` | 6 | the same |

@@ -2,7 +2,7 @@
 //!
 //! A photon carries flux over density on arrival, so that photons in a volume sum to the fluence integrated over it.
 
-use upbp_core::{Settings, TechniqueSet};
+use upbp_core::TechniqueSet;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_light_path};
 use upbp_estimators::{Kernel, Kernels, PathLengths, Plan, PlanChoices, StreamKind, World};
@@ -21,7 +21,6 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
         medium((1.0 - albedo) * sigma_t, albedo * sigma_t, case.optional("g").unwrap_or(0.0)),
     ));
     let world = World::new(&scene).expect("a valid scene");
-    let settings = Settings::default();
     let plan = Plan::new(
         &scene,
         &PlanChoices {
@@ -32,7 +31,7 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             beam_paths: 1,
             connections: 1,
             vertices_per_light_path: 1.0,
-            lengths: PathLengths { min: 1, max: settings.max_length },
+            lengths: PathLengths { min: 1, max: 1_000_000 },
             roulette: true,
             kernels: Kernels { pp3d: Kernel::ball(0.1), ..Kernels::NONE },
             heuristic: Heuristic::Balance,
@@ -82,7 +81,7 @@ fn fluence_around_a_point_source() {
         let half = (0.03 * r).min(0.1);
         let volume = 4.0 / 3.0 * std::f64::consts::PI * ((r + half).powi(3) - (r - half).powi(3));
         let mut sums = Sums::default();
-        let paths = if case.input("albedo") > 0.95 { 200_000 } else { 1_000_000 };
+        let paths = if case.input("albedo") > 0.95 { 100_000 } else { 600_000 };
         photons(&case, paths, |photons| {
             let inside = photons.iter().filter(|(distance, _)| (distance - r).abs() < half);
             sums.add(inside.map(|(_, flux)| flux).sum::<f64>() / volume);

@@ -48,7 +48,13 @@ fn slabs() {
         for mu0 in case.inputs("mu0") {
             let camera = [0.5 * GAP * (1.0 - mu0 * mu0).sqrt() / mu0, 0.0, 0.5 * GAP];
             let scene = slab(&case, "Null", &narrow_camera(camera, [0.0; 3], 32), "");
-            check(&mut table, &format!("{} mu0 = {mu0}", case.id), &scene, expected(&format!("mu0_{mu0}")), case.accuracy);
+            check(
+                &mut table,
+                &format!("{} mu0 = {mu0}", case.id),
+                &scene,
+                expected(&format!("mu0_{mu0}")),
+                case.accuracy,
+            );
         }
         // A white patch on the slab, seen from the slab's side, spreads camera rays as diffuse light is spread. It is
         // too small to shade what comes back.
@@ -56,7 +62,13 @@ fn slabs() {
             material: \"white\")";
         let camera = narrow_camera([0.0, 0.0, 5e-4], [0.0, 0.0, 1e-3], 32);
         let scene = slab(&case, "Null", &camera, patch);
-        check(&mut table, &format!("{} diffuse", case.id), &scene, expected("diffuse_incidence"), case.accuracy);
+        check(
+            &mut table,
+            &format!("{} diffuse", case.id),
+            &scene,
+            expected("diffuse_incidence"),
+            case.accuracy,
+        );
     }
     table.finish();
 }

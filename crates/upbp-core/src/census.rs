@@ -28,7 +28,8 @@ impl Census {
         let scene = world.scene;
         let scattering = scene.media().iter().any(Medium::scatters);
         if !scattering {
-            census.drop("no medium scatters: photons and beams in media are off", TechniqueSet::VOLUME_MERGES);
+            census
+                .drop("no medium scatters: photons and beams in media are off", TechniqueSet::VOLUME_MERGES);
         }
         if !scene.has_connectible_surfaces() {
             let surf = TechniqueSet::EMPTY.with(Technique::Surf);
@@ -47,7 +48,8 @@ impl Census {
         } else if !world.scene.emitters().iter().any(|emitter| emitter.kind().is_hittable())
             && !scene.media().iter().any(Medium::emits)
         {
-            census.drop("no light can be hit: emission hits are off", TechniqueSet::EMPTY.with(Technique::Hit));
+            census
+                .drop("no light can be hit: emission hits are off", TechniqueSet::EMPTY.with(Technique::Hit));
         }
         if max_length < 2 {
             let all_but_hit = TechniqueSet::ALL.without(TechniqueSet::EMPTY.with(Technique::Hit));

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
-use upbp_estimators::{Counters, Layer, LightMap, Spectrum, StreamKind};
 use upbp_estimators::walk::{trace_camera_path, trace_light_path};
+use upbp_estimators::{Counters, Layer, LightMap, Spectrum, StreamKind};
 
 use crate::film::Pixel;
 
@@ -60,8 +60,7 @@ pub(crate) fn light_pass<S: Scene>(
     pass
 }
 
-/// Traces one camera sub-path per pixel of `rect` into `pixels`. `advance` is called with the number of pixels that
-/// have been done, from any thread.
+/// Traces one camera sub-path per pixel of `rect` into `pixels`.
 pub(crate) fn camera_pass<S: Scene>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf>,

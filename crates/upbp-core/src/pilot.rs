@@ -57,6 +57,11 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
+    /// The number of sub-paths with which a query of some radius finds `count` photons on average.
+    pub(crate) fn paths(&self, count: f64, radius: f64) -> f64 {
+        count / self.rank * self.paths * (self.distance / radius).powf(self.dimension)
+    }
+
     /// The radius within which a query finds `count` photons on average, if `paths` sub-paths are traced.
     pub(crate) fn radius(&self, count: f64, paths: f64) -> f32 {
         (self.distance * (count / self.rank * self.paths / paths).powf(1.0 / self.dimension)) as f32
@@ -75,9 +80,8 @@ pub(crate) fn run<S: Scene>(
         &PlanChoices {
             seed: settings.seed,
             iteration: 0,
-            // Connections make the walks store their vertices; light tracing is of no use here.
-            techniques: techniques
-                .without([upbp_estimators::Technique::LightTracing].into_iter().collect()),
+            // Light tracing is of no use here.
+            techniques: techniques.without([upbp_estimators::Technique::LightTracing].into_iter().collect()),
             light_paths: LIGHT_PATHS,
             beam_paths: BEAM_PATHS,
             connections: 1,
@@ -112,7 +116,9 @@ pub(crate) fn run<S: Scene>(
         beams_per_path: light.beams.len() as f64 / beam_paths,
         surf: around(&queries.surfaces, &surface, paths, 2.0),
         pp3d: around(&queries.media, &medium, paths, 3.0),
-        pb2d: neighbours(&queries.edges, medium.len(), 8, paths, 2.0, |edge, i| edge.distance_to_point(medium[i])),
+        pb2d: neighbours(&queries.edges, medium.len(), 8, paths, 2.0, |edge, i| {
+            edge.distance_to_point(medium[i])
+        }),
         bp2d: neighbours(&queries.media, light.beams.len(), 8, beam_paths, 2.0, |point, i| {
             Edge::of_beam(&light.beams[i]).distance_to_point(*point)
         }),

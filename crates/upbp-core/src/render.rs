@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use upbp_estimators::scene::{Camera, PixelRect, Scene};
-use upbp_estimators::walk::{Context, LightVertex, PhotonBeam};
+use upbp_estimators::walk::{Context, LightVertex, PhotonBeam, Splat};
 use upbp_estimators::{
     Counters, LightMap, PathLengths, Plan, PlanChoices, StreamKind, Technique, TechniqueSet, World,
 };
@@ -19,6 +19,9 @@ use crate::pilot::{self, Neighbours, Pilot};
 use crate::radius::{Radius, RadiusSchedule};
 use crate::report::{ErrorPoint, PassSeconds, Report};
 use crate::settings::{CheckedSettings, LightPaths};
+
+/// The largest first radius of photon beams, relative to the scene's.
+const LARGEST_BEAM_RADIUS: f32 = 3e-3;
 
 /// When to stop: as soon as any of the rules holds. Without rules a render goes on until it is cancelled.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -131,8 +134,12 @@ impl<'a, S: Scene> Renderer<'a, S> {
             LightPaths::Auto => pixel_count,
             LightPaths::Count(count) => count,
         };
-        let light_paths = wanted.min(affordable_paths::<S>(&pilot, budget - film_bytes)).max(1);
-        let beam_paths = settings.beams.unwrap_or((light_paths / 25).max(1)).min(light_paths);
+        let beam_paths = settings
+            .beams
+            .unwrap_or_else(|| enough_beams(&world, &settings, &pilot).min(wanted / 10).max(1))
+            .min(wanted);
+        let (light_paths, beam_paths) =
+            affordable::<S>(&pilot, budget - film_bytes, [wanted, beam_paths], techniques);
         let radii = first_radii(&world, &settings, techniques, &pilot, light_paths, beam_paths);
         let mut renderer = Self {
             film: Film::new(rect, techniques),
@@ -326,14 +333,32 @@ impl<'a, S: Scene> Renderer<'a, S> {
     }
 }
 
-/// The number of light sub-paths that `bytes` have room for.
-fn affordable_paths<S: Scene>(pilot: &Pilot, bytes: u64) -> u32 {
-    // Positions and indices in the trees take about 40 bytes more per element; beams are split into pieces.
+/// As many light sub-paths, and as many with beams, as `wanted` and as `bytes` have room for.
+fn affordable<S: Scene>(pilot: &Pilot, bytes: u64, wanted: [u32; 2], techniques: TechniqueSet) -> (u32, u32) {
+    // Positions and indices in the trees take about 40 bytes per vertex more; a beam has some four pieces in its tree.
     let vertex = size_of::<LightVertex<S::Bsdf>>() as f64 + 40.0;
     let beam = size_of::<PhotonBeam>() as f64 + 300.0;
-    let path = pilot.vertices_per_path * vertex + pilot.beams_per_path * beam / 25.0;
+    let splat = if techniques.has(Technique::LightTracing) { size_of::<Splat>() as f64 } else { 0.0 };
+    let [paths, beam_paths] = wanted.map(f64::from);
+    let need = paths * pilot.vertices_per_path * (vertex + splat) + beam_paths * pilot.beams_per_path * beam;
     // Passes hold their pieces and the joined list for a moment.
-    (bytes as f64 / (2.0 * path.max(1.0))).min(f64::from(u32::MAX)) as u32
+    let part = (bytes as f64 / (2.0 * need.max(1.0))).min(1.0);
+    (((paths * part) as u32).max(1), ((beam_paths * part) as u32).max(1))
+}
+
+/// Light sub-paths with beams such that a query beam meets a few of them. More cost more than they tell: their look-ups
+/// soon take most of an iteration.
+fn enough_beams<S: Scene>(world: &World<'_, S>, settings: &CheckedSettings, pilot: &Pilot) -> u32 {
+    /// Photon beams within the kernel of a query beam.
+    const HITS: f64 = 1.0;
+    let largest = LARGEST_BEAM_RADIUS * world.bounds.radius;
+    let (found, radius) = match (pilot.bb1d, settings.radii.bb1d) {
+        (Some(found), Radius::Auto) => (found, largest),
+        (Some(found), Radius::Scene(fraction)) => (found, fraction * world.bounds.radius),
+        (Some(found), Radius::Absolute(radius)) => (found, radius),
+        (None, _) => return 1024,
+    };
+    found.paths(HITS, f64::from(radius)).clamp(64.0, 1e6) as u32
 }
 
 fn first_radii<S: Scene>(
@@ -353,7 +378,7 @@ fn first_radii<S: Scene>(
             Radius::Absolute(radius) => radius,
             Radius::Scene(fraction) => fraction * scene,
             Radius::Auto => found
-                .map_or(most, |n| n.radius(count, f64::from(paths)))
+                .map_or(most * scene, |n| n.radius(count, f64::from(paths)))
                 .clamp(0.1 * most * scene, most * scene),
         }
     };
@@ -363,7 +388,7 @@ fn first_radii<S: Scene>(
         pp3d: radius(Technique::Pp3d, radii.pp3d, pilot.pp3d, 8.0, light_paths, 5e-3),
         pb2d: radius(Technique::Pb2d, radii.pb2d, pilot.pb2d, 8.0, light_paths, 3e-3),
         bp2d: radius(Technique::Bp2d, radii.bp2d, pilot.bp2d, 8.0, beam_paths, 3e-3),
-        bb1d: radius(Technique::Bb1d, radii.bb1d, pilot.bb1d, 15.0, beam_paths, 3e-3),
+        bb1d: radius(Technique::Bb1d, radii.bb1d, pilot.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
         progressive: settings.progressive,
         // Positions have a relative precision of 6e-8.
         floor: 1e-6 * scene,

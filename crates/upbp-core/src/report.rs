@@ -122,11 +122,11 @@ impl fmt::Display for Report {
             Some(error) => writeln!(f, "estimated relMSE: {error:.3e}")?,
             None => writeln!(f, "estimated relMSE: unknown before the second iteration")?,
         }
-        if c.dropped + c.lost_walks > 0 {
+        if c.dropped + c.lost_walks + c.boundary_conflicts > 0 {
             writeln!(
                 f,
-                "dropped: {} contributions that were not finite, {} walks lost in geometry that is not closed",
-                c.dropped, c.lost_walks
+                "dropped: {} contributions that were not finite; geometry that is not closed: {} walks lost, {} boundaries ignored",
+                c.dropped, c.lost_walks, c.boundary_conflicts
             )?;
         }
         if let Some(last) = self.series.last() {

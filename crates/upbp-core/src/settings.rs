@@ -27,7 +27,7 @@ pub struct Settings {
     pub seed: u64,
     /// Light sub-paths per iteration.
     pub light_paths: LightPaths,
-    /// Light sub-paths that leave photon beams, `None` for 1 in 25.
+    /// Light sub-paths that leave photon beams; `None` for as many as a pilot finds useful.
     pub beams: Option<u32>,
     /// Light vertices that every camera vertex is connected to, `[1, 1000]`.
     pub connections: u32,

@@ -21,9 +21,11 @@ pub struct Counters {
     pub contributions: [u64; 9],
     /// Contributions that were not finite or negative, and were dropped.
     pub dropped: u64,
-    /// Walks that left a body without having entered it, or escaped while still inside one: geometry that is not
-    /// closed, or coincident to rounding. They are ended.
+    /// Walks that escaped while still inside a body: geometry that is not closed. They are ended.
     pub lost_walks: u64,
+    /// Boundaries that were ignored because they contradict the bodies that a walk is in: a body entered twice or left
+    /// without being inside (geometry that is not closed, or starts within rounding of a boundary), or nested too deep.
+    pub boundary_conflicts: u64,
 }
 
 impl Counters {
@@ -39,6 +41,7 @@ impl Counters {
         }
         self.dropped += other.dropped;
         self.lost_walks += other.lost_walks;
+        self.boundary_conflicts += other.boundary_conflicts;
     }
 
     /// Contributions of one technique.

@@ -1,6 +1,6 @@
 //! A scene made ready for the walks: emitters with their probabilities, bounds, the bodies around the camera.
 
-use upbp_media::{Medium, MediumStack};
+use upbp_media::{Medium, MediumStack, RaySegment};
 
 use crate::scene::{BoundingSphere, Camera, Emitter, EmitterId, EmitterKind, Scene};
 
@@ -41,8 +41,11 @@ impl<'a, S: Scene> World<'a, S> {
             return Err(WorldError::Crop { width, height });
         }
         // Light from infinity does not get through an infinite medium: such emitters are never chosen.
-        let closed =
-            scene.outside().is_some_and(|m| scene.media()[m.0 as usize].mean_free_path().is_finite());
+        let everything =
+            RaySegment { origin: bounds.centre, direction: glam::Vec3::Z, start: 0.0, end: f32::INFINITY };
+        let closed = scene
+            .outside()
+            .is_some_and(|m| scene.media()[m.0 as usize].segment(&everything).transmittance.is_black());
         let mut powers = Vec::with_capacity(scene.emitters().len());
         let mut environments = Vec::new();
         for (index, emitter) in scene.emitters().iter().enumerate() {

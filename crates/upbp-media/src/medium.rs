@@ -25,9 +25,8 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 /// # Path-level lanes
 ///
 /// `sample_distance` takes the number that picks the channel apart from the number that picks the
-/// distance. A walk that holds `u_channel` fixed on all its segments draws every distance from the same
-/// channel `c = ⌊3·u_channel⌋`, and in a medium whose channels are exponentials the densities of that lane
-/// are at hand: `S_c` is `transmittance[c]` and `p_c` is `sigma_t[c] · transmittance[c]`. The path-level mixture
+/// distance, and in a medium whose channels are exponentials the densities of one channel's lane are at
+/// hand: `S_c` is `transmittance[c]` and `p_c` is `sigma_t[c] · transmittance[c]`. The path-level mixture
 /// (policy C of `docs/theory.md`, section 1.4) therefore needs a method that returns the three lanes of a
 /// segment in double precision, with no change to those here.
 ///

@@ -7,7 +7,7 @@
 
 use crate::Spectrum;
 
-/// No channel is chosen less often: its throughput on passing a segment is bounded by the inverse.
+/// No channel is chosen much less often: its throughput on passing a segment is bounded by the inverse.
 const FLOOR: f64 = 0.05;
 
 /// Points of the quadrature.
@@ -46,9 +46,8 @@ fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum
         .map(|i| {
             let passed = 1.0 - (f64::from(i) + 0.5) / f64::from(POINTS);
             let t = -passed.ln() / sigma;
-            let p: f64 = (0..3)
-                .map(|c| alpha[c] * f64::from(sigma_t[c]) * (-f64::from(sigma_t[c]) * t).exp())
-                .sum();
+            let p: f64 =
+                (0..3).map(|c| alpha[c] * f64::from(sigma_t[c]) * (-f64::from(sigma_t[c]) * t).exp()).sum();
             passed / p
         })
         .sum();

@@ -52,9 +52,7 @@ pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::resu
     };
     let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let file = Image::from_layer(layer);
-    write_whole(path, |writer| {
-        file.write().to_buffered(writer).map_err(|error| fail(error.to_string()))
-    })
+    write_whole(path, |writer| file.write().to_buffered(writer).map_err(|error| fail(error.to_string())))
 }
 
 fn push(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, prefix: &str, image: &Picture) {

@@ -13,8 +13,10 @@ use crate::film::Image;
 pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<(), OutputError> {
     let bytes: Vec<u8> = image.pixels.iter().flatten().map(|value| quantise(value * exposure)).collect();
     write_whole(path, |writer| {
-        let fail =
-            |error: png::EncodingError| OutputError::Encode { path: path.to_owned(), reason: error.to_string() };
+        let fail = |error: png::EncodingError| OutputError::Encode {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        };
         let mut encoder = png::Encoder::new(writer, image.width, image.height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
@@ -27,8 +29,7 @@ pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<(), Output
 
 fn quantise(linear: f32) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
-    let encoded =
-        if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0 + 0.5) as u8
 }
 

@@ -105,6 +105,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
         out.counters.camera_edges += 1;
         edge.depth = depth;
         scratch.passage.trace(scene, origin, direction, &stack);
+        out.counters.boundary_conflicts += scratch.passage.take_conflicts();
         let passage = &scratch.passage;
         estimate::emission_along(context, passage, &edge, &mut out);
         let stop = sample_stop(scene, passage, &mut stream);

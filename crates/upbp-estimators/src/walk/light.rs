@@ -92,7 +92,7 @@ pub struct PhotonBeam {
     pub source: EdgeSource,
     /// Flux over density at the edge's first vertex, after scattering.
     pub throughput: Spectrum,
-    /// Squared distance factor: whether distances from the first vertex count (not from an infinite emitter).
+    /// Whether the edge starts at an infinite emitter: distances from there do not count in densities.
     pub from_infinity: bool,
     /// Edges from the light to a vertex on the beam.
     pub depth: u32,
@@ -160,6 +160,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
         out.counters.light_edges += 1;
         let passage = &mut scratch.passage;
         passage.trace(scene, flight.origin, flight.direction, &flight.stack);
+        out.counters.boundary_conflicts += passage.take_conflicts();
         let stop = sample_stop(scene, passage, &mut stream);
         if leaves_beams {
             store_beams(context, passage, stop, &flight, depth, index, out);

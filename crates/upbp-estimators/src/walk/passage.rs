@@ -39,6 +39,8 @@ pub struct Passage<B> {
     end: MediumStack,
     crossings: Vec<Crossing>,
     found: Vec<Crossing>,
+    /// Boundaries that contradicted the bodies that the ray was in, since they were last taken.
+    conflicts: u64,
 }
 
 /// What happens at the boundary of a body, given the bodies that a ray is in.
@@ -66,6 +68,7 @@ impl<B: Copy> Passage<B> {
             end: MediumStack::new(None),
             crossings: Vec::new(),
             found: Vec::new(),
+            conflicts: 0,
         }
     }
 
@@ -118,7 +121,9 @@ impl<B: Copy> Passage<B> {
     }
 
     fn cross<S: Scene>(&mut self, scene: &S, now: &mut MediumStack, span: &mut Span, crossing: Crossing) {
-        let _ = now.cross(crossing.interior, crossing.entering);
+        if now.cross(crossing.interior, crossing.entering) != upbp_media::Crossing::Done {
+            self.conflicts += 1;
+        }
         self.crossings.push(crossing);
         // An invisible boundary between two parts of the same medium changes nothing, not even a density.
         if now.medium() == span.medium {
@@ -145,6 +150,11 @@ impl<B: Copy> Passage<B> {
             None => density.push_vacuum(),
         }
         density
+    }
+
+    /// The number of boundaries so far that contradicted the bodies that the ray was in; the count starts anew.
+    pub fn take_conflicts(&mut self) -> u64 {
+        std::mem::take(&mut self.conflicts)
     }
 
     /// What the edge accumulates to its end.
