@@ -503,11 +503,13 @@ fn closed_forms_agree_with_the_table() {
     for case in cases.iter().filter(|case| case["kind"] == "canonical_variance") {
         let number = |part: &str, name: &str| case[part][name].as_f64().expect("a number");
         let (w, a) = (number("inputs", "sigma_t_h"), number("inputs", "sigma_t_start"));
-        let forms: [(&str, fn(f64, f64) -> f64); 3] =
-            [("point", closed::point), ("short_beam", closed::overlap), ("short_beam_1d", closed::crossing)];
-        for (name, form) in forms {
+        for (name, value) in [
+            ("point", closed::point(w, a)),
+            ("short_beam", closed::overlap(w, a)),
+            ("short_beam_1d", closed::crossing(w, a)),
+        ] {
             let expected = number("expected", name) + 1.0;
-            assert!((form(w, a) / expected - 1.0).abs() < 1e-9, "{name} at w = {w}, a = {a}");
+            assert!((value / expected - 1.0).abs() < 1e-9, "{name} at w = {w}, a = {a}");
             checked += 1;
         }
     }

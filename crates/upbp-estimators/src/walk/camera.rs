@@ -3,8 +3,8 @@
 use glam::{Vec2, Vec3};
 use upbp_media::{MediumStack, Spectrum};
 
+use super::arrival::{Arrival, arrive, pend, sample_stop};
 use super::context::{Context, Scratch};
-use super::light::{Arrival, arrive, pend, sample_stop};
 use super::site::Site;
 use super::visibility::ray_origin;
 use crate::counters::Counters;

@@ -1,17 +1,20 @@
 //! Sub-paths from both ends, and what lies between two vertices.
 
+mod arrival;
 mod camera;
 mod context;
 mod light;
 mod passage;
+mod photon;
 mod site;
 mod visibility;
 
 pub use camera::{CameraWalk, trace_camera_path};
 pub(crate) use camera::{Output, QueryEdge, QueryVertex};
 pub use context::{Context, Scratch};
-pub use light::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat, trace_light_path};
+pub use light::trace_light_path;
 pub use passage::{Passage, Span};
+pub use photon::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
 pub use site::{Evaluation, Scattered, Site, SurfaceSite};
 pub(crate) use visibility::ray_origin;
 pub use visibility::{Target, clear_edge};

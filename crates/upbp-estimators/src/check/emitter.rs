@@ -1,0 +1,214 @@
+//! [`check_emitter`]: emission, next event and hits of a light agree.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::Vec3;
+
+use super::{Check, DRAWS, Random, direction, is_density, is_light, is_unit, require, same, same_spectrum};
+use crate::scene::{BoundingSphere, Emitter, EmitterKind, EmitterPoint};
+
+/// Checks the contract of [`Emitter`] for receivers at the given points, of which a light that shines
+/// should reach at least one.
+pub fn check_emitter(emitter: &impl Emitter, bounds: &BoundingSphere, receivers: &[Vec3]) -> Check {
+    let power = emitter.power(bounds);
+    require(power.is_finite() && power >= 0.0, "power is finite and not negative", power)?;
+    let mut random = Random(7);
+    for _ in 0..2000 {
+        check_emission(emitter, bounds, &mut random)?;
+        for &receiver in receivers {
+            check_incident(emitter, bounds, receiver, &mut random)?;
+        }
+    }
+    match emitter.kind() {
+        EmitterKind::Area => receivers
+            .iter()
+            .try_for_each(|&receiver| check_area_irradiance(emitter, bounds, receiver, &mut random)),
+        EmitterKind::Point => check_point_directions(emitter, bounds, &mut random),
+        EmitterKind::Directional => Ok(()),
+        EmitterKind::Environment => check_environment_directions(emitter, bounds, &mut random),
+    }
+}
+
+fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Check {
+    let Some(emission) = emitter.sample_emission(bounds, random.pair(), random.pair()) else {
+        return Ok(());
+    };
+    let kind = emitter.kind();
+    require(is_unit(emission.direction), "light goes along a unit vector", emission)?;
+    require(emission.point.position.is_finite(), "light starts at a finite point", emission)?;
+    require(is_light(emission.radiance), "emitted light is finite and not negative", emission)?;
+    let densities = [emission.pdf_position, emission.pdf_direction];
+    require(densities.iter().all(|&p| is_density(p) && p > 0.0), "what is emitted has densities", emission)?;
+    if kind.is_infinite() {
+        let offset = emission.point.position - bounds.centre;
+        let outside = offset.dot(emission.direction) <= -bounds.radius;
+        require(outside, "light from infinity starts before the scene", emission)?;
+        let across = offset.reject_from_normalized(emission.direction).length();
+        require(across <= bounds.radius * 1.001, "light from infinity starts on the disc", emission)?;
+        let disc = 1.0 / (std::f32::consts::PI * bounds.radius * bounds.radius);
+        require(same(emission.pdf_direction, disc), "the disc is sampled uniformly", emission)?;
+    }
+    if kind == EmitterKind::Area {
+        let cosine = emission.direction.dot(emission.point.normal);
+        require(cosine > 0.0, "a surface emits on the side of its normal", emission)?;
+    }
+    let receiver = emission.point.position + emission.direction * bounds.radius;
+    let seen = emitter.hit(bounds, &emission.point, emission.direction, receiver);
+    require(seen.is_some() == kind.is_hittable(), "hit answers for lights that can be hit", emission)?;
+    let Some(seen) = seen else { return Ok(()) };
+    let agrees = same_spectrum(seen.radiance, emission.radiance)
+        && same(seen.pdf_position, emission.pdf_position)
+        && same(seen.pdf_direction, emission.pdf_direction);
+    require(agrees, "hit agrees with sample_emission", (emission, seen))
+}
+
+fn check_incident(
+    emitter: &impl Emitter,
+    bounds: &BoundingSphere,
+    receiver: Vec3,
+    random: &mut Random,
+) -> Check {
+    let Some(incident) = emitter.sample_incident(bounds, receiver, random.pair()) else {
+        return Ok(());
+    };
+    let kind = emitter.kind();
+    let case = (receiver, incident);
+    require(is_unit(incident.towards_light), "the direction to a light is a unit vector", case)?;
+    require(is_light(incident.radiance), "incident light is finite and not negative", case)?;
+    let densities = [incident.pdf, incident.pdf_position, incident.pdf_direction];
+    require(densities.iter().all(|&p| is_density(p)), "densities are finite and not negative", case)?;
+    require(incident.pdf > 0.0, "what is chosen has a density", case)?;
+    if kind.is_infinite() {
+        require(incident.distance == f32::INFINITY, "an infinite light has no distance", case)?;
+    } else {
+        let there = receiver + incident.towards_light * incident.distance;
+        let near = there.distance(incident.point.position) <= 1e-4 * (incident.distance + receiver.length());
+        require(near, "direction and distance lead to the chosen point", case)?;
+    }
+    let Some(seen) = emitter.hit(bounds, &incident.point, -incident.towards_light, receiver) else {
+        return require(!kind.is_hittable(), "a chosen point of a light can be hit", case);
+    };
+    let agrees = same_spectrum(seen.radiance, incident.radiance)
+        && same(seen.pdf_incident, incident.pdf)
+        && same(seen.pdf_position, incident.pdf_position)
+        && same(seen.pdf_direction, incident.pdf_direction);
+    require(agrees, "hit agrees with sample_incident", (case, seen))?;
+    let alone =
+        emitter.pdf_incident(bounds, &incident.point, -incident.towards_light, receiver, seen.pdf_position);
+    require(same(alone, incident.pdf), "pdf_incident agrees with sample_incident", (case, alone))
+}
+
+/// Mean of random terms, and its standard error.
+#[derive(Default)]
+struct Mean {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Mean {
+    fn add(&mut self, term: f64) {
+        self.count += 1.0;
+        self.sum += term;
+        self.squares += term * term;
+    }
+
+    fn value(&self) -> (f64, f64) {
+        let mean = self.sum / self.count;
+        (mean, ((self.squares / self.count - mean * mean).max(0.0) / self.count).sqrt())
+    }
+
+    fn agrees(&self, expected: (f64, f64), what: &'static str) -> Check {
+        let (mean, error) = self.value();
+        let tolerance = 5.0 * error.hypot(expected.1) + 2e-3 * expected.0.abs();
+        require((mean - expected.0).abs() <= tolerance, what, (mean, error, expected))
+    }
+}
+
+/// The light that falls on a receiver must be the same by points for it and by points of emission. Meant for
+/// convex lights: the second way does not see that a surface hides itself.
+fn check_area_irradiance(
+    emitter: &impl Emitter,
+    bounds: &BoundingSphere,
+    receiver: Vec3,
+    random: &mut Random,
+) -> Check {
+    let (mut chosen, mut emitted) = (Mean::default(), Mean::default());
+    for _ in 0..DRAWS {
+        let term = emitter.sample_incident(bounds, receiver, random.pair()).map_or(0.0, |incident| {
+            let cosine = incident.point.normal.dot(-incident.towards_light).max(0.0);
+            incident.radiance.mean() * cosine / (incident.distance * incident.distance * incident.pdf)
+        });
+        chosen.add(f64::from(term));
+        let term = emitter.sample_emission(bounds, random.pair(), random.pair()).map_or(0.0, |emission| {
+            let between = receiver - emission.point.position;
+            let towards = between.normalize_or_zero();
+            let cosine = emission.point.normal.dot(towards).max(0.0);
+            let seen = emitter.hit(bounds, &emission.point, towards, receiver);
+            let radiance = seen.map_or(0.0, |seen| seen.radiance.mean());
+            radiance * cosine / (between.length_squared() * emission.pdf_position)
+        });
+        emitted.add(f64::from(term));
+    }
+    chosen.agrees(emitted.value(), "both ways to choose points give the same irradiance")
+}
+
+/// `∫ pdf_direction dω = 1` around a point, seen by receivers around it.
+fn check_point_directions(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Check {
+    let Some(position) = (0..100)
+        .find_map(|_| emitter.sample_emission(bounds, random.pair(), random.pair()))
+        .map(|emission| emission.point.position)
+    else {
+        return Ok(());
+    };
+    let mut power = Mean::default();
+    let (rows, columns) = (600, 1200);
+    let (theta_step, phi_step) = (PI / f64::from(rows), TAU / f64::from(columns));
+    let (mut density, mut flux) = (0.0, 0.0);
+    for row in 0..rows {
+        let theta = (f64::from(row) + 0.5) * theta_step;
+        for column in 0..columns {
+            let receiver = position + direction(theta, (f64::from(column) + 0.5) * phi_step) * bounds.radius;
+            if let Some(incident) = emitter.sample_incident(bounds, receiver, [0.5; 2]) {
+                let solid_angle = theta.sin() * theta_step * phi_step;
+                density += f64::from(incident.pdf_direction) * solid_angle;
+                flux += f64::from(incident.radiance.mean()) * solid_angle;
+            }
+        }
+    }
+    // A cone's rim cuts through the grid: a few per cent for the narrowest that this is meant for.
+    require((density - 1.0).abs() < 0.03, "the density of directions integrates to one", density)?;
+    for _ in 0..DRAWS {
+        let emission = emitter.sample_emission(bounds, random.pair(), random.pair());
+        power.add(emission.map_or(0.0, |e| f64::from(e.radiance.mean() / e.pdf_direction)));
+    }
+    power.agrees((flux, 0.006 * flux), "emission carries the flux that receivers see")
+}
+
+/// `∫ pdf dω = 1` over all directions, and the same flux by emission, by choice and by quadrature.
+fn check_environment_directions(
+    emitter: &impl Emitter,
+    bounds: &BoundingSphere,
+    random: &mut Random,
+) -> Check {
+    let anywhere = EmitterPoint { position: bounds.centre, normal: Vec3::Z };
+    let (mut density, mut flux) = (Mean::default(), Mean::default());
+    for _ in 0..20 * DRAWS {
+        let direction = random.direction();
+        let seen = emitter.hit(bounds, &anywhere, direction, bounds.centre);
+        density.add(seen.map_or(0.0, |seen| f64::from(seen.pdf_position) * 2.0 * TAU));
+        flux.add(seen.map_or(0.0, |seen| f64::from(seen.radiance.mean()) * 2.0 * TAU));
+    }
+    density.agrees((1.0, 0.0), "the density of directions integrates to one")?;
+    let (mut chosen, mut emitted) = (Mean::default(), Mean::default());
+    for _ in 0..DRAWS {
+        let incident = emitter.sample_incident(bounds, bounds.centre, random.pair());
+        chosen.add(incident.map_or(0.0, |i| f64::from(i.radiance.mean() / i.pdf)));
+        let emission = emitter.sample_emission(bounds, random.pair(), random.pair());
+        emitted.add(emission.map_or(0.0, |e| f64::from(e.radiance.mean() / e.pdf_position)));
+    }
+    chosen.agrees(flux.value(), "next event estimation sees all of the environment")?;
+    emitted.agrees(flux.value(), "emission sees all of the environment")
+}
+
+// --------------------------------------------------------------------------------------------------- camera

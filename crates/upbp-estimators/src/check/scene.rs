@@ -1,0 +1,80 @@
+//! [`check_scene`]: hits, crossings and bodies of a scene agree.
+
+use super::{Check, ContractViolation, Random, is_unit, require};
+use crate::scene::{Crossing, Scene};
+
+/// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
+/// lie on their ray, `trace` and `is_clear` find what `intersect` does, and the bodies around a point
+/// follow from the boundaries on the way to it.
+///
+/// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree.
+pub fn check_scene(scene: &impl Scene) -> Check {
+    let bounds = scene.bounds();
+    require(bounds.radius.is_finite() && bounds.radius > 0.0, "bounds have a radius", bounds)?;
+    require(bounds.centre.is_finite(), "bounds have a centre", bounds)?;
+    let mut random = Random(11);
+    let mut violations = Vec::new();
+    let rays = 2000;
+    for _ in 0..rays {
+        let origin = bounds.centre + random.direction() * (1.2 * bounds.radius);
+        let target = bounds.centre + random.direction() * (bounds.radius * random.next());
+        let Some(direction) = (target - origin).try_normalize() else { continue };
+        let ray = crate::Ray { origin, direction, t_min: 0.0, t_max: 4.0 * bounds.radius };
+        violations.extend(check_ray(scene, &ray, &mut random).err());
+    }
+    if violations.len() * 100 > rays {
+        let first = violations.swap_remove(0);
+        return Err(ContractViolation { details: format!("{first:?}"), ..first });
+    }
+    Ok(())
+}
+
+fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check {
+    let radius = scene.bounds().radius;
+    if let Some(hit) = scene.intersect(ray) {
+        let case = (ray, hit.t, hit.geometric_normal, hit.shading_normal);
+        require(hit.t > ray.t_min && hit.t < ray.t_max, "a hit is within the ray", case)?;
+        let near = hit.position.distance(ray.origin + ray.direction * hit.t) < 1e-4 * radius;
+        require(near, "a hit's position is on the ray", case)?;
+        let units = is_unit(hit.geometric_normal) && is_unit(hit.shading_normal);
+        require(units, "normals are unit vectors", case)?;
+        let sides = hit.geometric_normal.dot(hit.shading_normal) >= 0.0;
+        require(sides, "the shading normal is on the side of the geometric one", case)?;
+    }
+    let mut crossings = Vec::new();
+    let hit = scene.trace(ray, &mut crossings);
+    let end = hit.as_ref().map_or(ray.t_max, |hit| hit.t);
+    require(
+        is_ordered(&crossings, ray, end),
+        "crossings are sorted and before the hit",
+        (ray, &crossings, end),
+    )?;
+    require(crossings.iter().all(|c| !c.scatters), "trace only crosses null boundaries", (ray, &crossings))?;
+
+    // Short of the hit nothing blocks; beyond an opaque one something does.
+    let mut passed = Vec::new();
+    let before = crate::Ray { t_max: end - 1e-3 * radius, ..*ray };
+    let clear = before.t_max <= before.t_min || scene.is_clear(&before, &mut passed);
+    require(clear, "nothing blocks before the nearest hit", (ray, end))?;
+    if hit.is_some_and(|hit| hit.interior.is_none()) {
+        let beyond = crate::Ray { t_max: end + 1e-3 * radius, ..*ray };
+        require(!scene.is_clear(&beyond, &mut Vec::new()), "an opaque hit blocks", (ray, end))?;
+    }
+
+    // The bodies around a point of the first stretch: those at the start, and the boundaries since.
+    let t = end * random.next();
+    let near_boundary = crossings.iter().any(|crossing| (crossing.t - t).abs() < 1e-3 * radius);
+    if near_boundary {
+        return Ok(());
+    }
+    let mut stack = scene.stack_at(ray.origin);
+    for crossing in crossings.iter().filter(|crossing| crossing.t < t) {
+        let _ = stack.cross(crossing.interior, crossing.entering);
+    }
+    let there = scene.stack_at(ray.origin + ray.direction * t);
+    require(stack == there, "the bodies around a point follow from the boundaries", (ray, t, stack, there))
+}
+
+fn is_ordered(crossings: &[Crossing], ray: &crate::Ray, end: f32) -> bool {
+    crossings.is_sorted_by(|a, b| a.t <= b.t) && crossings.iter().all(|c| c.t > ray.t_min && c.t <= end)
+}

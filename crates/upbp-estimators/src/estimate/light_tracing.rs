@@ -1,0 +1,98 @@
+//! Light tracing: a light vertex and the lens.
+
+use upbp_media::MediumStack;
+
+use crate::mis::End;
+use crate::observer::{Joint, ObservedSample, Observer};
+use crate::random::Stream;
+use crate::scene::{Camera, Crossing, Scene, Walk};
+use crate::technique::Technique;
+use crate::walk::{Context, LightChunk, LightVertex, Splat, Target, clear_edge, ray_origin};
+
+/// Connects a light vertex to the camera. `stack` are the bodies on the side that its walk came from, `behind` those on the
+/// other side of a surface.
+#[expect(clippy::too_many_arguments, reason = "the state of one vertex, used here only")]
+pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    vertex: &LightVertex<S::Bsdf>,
+    stack: &MediumStack,
+    behind: &MediumStack,
+    stream: &mut Stream,
+    crossings: &mut Vec<Crossing>,
+    out: &mut LightChunk<S::Bsdf>,
+    observer: &mut O,
+) {
+    let Context { world, plan } = *context;
+    let scene = world.scene;
+    let camera = scene.camera();
+    let Some(view) = camera.connect(vertex.position, stream.pair()) else { return };
+    let pixel = [view.film.x.floor() as u32, view.film.y.floor() as u32];
+    let crop = camera.crop();
+    let inside = |p: u32, start: u32, size: u32| p >= start && p - start < size;
+    if !inside(pixel[0], crop.x, crop.width) || !inside(pixel[1], crop.y, crop.height) {
+        return;
+    }
+    let between = view.lens - vertex.position;
+    let distance = between.length();
+    let direction = between / distance;
+    let Some(scattering) = vertex.site.evaluate(
+        scene,
+        plan.roulette,
+        Walk::Light,
+        vertex.position,
+        vertex.towards_light,
+        direction,
+    ) else {
+        return;
+    };
+    if scattering.value.is_black() {
+        return;
+    }
+    out.counters.shadow_rays += 1;
+    let crosses = vertex.site.crosses(vertex.towards_light, direction);
+    let origin = ray_origin(&vertex.site, vertex.position, direction);
+    let target = Target { direction, distance, surface: None };
+    let Some(density) = clear_edge(scene, if crosses { behind } else { stack }, origin, &target, crossings)
+    else {
+        return;
+    };
+    let in_medium = vertex.site.in_medium();
+    let distance2 = f64::from(distance) * f64::from(distance);
+    // C_{k-1}: the density of this vertex as the camera would sample it.
+    let ray_pdf = f64::from(view.pdf) * scattering.cos / distance2;
+    let light_density = ray_pdf * density.backward(in_medium);
+    let c_camera = if in_medium {
+        plan.mis.distance_factor(Walk::Camera, density.reach, density.backward(true))
+    } else {
+        0.0
+    };
+    let end = End {
+        merges: plan.mis.merge_sum(
+            vertex.site.merge_site(scattering.sin_theta),
+            Walk::Light,
+            vertex.tip.c,
+            c_camera,
+        ),
+        before: vertex.tip.before(&plan.mis, scattering.rho_opposite),
+    };
+    let weight = plan.mis.light_tracing_weight(end, light_density);
+    let value = vertex.throughput
+        * scattering.value
+        * density.transmittance
+        * (ray_pdf / f64::from(plan.light_paths)) as f32;
+    if let Some(value_weighted) = out.counters.accept(Technique::LightTracing, value, weight) {
+        out.splats.push(Splat { pixel, value: value_weighted });
+        observer.sample(&ObservedSample {
+            technique: Technique::LightTracing,
+            camera_depth: 0,
+            joint: Joint::LightTracing {
+                path: vertex.path,
+                light: (vertex.position, vertex.site, vertex.depth),
+                lens: view.lens,
+                pdf: view.pdf,
+            },
+            weight,
+            value,
+        });
+    }
+}

@@ -1,0 +1,117 @@
+//! The end of an edge, the same for both walks: where it stops, what is there, what it passes on.
+
+use glam::Vec3;
+use upbp_media::{EdgeDensity, Medium, MediumStack};
+
+use super::context::Context;
+use super::passage::Passage;
+use super::site::{Scattered, Site};
+use crate::mis::{MergeSite, Pending, Tip};
+use crate::random::Stream;
+use crate::scene::Scene;
+
+/// Where a walk stops in a medium: the index of the span and the distance.
+pub(super) fn sample_stop<S: Scene>(
+    scene: &S,
+    passage: &Passage<S::Bsdf>,
+    stream: &mut Stream,
+) -> Option<(usize, f32)> {
+    for (i, span) in passage.spans.iter().enumerate() {
+        let Some(medium) = span.medium else { continue };
+        let medium = &scene.media()[medium.0 as usize];
+        if !medium.scatters() {
+            continue;
+        }
+        let [u_channel, u_distance] = stream.pair();
+        if let Some(t) = medium.sample_distance(&passage.segment(span, span.end), u_channel, u_distance) {
+            return Some((i, t));
+        }
+    }
+    None
+}
+
+/// The end of an edge.
+pub(super) struct Arrived<B> {
+    pub(super) position: Vec3,
+    pub(super) distance: f32,
+    pub(super) density: EdgeDensity,
+    pub(super) site: Site<B>,
+    /// The bodies on the side that the walk comes from.
+    pub(super) stack: MediumStack,
+    /// The bodies on the other side of a surface.
+    pub(super) behind: MediumStack,
+}
+
+#[expect(
+    clippy::large_enum_variant,
+    reason = "lives on the stack for a moment, and is nearly always the large one"
+)]
+pub(super) enum Arrival<B> {
+    /// At a vertex.
+    Vertex(Arrived<B>),
+    /// To infinity.
+    Escaped,
+    /// Grazing a surface.
+    Absorbed,
+    /// To infinity, but still inside a body: the geometry is not closed.
+    Lost,
+}
+
+pub(super) fn arrive<S: Scene>(
+    scene: &S,
+    passage: &Passage<S::Bsdf>,
+    stop: Option<(usize, f32)>,
+) -> Arrival<S::Bsdf> {
+    if let Some((i, t)) = stop {
+        let span = &passage.spans[i];
+        let Some(medium) = span.medium else { return Arrival::Lost };
+        let stack = passage.stack_in(span, t);
+        let position = passage.origin + t * passage.direction;
+        if !position.is_finite() {
+            return Arrival::Lost;
+        }
+        return Arrival::Vertex(Arrived {
+            position,
+            distance: t,
+            density: passage.density_to(scene, span, t),
+            site: Site::Medium(medium),
+            stack,
+            behind: stack,
+        });
+    }
+    let stack = *passage.stack_at_end();
+    let Some(hit) = &passage.hit else {
+        return if stack.is_empty() { Arrival::Escaped } else { Arrival::Lost };
+    };
+    let Some(bsdf) = hit.bsdf else { return Arrival::Lost };
+    match Site::at_hit(hit, bsdf, passage.direction, &stack) {
+        Some((site, behind)) => Arrival::Vertex(Arrived {
+            position: hit.position,
+            distance: hit.t,
+            density: passage.density(scene),
+            site,
+            stack,
+            behind,
+        }),
+        None => Arrival::Absorbed,
+    }
+}
+
+/// What the weights of the next vertex need of one that has scattered.
+pub(super) fn pend<S: Scene>(
+    context: &Context<'_, S>,
+    tip: &Tip,
+    site: &Site<S::Bsdf>,
+    scattered: &Scattered,
+) -> Pending {
+    let smooth = if scattered.delta { Tip { connect: 0.0, ..*tip } } else { *tip };
+    Pending {
+        before: smooth.before(&context.plan.mis, scattered.rho_opposite),
+        rho: scattered.rho_own,
+        cos_out: scattered.cos,
+        site: if scattered.delta { MergeSite::None } else { site.merge_site(scattered.sin_theta) },
+        c: tip.c,
+        connectible: !scattered.delta,
+        in_medium: site.in_medium(),
+    }
+}

@@ -1,0 +1,123 @@
+//! What light sub-paths leave: vertices, photon beams, splats.
+
+use glam::Vec3;
+use upbp_accel::Segment;
+use upbp_media::{EdgeDensity, MediumId, Spectrum};
+
+use super::context::Context;
+use super::site::Site;
+use crate::counters::Counters;
+use crate::mis::{Pending, Tip};
+use crate::scene::{Emitter, EmitterId, EmitterPoint, Scene};
+
+/// A vertex of a light sub-path where camera sub-paths can be connected or merged.
+#[derive(Clone, Copy, Debug)]
+pub struct LightVertex<B> {
+    /// Where it is.
+    pub position: Vec3,
+    /// Direction to the vertex before, towards the light.
+    pub towards_light: Vec3,
+    /// Flux over density on arrival, before scattering (`docs/theory.md`, section 1.5).
+    pub throughput: Spectrum,
+    /// What the weights need.
+    pub tip: Tip,
+    /// Edges from the light.
+    pub depth: u32,
+    /// Index of the sub-path.
+    pub path: u32,
+    /// How it scatters.
+    pub site: Site<B>,
+}
+
+/// What connects the first vertex of an edge with a vertex somewhere on it, for the weights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EdgeSource {
+    /// The edge starts at an emitter: next event estimation makes the same edge.
+    Emitter {
+        /// The emitter.
+        emitter: EmitterId,
+        /// The point on it.
+        point: EmitterPoint,
+        /// `L_0` without the choice of the emitter.
+        pdf_position: f32,
+    },
+    /// The edge starts at a vertex that scatters.
+    Vertex,
+}
+
+impl EdgeSource {
+    /// The number of samples that connect the edge's start to `position` (section 4.2).
+    pub(crate) fn connections<S: Scene>(
+        &self,
+        context: &Context<'_, S>,
+        direction: Vec3,
+        position: Vec3,
+    ) -> f64 {
+        let mis = &context.plan.mis;
+        match self {
+            Self::Vertex => mis.connect,
+            Self::Emitter { emitter, point, pdf_position } => {
+                let world = context.world;
+                let pdf = world.scene.emitters()[emitter.0 as usize].pdf_incident(
+                    &world.bounds,
+                    point,
+                    direction,
+                    position,
+                    *pdf_position,
+                );
+                mis.nee * f64::from(pdf) / f64::from(*pdf_position)
+            }
+        }
+    }
+}
+
+/// The light that a sub-path carries through one medium along one edge.
+#[derive(Clone, Copy, Debug)]
+pub struct PhotonBeam {
+    /// Where it runs; distances from the edge's first vertex.
+    pub segment: Segment,
+    /// The medium.
+    pub medium: MediumId,
+    /// What the edge has accumulated up to the segment's start.
+    pub before: EdgeDensity,
+    /// What the weights need of the edge's first vertex.
+    pub pending: Pending,
+    /// Where the edge starts.
+    pub source: EdgeSource,
+    /// Flux over density at the edge's first vertex, after scattering.
+    pub throughput: Spectrum,
+    /// Whether the edge starts at an infinite emitter: distances from there do not count in densities.
+    pub from_infinity: bool,
+    /// Edges from the light to a vertex on the beam.
+    pub depth: u32,
+    /// Index of the sub-path.
+    pub path: u32,
+}
+
+/// A contribution of light tracing to some pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splat {
+    /// Column and row on the film.
+    pub pixel: [u32; 2],
+    /// Radiance, weighted.
+    pub value: Spectrum,
+}
+
+/// What a number of light sub-paths leave.
+#[derive(Clone, Debug)]
+pub struct LightChunk<B> {
+    /// Vertices, in the order of the paths.
+    pub vertices: Vec<LightVertex<B>>,
+    /// Photon beams, in the order of the paths.
+    pub beams: Vec<PhotonBeam>,
+    /// Splats, in the order of the paths.
+    pub splats: Vec<Splat>,
+    /// What was done.
+    pub counters: Counters,
+}
+
+impl<B> Default for LightChunk<B> {
+    fn default() -> Self {
+        Self { vertices: Vec::new(), beams: Vec::new(), splats: Vec::new(), counters: Counters::default() }
+    }
+}
