@@ -122,6 +122,13 @@ impl fmt::Display for Report {
             Some(error) => writeln!(f, "estimated relMSE: {error:.3e}")?,
             None => writeln!(f, "estimated relMSE: unknown before the second iteration")?,
         }
+        if c.cut_walks > 0 {
+            writeln!(
+                f,
+                "{} camera sub-paths were ended by the limit of the path length (max_length): light is missing",
+                c.cut_walks
+            )?;
+        }
         if c.dropped + c.lost_walks + c.boundary_conflicts > 0 {
             writeln!(
                 f,

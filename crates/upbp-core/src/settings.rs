@@ -33,7 +33,8 @@ pub struct Settings {
     pub connections: u32,
     /// Fewest edges of a path between light and camera, at least 1.
     pub min_length: u32,
-    /// Most edges of a path, at least `min_length`.
+    /// Most edges of a path, at least `min_length`. Thick media that hardly absorb need many: walks that are cut are counted
+    /// in the report.
     pub max_length: u32,
     /// End walks by local Russian roulette: by the albedo of surfaces and media.
     pub roulette: bool,

@@ -21,6 +21,8 @@ pub struct Counters {
     pub contributions: [u64; 9],
     /// Contributions that were not finite or negative, and were dropped.
     pub dropped: u64,
+    /// Camera sub-paths that were ended by the limit of the path length at a vertex that scatters.
+    pub cut_walks: u64,
     /// Walks that escaped while still inside a body: geometry that is not closed. They are ended.
     pub lost_walks: u64,
     /// Boundaries that were ignored because they contradict the bodies that a walk is in: a body entered twice or left
@@ -40,6 +42,7 @@ impl Counters {
             *sum += count;
         }
         self.dropped += other.dropped;
+        self.cut_walks += other.cut_walks;
         self.lost_walks += other.lost_walks;
         self.boundary_conflicts += other.boundary_conflicts;
     }

@@ -141,6 +141,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
             estimate::emitter_hit(context, hit, direction, origin, &mis_edge, throughput, &edge, &mut out);
         }
         if depth == plan.lengths.max {
+            out.counters.cut_walks += u64::from(arrived.site.is_connectible());
             break;
         }
         let connectible = arrived.site.is_connectible();
