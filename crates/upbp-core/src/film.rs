@@ -125,7 +125,8 @@ impl Film {
     }
 
     /// Estimated error of the image: mean over pixels and channels of `variance / (value² + 0.01)`, the relMSE that a
-    /// comparison with the converged image would give. Does not see bias. Infinite with fewer than two iterations.
+    /// comparison with the converged image would give. Does not see bias, and overstates what stratified random numbers
+    /// leave of the variance. Infinite with fewer than two iterations.
     #[must_use]
     pub fn estimated_error(&self) -> f64 {
         if self.iterations < 2 || self.squares.is_empty() {

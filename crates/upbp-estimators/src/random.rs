@@ -3,9 +3,19 @@
 //! Every sub-path draws from its own stream, a function of (seed, iteration, kind of path, index): results then
 //! depend neither on the number of threads nor on who renders which iteration, and the walks of both sides are
 //! independent (a shared stream correlates them, `docs/theory.md`, section 10, row 6).
+//!
+//! The first decisions of a sub-path are points of Owen-scrambled (0, 2)-sequences, padded: every decision has an order and a
+//! scramble of its own (`docs/theory.md`, section 6(k)). The light sub-paths of an iteration are stratified among
+//! each other, the camera sub-paths of a pixel over iterations; each sub-path for itself is uniform and independent of all others,
+//! so nothing is biased. Later decisions, whose strata no longer mean anything, come from xoshiro256++.
+//!
+//! Source: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020. Oracle: `tests::strata_hold_one_point_each`.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+/// Draws that are stratified: about four vertices of a path.
+const STRATIFIED_DRAWS: u32 = 24;
 
 /// What a stream is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -20,39 +30,104 @@ pub enum StreamKind {
     PilotCamera,
 }
 
-/// A stream of uniform random numbers (xoshiro256++).
+/// A stream of uniform random numbers.
 #[derive(Clone, Debug)]
-pub struct Stream(Xoshiro256PlusPlus);
+pub struct Stream {
+    /// Number of the point in the sequences that this stream shares with others.
+    point: u32,
+    /// What is common to the streams that are stratified among each other.
+    family: u64,
+    draws: u32,
+    rest: Xoshiro256PlusPlus,
+}
 
 impl Stream {
     /// The stream of one sub-path.
     #[must_use]
     pub fn new(seed: u64, iteration: u64, kind: StreamKind, index: u64) -> Self {
+        let common =
+            mix(mix(seed ^ 0x9e37_79b9_7f4a_7c15) ^ (kind as u64 + 1).wrapping_mul(0x8cb9_2ba7_2f3d_8dd7));
+        let of_iteration = iteration.wrapping_mul(0xd1b5_4a32_d192_ed03);
+        let of_index = index.wrapping_mul(0xaef1_7502_108e_f2d9);
+        // Light sub-paths share an iteration, camera sub-paths a pixel. Beyond 2³² the sequences repeat their points, which
+        // costs stratification only.
+        let (point, family) = match kind {
+            StreamKind::Light | StreamKind::PilotLight => (index as u32, mix(common ^ of_iteration)),
+            StreamKind::Camera | StreamKind::PilotCamera => (iteration as u32, mix(common ^ of_index)),
+        };
         // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in common.
-        let mut state = mix(seed ^ 0x9e37_79b9_7f4a_7c15);
-        state = mix(state ^ iteration.wrapping_mul(0xd1b5_4a32_d192_ed03));
-        state = mix(state ^ (kind as u64 + 1).wrapping_mul(0x8cb9_2ba7_2f3d_8dd7));
-        state = mix(state ^ index.wrapping_mul(0xaef1_7502_108e_f2d9));
-        Self(Xoshiro256PlusPlus::seed_from_u64(state))
+        let rest = Xoshiro256PlusPlus::seed_from_u64(mix(mix(common ^ of_iteration) ^ of_index));
+        Self { point, family, draws: 0, rest }
     }
 
     /// Uniform in `[0, 1)`, a multiple of 2⁻²⁴.
     pub fn uniform(&mut self) -> f32 {
-        (self.0.next_u64() >> 40) as f32 * (1.0 / 16_777_216.0)
+        match self.next_decision() {
+            Some(key) => to_unit(scramble(order(self.point, key).reverse_bits(), (key >> 32) as u32)),
+            None => to_unit((self.rest.next_u64() >> 32) as u32),
+        }
     }
 
-    /// Two of them.
+    /// Two of them, stratified together.
     pub fn pair(&mut self) -> [f32; 2] {
-        let bits = self.0.next_u64();
-        let scale = 1.0 / 16_777_216.0;
-        [(bits >> 40) as f32 * scale, ((bits >> 16) & 0x00ff_ffff) as f32 * scale]
+        if let Some(key) = self.next_decision() {
+            let point = order(self.point, key);
+            let other = mix(key);
+            [
+                to_unit(scramble(point.reverse_bits(), other as u32)),
+                to_unit(scramble(sobol(point), (other >> 32) as u32)),
+            ]
+        } else {
+            let bits = self.rest.next_u64();
+            [to_unit((bits >> 32) as u32), to_unit(bits as u32)]
+        }
     }
 
     /// Uniform in `0..count`; 0 if `count` is 0.
     pub fn index(&mut self, count: usize) -> usize {
         // Multiply and shift: the bias is below count / 2⁶⁴.
-        ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
+        ((u128::from(self.rest.next_u64()) * count as u128) >> 64) as usize
     }
+
+    /// The key of the next decision, while decisions are stratified.
+    fn next_decision(&mut self) -> Option<u64> {
+        self.draws += 1;
+        (self.draws <= STRATIFIED_DRAWS)
+            .then(|| mix(self.family.wrapping_add(u64::from(self.draws).wrapping_mul(0x9e37_79b9_7f4a_7c15))))
+    }
+}
+
+fn to_unit(bits: u32) -> f32 {
+    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// The number of the point that takes the place of `point`: a permutation that keeps aligned blocks of 2ᵏ together.
+fn order(point: u32, key: u64) -> u32 {
+    scramble(point, key as u32)
+}
+
+/// Owen scrambling: every bit is flipped or not by a hash of the bits above it.
+fn scramble(bits: u32, seed: u32) -> u32 {
+    // A hash in which each bit depends on lower ones only (Laine and Karras, constants after Vegdahl), on reversed bits.
+    let mut x = bits.reverse_bits();
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(seed);
+    x = x.wrapping_mul((seed >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^= x.wrapping_mul(0x53a2_2864);
+    x.reverse_bits()
+}
+
+/// The second dimension of the Sobol sequence; the first is the reversal of the bits. Its matrix is Pascal's triangle modulo
+/// two, a Kronecker power of 2 × 2 matrices: one butterfly per bit of the bit number.
+fn sobol(point: u32) -> u32 {
+    let mut x = point.reverse_bits();
+    x ^= (x & 0x0000_ffff) << 16;
+    x ^= (x & 0x00ff_00ff) << 8;
+    x ^= (x & 0x0f0f_0f0f) << 4;
+    x ^= (x & 0x3333_3333) << 2;
+    x ^= (x & 0x5555_5555) << 1;
+    x
 }
 
 fn mix(mut z: u64) -> u64 {
@@ -65,23 +140,106 @@ fn mix(mut z: u64) -> u64 {
 mod tests {
     use super::*;
 
-    #[test]
-    fn neighbouring_streams_are_uncorrelated() {
-        // Correlation of first draws over 1e5 pairs of neighbours: standard deviation 1/√n.
-        let n = 100_000_u64;
-        for shift in [
-            |i: u64| Stream::new(7, 0, StreamKind::Light, i + 1),
-            |i: u64| Stream::new(7, 0, StreamKind::Camera, i),
-            |i: u64| Stream::new(7, 1, StreamKind::Light, i),
-            |i: u64| Stream::new(8, 0, StreamKind::Light, i),
-        ] {
-            let mut sum = 0.0;
-            for i in 0..n {
-                let a = f64::from(Stream::new(7, 0, StreamKind::Light, i).uniform()) - 0.5;
-                sum += a * (f64::from(shift(i).uniform()) - 0.5) * 12.0;
+    /// The direction numbers of the second Sobol dimension, one after the other.
+    fn sobol_by_definition(mut point: u32) -> u32 {
+        let (mut direction, mut result) = (1_u32 << 31, 0);
+        while point != 0 {
+            if point & 1 == 1 {
+                result ^= direction;
             }
-            let z = sum / (n as f64).sqrt();
-            assert!(z.abs() < 4.0, "correlation of {z} standard deviations");
+            point >>= 1;
+            direction ^= direction >> 1;
+        }
+        result
+    }
+
+    #[test]
+    fn butterflies_are_the_direction_numbers() {
+        for i in 0..32 {
+            assert_eq!(sobol(1 << i), sobol_by_definition(1 << i), "bit {i}");
+        }
+        assert_eq!(sobol(0xdead_beef), sobol_by_definition(0xdead_beef));
+    }
+
+    #[test]
+    fn strata_hold_one_point_each() {
+        // 64 streams of a family: every elementary interval of area 1/64 has one point, at each decision.
+        for (kind, make) in [
+            (StreamKind::Light, (|i| Stream::new(5, 3, StreamKind::Light, 192 + i)) as fn(u64) -> Stream),
+            (StreamKind::Camera, |i| Stream::new(5, 192 + i, StreamKind::Camera, 17)),
+        ] {
+            let mut streams: Vec<_> = (0..64).map(make).collect();
+            for _ in 0..STRATIFIED_DRAWS / 2 {
+                let pairs: Vec<_> = streams.iter_mut().map(Stream::pair).collect();
+                for (width, height) in [(1, 64), (2, 32), (4, 16), (8, 8), (16, 4), (32, 2), (64, 1)] {
+                    let mut cells: Vec<_> = pairs
+                        .iter()
+                        .map(|[x, y]| (x * width as f32) as usize + width * (y * height as f32) as usize)
+                        .collect();
+                    cells.sort_unstable();
+                    assert_eq!(cells, (0..64).collect::<Vec<_>>(), "{kind:?}, {width} x {height}");
+                }
+                let mut cells: Vec<_> = streams.iter_mut().map(|s| (s.uniform() * 64.0) as usize).collect();
+                cells.sort_unstable();
+                assert_eq!(cells, (0..64).collect::<Vec<_>>(), "{kind:?}");
+            }
+        }
+    }
+
+    /// Correlation of two draws over many streams, in standard deviations.
+    fn correlation(draws: impl Fn(u64) -> (f32, f32)) -> f64 {
+        let n = 100_000_u64;
+        let sum: f64 = (0..n)
+            .map(|i| {
+                let (a, b) = draws(i);
+                (f64::from(a) - 0.5) * (f64::from(b) - 0.5) * 12.0
+            })
+            .sum();
+        sum / (n as f64).sqrt()
+    }
+
+    #[test]
+    fn families_and_decisions_are_uncorrelated() {
+        let first = |mut stream: Stream| stream.uniform();
+        let light = |seed, iteration, index| Stream::new(seed, iteration, StreamKind::Light, index);
+        let camera = |seed, iteration, index| Stream::new(seed, iteration, StreamKind::Camera, index);
+        for z in [
+            // Other walk, iteration, seed, pixel.
+            correlation(|i| (first(light(7, 0, i)), first(camera(7, 0, i)))),
+            correlation(|i| (first(light(7, 0, i)), first(light(7, 1, i)))),
+            correlation(|i| (first(light(7, 0, i)), first(light(8, 0, i)))),
+            correlation(|i| (first(camera(7, 2, i)), first(camera(7, 2, i + 1)))),
+            // Two decisions of a sub-path, in and beyond the stratified ones.
+            correlation(|i| {
+                let mut stream = light(7, 0, i);
+                (stream.uniform(), stream.uniform())
+            }),
+            correlation(|i| {
+                let mut stream = camera(i, 4, 9);
+                (stream.pair()[1], stream.pair()[1])
+            }),
+            correlation(|i| {
+                let mut stream = light(7, 0, i);
+                (0..STRATIFIED_DRAWS).for_each(|_| drop(stream.uniform()));
+                (stream.uniform(), stream.uniform())
+            }),
+        ] {
+            assert!(z.abs() < 4.5, "correlation of {z} standard deviations");
+        }
+    }
+
+    #[test]
+    fn every_draw_is_uniform_over_seeds() {
+        // One point of one family, over seeds: χ² with 15 degrees of freedom is below 45 with probability 0.9999.
+        for draw in [0, 1, 5, STRATIFIED_DRAWS + 1] {
+            let mut counts = [0_u32; 16];
+            for seed in 0..20_000 {
+                let mut stream = Stream::new(seed, 3, StreamKind::Camera, 11);
+                (0..draw).for_each(|_| drop(stream.pair()));
+                counts[(stream.pair()[1] * 16.0) as usize] += 1;
+            }
+            let chi2: f64 = counts.iter().map(|&c| (f64::from(c) - 1250.0).powi(2) / 1250.0).sum();
+            assert!(chi2 < 45.0, "draw {draw}: {counts:?}");
         }
     }
 
