@@ -220,7 +220,9 @@ mod tests {
             }),
             correlation(|i| {
                 let mut stream = light(7, 0, i);
-                (0..STRATIFIED_DRAWS).for_each(|_| drop(stream.uniform()));
+                for _ in 0..STRATIFIED_DRAWS {
+                    stream.uniform();
+                }
                 (stream.uniform(), stream.uniform())
             }),
         ] {
@@ -235,7 +237,9 @@ mod tests {
             let mut counts = [0_u32; 16];
             for seed in 0..20_000 {
                 let mut stream = Stream::new(seed, 3, StreamKind::Camera, 11);
-                (0..draw).for_each(|_| drop(stream.pair()));
+                for _ in 0..draw {
+                    stream.pair();
+                }
                 counts[(stream.pair()[1] * 16.0) as usize] += 1;
             }
             let chi2: f64 = counts.iter().map(|&c| (f64::from(c) - 1250.0).powi(2) / 1250.0).sum();

@@ -75,7 +75,7 @@ fn connect<S: Scene, O: Observer<S::Bsdf>>(
     }
     out.counters.shadow_rays += 1;
     let crosses = vertex.site.crosses(vertex.towards_camera, direction);
-    let stack = if crosses { &vertex.behind } else { &vertex.stack };
+    let stack = vertex.sides.towards(crosses);
     let origin = ray_origin(&vertex.site, vertex.position, direction);
     let surface = match &light.site {
         Site::Surface(surface) => Some((light.position, surface.geometric_normal)),

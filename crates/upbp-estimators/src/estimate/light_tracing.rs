@@ -1,22 +1,17 @@
 //! Light tracing: a light vertex and the lens.
 
-use upbp_media::MediumStack;
-
 use crate::mis::End;
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::random::Stream;
 use crate::scene::{Camera, Crossing, Scene, Walk};
 use crate::technique::Technique;
-use crate::walk::{Context, LightChunk, LightVertex, Splat, Target, clear_edge, ray_origin};
+use crate::walk::{Context, LightChunk, LightVertex, Sides, Splat, Target, clear_edge, ray_origin};
 
-/// Connects a light vertex to the camera. `stack` are the bodies on the side that its walk came from, `behind` those on the
-/// other side of a surface.
-#[expect(clippy::too_many_arguments, reason = "the state of one vertex, used here only")]
+/// Connects a light vertex to the camera; `sides` are the bodies around it.
 pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     vertex: &LightVertex<S::Bsdf>,
-    stack: &MediumStack,
-    behind: &MediumStack,
+    sides: &Sides,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut LightChunk<S::Bsdf>,
@@ -52,8 +47,7 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf>>(
     let crosses = vertex.site.crosses(vertex.towards_light, direction);
     let origin = ray_origin(&vertex.site, vertex.position, direction);
     let target = Target { direction, distance, surface: None };
-    let Some(density) = clear_edge(scene, if crosses { behind } else { stack }, origin, &target, crossings)
-    else {
+    let Some(density) = clear_edge(scene, sides.towards(crosses), origin, &target, crossings) else {
         return;
     };
     let in_medium = vertex.site.in_medium();

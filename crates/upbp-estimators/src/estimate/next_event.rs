@@ -53,7 +53,7 @@ pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
     let origin = ray_origin(&vertex.site, vertex.position, direction);
     let surface = (kind == EmitterKind::Area).then_some((incident.point.position, incident.point.normal));
     let target = Target { direction, distance: incident.distance, surface };
-    let stack = if crosses { &vertex.behind } else { &vertex.stack };
+    let stack = vertex.sides.towards(crosses);
     let Some(density) = clear_edge(scene, stack, origin, &target, crossings) else { return };
 
     let in_medium = vertex.site.in_medium();

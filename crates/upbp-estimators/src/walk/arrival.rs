@@ -1,11 +1,11 @@
 //! The end of an edge, the same for both walks: where it stops, what is there, what it passes on.
 
 use glam::Vec3;
-use upbp_media::{EdgeDensity, Medium, MediumStack};
+use upbp_media::{EdgeDensity, Medium};
 
 use super::context::Context;
 use super::passage::Passage;
-use super::site::{Scattered, Site};
+use super::site::{Scattered, Sides, Site};
 use crate::mis::{MergeSite, Pending, Tip};
 use crate::random::Stream;
 use crate::scene::Scene;
@@ -36,10 +36,8 @@ pub(super) struct Arrived<B> {
     pub(super) distance: f32,
     pub(super) density: EdgeDensity,
     pub(super) site: Site<B>,
-    /// The bodies on the side that the walk comes from.
-    pub(super) stack: MediumStack,
-    /// The bodies on the other side of a surface.
-    pub(super) behind: MediumStack,
+    /// The bodies around it.
+    pub(super) sides: Sides,
 }
 
 #[expect(
@@ -65,7 +63,6 @@ pub(super) fn arrive<S: Scene>(
     if let Some((i, t)) = stop {
         let span = &passage.spans[i];
         let Some(medium) = span.medium else { return Arrival::Lost };
-        let stack = passage.stack_in(span, t);
         let position = passage.origin + t * passage.direction;
         if !position.is_finite() {
             return Arrival::Lost;
@@ -75,23 +72,21 @@ pub(super) fn arrive<S: Scene>(
             distance: t,
             density: passage.density_to(scene, span, t),
             site: Site::Medium(medium),
-            stack,
-            behind: stack,
+            sides: Sides::around(passage.stack_in(span, t)),
         });
     }
-    let stack = *passage.stack_at_end();
+    let stack = passage.stack_at_end();
     let Some(hit) = &passage.hit else {
         return if stack.is_empty() { Arrival::Escaped } else { Arrival::Lost };
     };
     let Some(bsdf) = hit.bsdf else { return Arrival::Lost };
-    match Site::at_hit(hit, bsdf, passage.direction, &stack) {
-        Some((site, behind)) => Arrival::Vertex(Arrived {
+    match Site::at_hit(hit, bsdf, passage.direction, stack) {
+        Some((site, sides)) => Arrival::Vertex(Arrived {
             position: hit.position,
             distance: hit.t,
             density: passage.density(scene),
             site,
-            stack,
-            behind,
+            sides,
         }),
         None => Arrival::Absorbed,
     }

@@ -1,11 +1,11 @@
 //! Camera sub-paths: one per pixel sample, with every technique that ends on them.
 
 use glam::{Vec2, Vec3};
-use upbp_media::{MediumStack, Spectrum};
+use upbp_media::Spectrum;
 
 use super::arrival::{Arrival, arrive, pend, sample_stop};
 use super::context::{Context, Scratch};
-use super::site::Site;
+use super::site::{Sides, Site};
 use super::visibility::ray_origin;
 use crate::counters::Counters;
 use crate::estimate;
@@ -65,9 +65,7 @@ pub(crate) struct QueryVertex<B> {
     pub(crate) tip: Tip,
     pub(crate) depth: u32,
     pub(crate) site: Site<B>,
-    /// The bodies on the camera's side, and on the other side of a surface.
-    pub(crate) stack: MediumStack,
-    pub(crate) behind: MediumStack,
+    pub(crate) sides: Sides,
 }
 
 /// Traces the camera sub-path of one sample of a pixel. `index` addresses its random numbers.
@@ -158,8 +156,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
             tip,
             depth,
             site: arrived.site,
-            stack: arrived.stack,
-            behind: arrived.behind,
+            sides: arrived.sides,
         };
         if connectible {
             estimate::next_event(context, &vertex, &mut stream, &mut scratch.crossings, &mut out);
@@ -180,7 +177,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
         });
         origin = ray_origin(&vertex.site, vertex.position, scattered.direction);
         direction = scattered.direction;
-        stack = if scattered.transmitted { vertex.behind } else { vertex.stack };
+        stack = vertex.sides.towards(scattered.transmitted);
         edge = QueryEdge {
             throughput: throughput * scattered.weight,
             pending: pend(context, &vertex.tip, &vertex.site, &scattered),

@@ -62,7 +62,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
                 return;
             }
         };
-        let Arrived { position, distance, density, site, stack, behind } = arrival;
+        let Arrived { position, distance, density, site, sides } = arrival;
         let in_medium = site.in_medium();
         let t = density.forward(in_medium);
         let throughput = flight.throughput * density.transmittance / t as f32;
@@ -84,16 +84,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
         let vertex = LightVertex { position, towards_light: from, throughput, tip, depth, path: index, site };
         if connectible {
             if plan.mis.light_tracing > 0.0 && plan.lengths.contain(depth + 1) {
-                light_tracing(
-                    context,
-                    &vertex,
-                    &stack,
-                    &behind,
-                    &mut stream,
-                    &mut scratch.crossings,
-                    out,
-                    observer,
-                );
+                light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
             }
             if plan.stores_vertices() {
                 out.vertices.push(vertex);
@@ -109,7 +100,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
         flight = Flight {
             origin: ray_origin(&site, position, scattered.direction),
             direction: scattered.direction,
-            stack: if scattered.transmitted { behind } else { stack },
+            stack: sides.towards(scattered.transmitted),
             pending: pend(context, &tip, &site, &scattered),
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,

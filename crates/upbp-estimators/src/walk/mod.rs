@@ -15,7 +15,7 @@ pub use context::{Context, Scratch};
 pub use light::trace_light_path;
 pub use passage::{Passage, Span};
 pub use photon::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
-pub use site::{Evaluation, Scattered, Site, SurfaceSite};
+pub use site::{Evaluation, Scattered, Sides, Site, SurfaceSite};
 pub(crate) use visibility::ray_origin;
 pub use visibility::{Target, clear_edge};
 

@@ -1,7 +1,7 @@
 //! Vertices where a path can be connected and merged, and how they scatter.
 
 use glam::Vec3;
-use upbp_media::{Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
+use upbp_media::{Interior, Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
 
 use super::MIN_COSINE;
 use crate::mis::MergeSite;
@@ -28,6 +28,36 @@ pub struct SurfaceSite<B> {
     pub shading_normal: Vec3,
     /// Refractive indices on its two sides.
     pub interface: Interface,
+}
+
+/// The bodies on the two sides of a vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct Sides {
+    /// Those on the side that the walk comes from.
+    near: MediumStack,
+    /// The body whose surface the vertex is on, and whether the walk would enter it.
+    boundary: Option<(Interior, bool)>,
+}
+
+impl Sides {
+    /// The same bodies all around: a vertex in a medium.
+    #[must_use]
+    pub const fn around(stack: MediumStack) -> Self {
+        Self { near: stack, boundary: None }
+    }
+
+    /// The bodies on the side that a path goes to, which `crosses` the surface or stays on the side it came from.
+    #[inline]
+    #[must_use]
+    pub fn towards(&self, crosses: bool) -> MediumStack {
+        let mut stack = self.near;
+        if let Some((interior, entering)) = self.boundary
+            && crosses
+        {
+            let _ = stack.cross(interior, entering);
+        }
+        stack
+    }
 }
 
 /// A pair of directions at a vertex, evaluated.
@@ -72,32 +102,25 @@ fn sine(a: Vec3, b: Vec3) -> f64 {
 }
 
 impl<B: Bsdf> Site<B> {
-    /// The surface of a hit; `before` are the bodies on the side that the ray comes from.
-    ///
-    /// Returns the site and the bodies on the other side. `None` if the surface is grazed.
-    pub fn at_hit(
-        hit: &Hit<B>,
-        bsdf: B,
-        direction: Vec3,
-        before: &MediumStack,
-    ) -> Option<(Self, MediumStack)> {
+    /// The surface of a hit; `before` are the bodies on the side that the ray comes from. `None` if the surface is
+    /// grazed.
+    pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, before: &MediumStack) -> Option<(Self, Sides)> {
         let cos = direction.dot(hit.geometric_normal);
         if cos.abs() < MIN_COSINE || !hit.shading_normal.is_finite() {
             return None;
         }
         let entering = cos < 0.0;
-        let mut behind = *before;
-        if let Some(interior) = hit.interior {
-            let _ = behind.cross(interior, entering);
-        }
-        let (above, below) = if entering { (before, &behind) } else { (&behind, before) };
+        let sides = Sides { near: *before, boundary: hit.interior.map(|interior| (interior, entering)) };
+        let near = before.ior();
+        let far = if sides.boundary.is_some() { sides.towards(true).ior() } else { near };
+        let (above, below) = if entering { (near, far) } else { (far, near) };
         let site = SurfaceSite {
             bsdf,
             geometric_normal: hit.geometric_normal,
             shading_normal: hit.shading_normal,
-            interface: Interface { above: above.ior(), below: below.ior() },
+            interface: Interface { above, below },
         };
-        Some((Self::Surface(site), behind))
+        Some((Self::Surface(site), sides))
     }
 
     /// Whether paths can be connected and merged here.

@@ -32,7 +32,7 @@ pub(crate) fn ray_origin<B>(site: &Site<B>, position: Vec3, direction: Vec3) -> 
 /// `stack` holds the bodies at the near end, on the side of `target`; the far end has none of its own.
 pub fn clear_edge<S: Scene>(
     scene: &S,
-    stack: &MediumStack,
+    mut stack: MediumStack,
     origin: Vec3,
     target: &Target,
     crossings: &mut Vec<Crossing>,
@@ -51,7 +51,6 @@ pub fn clear_edge<S: Scene>(
     if !(ray.t_max > 0.0) || !ray.direction.is_finite() || !scene.is_clear(&ray, crossings) {
         return None;
     }
-    let mut stack = *stack;
     let mut density = EdgeDensity::EMPTY;
     let mut start = 0.0;
     let mut push = |medium: Option<upbp_media::MediumId>, start: f32, end: f32| match medium {
