@@ -277,7 +277,11 @@ fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: u
             quantile(0.999),
             quantile(1.0),
         );
-        assert!(doubtful * 10_000 <= 10_000 + seen, "{technique:?}: {doubtful} of {seen} in doubt");
+        // A vertex within rounding of a boundary cannot be rebuilt: about one sample in 10⁴, a Poisson count, in clusters
+        // since samples share vertices. This only guards that hardly any sample escapes the comparison.
+        let expected = 1e-4 * seen as f64;
+        let most = expected + 4.0 * expected.sqrt() + 4.0;
+        assert!(doubtful as f64 <= most, "{technique:?}: {doubtful} of {seen} in doubt");
         // Squared densities have twice the relative error.
         let tolerance = if plan.mis.heuristic == Heuristic::Power { 2.0 * TOLERANCE } else { TOLERANCE };
         assert!(quantile(REGULAR) < tolerance, "{technique:?}: {:e}", quantile(REGULAR));
