@@ -1,0 +1,124 @@
+//! What is rendered: a scene and its reference, with the noise of the latter.
+
+use std::collections::HashSet;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
+use upbp_core::{Image, read_exr};
+use upbp_scene::ReadyScene;
+
+/// Names of the scenes with a reference of their own.
+const SCENES: [&str; 10] = [
+    "absorb_only",
+    "chromatic_sphere",
+    "emission_grey",
+    "fog_cornell",
+    "fog_two_spheres",
+    "forward_hg_box",
+    "glass_env",
+    "high_albedo_cube",
+    "mirror_fog",
+    "point_bubble_fog",
+];
+
+/// Mean errors of a perfect render, due to the noise of the reference; 0 where it is not known.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Floor {
+    /// Mean of `σ² / (r² + 0.01)`.
+    pub(crate) relative_mse: f64,
+    /// Root of the mean of `σ²`.
+    pub(crate) rmse: f64,
+}
+
+/// A scene to render.
+pub(crate) struct Subject {
+    pub(crate) name: String,
+    pub(crate) scene: ReadyScene,
+    pub(crate) reference: Image,
+    pub(crate) floor: Floor,
+}
+
+/// Where a scene and its reference are.
+struct Files {
+    name: String,
+    scene: PathBuf,
+    reference: PathBuf,
+}
+
+impl Subject {
+    /// Loads everything that the command line names.
+    pub(crate) fn load_all(wanted: &[String]) -> Result<Vec<Self>, Box<dyn Error>> {
+        let mut all = Vec::new();
+        for item in wanted {
+            match item.as_str() {
+                "all" => all.extend(SCENES.into_iter().map(Files::shipped)),
+                name if SCENES.contains(&name) => all.push(Files::shipped(name)),
+                pair => all.push(Files::pair(pair)?),
+            }
+        }
+        let mut names = HashSet::new();
+        if let Some(files) = all.iter().find(|files| !names.insert(&files.name)) {
+            return Err(format!("two scenes are called `{}`", files.name).into());
+        }
+        all.into_iter().map(Self::load).collect()
+    }
+
+    fn load(files: Files) -> Result<Self, Box<dyn Error>> {
+        let scene = ReadyScene::load(&files.scene)?;
+        let reference = read_exr(&files.reference)?;
+        let errors = standard_errors(&files.reference)
+            .map_err(|error| format!("cannot read {}: {error}", files.reference.display()))?;
+        let floor = errors.map_or_else(Floor::default, |errors| floor(&reference, &errors));
+        Ok(Self { name: files.name, scene, reference, floor })
+    }
+}
+
+impl Files {
+    fn shipped(name: &str) -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        Self {
+            name: name.to_owned(),
+            scene: root.join(format!("examples/scenes/reference/{name}.ron")),
+            reference: root.join(format!("tests/data/references/{name}.exr")),
+        }
+    }
+
+    fn pair(text: &str) -> Result<Self, String> {
+        let (scene, reference) = text.split_once('=').ok_or_else(|| {
+            format!("scene `{text}`: expected all, SCENE.ron=REF.exr, or one of {}", SCENES.join(", "))
+        })?;
+        let name = Path::new(scene).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        if name.is_empty() || reference.is_empty() {
+            return Err(format!("scene `{text}`: expected SCENE.ron=REF.exr"));
+        }
+        Ok(Self { name, scene: scene.into(), reference: reference.into() })
+    }
+}
+
+/// The channels `stderr.R`, `stderr.G`, `stderr.B`, if there are all three.
+fn standard_errors(path: &Path) -> Result<Option<[Vec<f32>; 3]>, exr::error::Error> {
+    let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
+    let layer = image.all_attributes().from_file(path)?.layer_data;
+    let channel = |name: &str| {
+        let found = layer.channel_data.list.iter().find(|channel| channel.name.to_string() == name)?;
+        Some(found.sample_data.values_as_f32().collect::<Vec<f32>>())
+    };
+    Ok(channel("stderr.R")
+        .zip(channel("stderr.G"))
+        .zip(channel("stderr.B"))
+        .map(|((red, green), blue)| [red, green, blue]))
+}
+
+fn floor(reference: &Image, errors: &[Vec<f32>; 3]) -> Floor {
+    let (mut relative, mut square) = (0.0, 0.0);
+    for (i, pixel) in reference.pixels.iter().enumerate() {
+        for c in 0..3 {
+            let (r, s) = (f64::from(pixel[c]), f64::from(errors[c][i]));
+            relative += s * s / (r * r + 0.01);
+            square += s * s;
+        }
+    }
+    let n = (3 * reference.pixels.len()).max(1) as f64;
+    Floor { relative_mse: relative / n, rmse: (square / n).sqrt() }
+}
