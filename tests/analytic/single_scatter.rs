@@ -1,5 +1,7 @@
 //! Light that was scattered exactly once.
 
+use std::f64::consts::PI;
+
 use crate::cases::{Case, Table, cases, medium, narrow_camera, scene, settings, vector};
 use crate::support::render;
 use upbp_core::{LightPaths, Settings};
@@ -87,8 +89,51 @@ fn point_light_seen_through_fog() {
     table.finish();
 }
 
-/// Far from all boundaries the bias of a merge falls like the square of its radius. Kernels whose bias stands out of the
-/// noise are nearly as wide as the light is far away: the next order adds something.
+/// What a merge must give with a kernel of some radius, by quadrature: along the ray, the light of the point source is averaged
+/// over the kernel instead of taken at the point. Isotropic scattering; the kernel does not reach the light.
+fn smoothed(technique: &str, case: &Case, radius: f64) -> f64 {
+    let sigma_t = case.input("sigma_a") + case.input("sigma_s");
+    let fluence = |d: f64| (-sigma_t * d).exp() / (d * d);
+    let at: [f64; 3] = case.inputs("light_position").try_into().expect("three numbers");
+    // The ray starts in the origin and runs along z.
+    let across = at[0].hypot(at[1]);
+    let steps = |n: u32| move |i: u32| (f64::from(i) + 0.5) / f64::from(n);
+    let average = |t: f64| -> f64 {
+        let along = at[2] - t;
+        let distance = across.hypot(along);
+        if technique == "pp3d" {
+            // Shells around the light: their area within a ball at this distance.
+            let shell = |u: f64| {
+                let d = distance + (2.0 * u - 1.0) * radius;
+                fluence(d) * PI * d / distance * (radius.powi(2) - (distance - d).powi(2)) * 2.0 * radius
+            };
+            (0..1000).map(steps(1000)).map(shell).sum::<f64>() / 1000.0 * 3.0 / (4.0 * PI * radius.powi(3))
+        } else {
+            // A parabolic disc across the ray: rings of equal weight per area, times 2 (1 − u²).
+            let ring = |i: u32| {
+                let area = steps(60)(i);
+                let r = radius * area.sqrt();
+                let point = |j: u32| {
+                    let phi = 2.0 * PI * steps(60)(j);
+                    fluence((across - r * phi.cos()).hypot(r * phi.sin()).hypot(along))
+                };
+                2.0 * (1.0 - area) * (0..60).map(point).sum::<f64>() / 60.0
+            };
+            (0..60).map(ring).sum::<f64>() / 60.0
+        }
+    };
+    // t = tan of an angle: even steps near the light, the tail to infinity.
+    let integrand = |u: f64| {
+        let angle = 0.5 * PI * u;
+        let t = angle.tan() * at[2];
+        (-sigma_t * t).exp() * average(t) * at[2] * 0.5 * PI / angle.cos().powi(2)
+    };
+    case.input("sigma_s") / (4.0 * PI) * (0..2000).map(steps(2000)).map(integrand).sum::<f64>() / 2000.0
+}
+
+/// Far from all boundaries the bias of a merge falls like the square of its radius: PP3D and PB2D have the bias that
+/// quadrature predicts, whose exponent comes to two as the radius shrinks. BB1D smooths across both beams at once, which is
+/// not predicted here; a bias of 10 % and more contains the next order, and its exponent is above two.
 #[test]
 fn bias_falls_with_the_square_of_the_radius() {
     let case = cases("single_scatter_point_light").remove(0);
@@ -96,27 +141,49 @@ fn bias_falls_with_the_square_of_the_radius() {
     let camera = |size| narrow_camera([0.0; 3], [0.0, 0.0, 1.0], size);
     let one = scene(&point_light(&case, &camera(1)));
     let many = scene(&point_light(&case, &camera(64)));
-    for (techniques, scene) in [("pp3d", &many), ("pb2d", &one), ("bb1d", &one)] {
-        let bias = [0.8, 0.4].map(|radius| {
-            let settings = Settings {
-                light_paths: LightPaths::Count(50_000),
-                beams: Some(50_000),
-                ..once(techniques, Some(radius * distance(&case)))
-            };
-            let (result, _) = render(scene, &settings, 60);
-            (result.mean / expected - 1.0, result.error / expected)
-        });
-        let exponent = (bias[0].0 / bias[1].0).log2();
-        let error = (bias[0].1 / bias[0].0).hypot(bias[1].1 / bias[1].0) / std::f64::consts::LN_2;
+    let mut table = Table::default();
+    for technique in ["pp3d", "pb2d"] {
+        let bias = |radius: f64| smoothed(technique, &case, radius) / expected - 1.0;
+        let exponent = |radius: f64| (bias(radius) / bias(0.5 * radius)).log2();
         println!(
-            "{techniques}: {:+.2} ± {:.2} %, {:+.2} ± {:.2} % with half the radius, exponent {exponent:.2} ± {error:.2}",
-            100.0 * bias[0].0,
-            100.0 * bias[0].1,
-            100.0 * bias[1].0,
-            100.0 * bias[1].1,
+            "{technique}: predicted exponents {:.3}, {:.3}, {:.3}",
+            exponent(0.8),
+            exponent(0.2),
+            exponent(0.05)
         );
-        assert!((exponent - 2.0).abs() < 0.5, "{techniques}: {exponent} ± {error}");
+        assert!((exponent(0.2) - 2.0).abs() < 0.05);
+        assert!(exponent(0.8) > exponent(0.4) && exponent(0.4) > exponent(0.2));
     }
+    let mut measured = |technique: &str, scene, radius: f64| {
+        let settings = Settings {
+            light_paths: LightPaths::Count(50_000),
+            beams: Some(50_000),
+            ..once(technique, Some(radius * distance(&case)))
+        };
+        let (result, _) = render(scene, &settings, 60);
+        if technique != "bb1d" {
+            let predicted = smoothed(technique, &case, radius * distance(&case));
+            table.check(&format!("{technique}, radius {radius}"), result, predicted, 1e-4 * predicted);
+        }
+        (result.mean / expected - 1.0, result.error / expected)
+    };
+    for (technique, scene) in [("pp3d", &many), ("pb2d", &one), ("bb1d", &one)] {
+        let (wide, narrow) = (measured(technique, scene, 0.8), measured(technique, scene, 0.4));
+        let exponent = (wide.0 / narrow.0).log2();
+        let error = (wide.1 / wide.0).hypot(narrow.1 / narrow.0) / std::f64::consts::LN_2;
+        println!(
+            "{technique}: {:+.2} ± {:.2} %, {:+.2} ± {:.2} % with half the radius, exponent {exponent:.2} ± {error:.2}",
+            100.0 * wide.0,
+            100.0 * wide.1,
+            100.0 * narrow.0,
+            100.0 * narrow.1,
+        );
+        assert!(
+            exponent > 2.0 - 4.0 * error && exponent < 2.5 + 4.0 * error,
+            "{technique}: {exponent} ± {error}"
+        );
+    }
+    table.finish();
 }
 
 #[test]
