@@ -91,7 +91,7 @@ impl Lines {
     ///
     /// The cross-product form: the one that divides by the product of the directions fails for
     /// perpendicular lines. Plain arrays, so that a loop over eight lines vectorises.
-    #[inline]
+    #[inline(always)]
     pub(super) fn solve(a: [f32; 3], b: [f32; 3], w: [f32; 3]) -> Self {
         let n = cross(a, b);
         let sin2 = dot(n, n);
@@ -106,12 +106,12 @@ impl Lines {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-#[inline]
+#[inline(always)]
 fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

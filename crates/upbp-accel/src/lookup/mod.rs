@@ -3,12 +3,15 @@
 //! Both structures rest on one [packed tree](packed): items are sorted into blocks of eight, blocks into
 //! nodes of eight. The search radius belongs to the query, which widens the boxes that it tests.
 
+#![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
+
 mod approach;
 mod packed;
 mod point_tree;
 mod probe;
 mod segment_tree;
 mod split;
+mod wide;
 
 pub use approach::{ClosestApproach, PARALLEL_SIN2, Segment, closest_approach};
 pub use point_tree::PointTree;

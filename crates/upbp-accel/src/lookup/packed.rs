@@ -9,6 +9,8 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::wide::{Task, Wide, run};
+
 /// Items per block and children per node.
 pub(super) const WIDTH: usize = 8;
 
@@ -20,6 +22,7 @@ const SERIAL: usize = 1 << 13;
 
 /// Eight boxes, arranged for vectorised tests. An unused lane has an empty box.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub(super) struct Boxes {
     pub(super) min: [[f32; WIDTH]; 3],
     pub(super) max: [[f32; WIDTH]; 3],
@@ -42,6 +45,15 @@ impl Boxes {
     }
 }
 
+/// What a traversal asks. Its methods are compiled into the traversal, for the instruction set of that.
+pub(super) trait Query {
+    /// The boxes that may hold what is looked for, one bit per lane.
+    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32;
+
+    /// Looks at the items of a block.
+    fn block<W: Wide>(&mut self, wide: W, index: usize);
+}
+
 /// A hierarchy over blocks of eight items.
 #[derive(Clone, Debug)]
 pub(super) struct PackedTree {
@@ -56,8 +68,29 @@ pub(super) struct PackedTree {
 /// An item while it is sorted.
 #[derive(Clone, Copy)]
 struct Entry {
-    centre: [f32; 3],
+    /// As [`ordered`] integers, which compare faster.
+    centre: [u32; 3],
     index: u32,
+}
+
+impl Entry {
+    /// Ties go to the lesser index.
+    #[inline]
+    fn key<const AXIS: usize>(&self) -> u64 {
+        u64::from(self.centre[AXIS]) << 32 | u64::from(self.index)
+    }
+}
+
+/// An integer in the place of a number in the total order.
+#[inline]
+fn ordered(x: f32) -> u32 {
+    let bits = x.to_bits();
+    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
+}
+
+/// The number at a place in the total order.
+fn number(ordered: u32) -> f32 {
+    f32::from_bits(if ordered >> 31 == 1 { ordered ^ 1 << 31 } else { !ordered })
 }
 
 impl PackedTree {
@@ -69,7 +102,7 @@ impl PackedTree {
             .with_min_len(SERIAL)
             .map(|index| {
                 let (min, max) = bounds(index);
-                Entry { centre: (min * 0.5 + max * 0.5).to_array(), index: index as u32 }
+                Entry { centre: (min * 0.5 + max * 0.5).to_array().map(ordered), index: index as u32 }
             })
             .collect();
         let mut capacity = WIDTH;
@@ -126,46 +159,58 @@ impl PackedTree {
         self.nodes.capacity() * size_of::<Boxes>() + self.starts.capacity() * size_of::<usize>()
     }
 
-    /// Calls `visit` with the index of every block under the boxes that `test` accepts. One bit per lane.
+    /// Asks `query` about every block under the boxes that it accepts, in the order of the blocks.
     #[inline]
-    pub(super) fn traverse(&self, test: impl Fn(&Boxes) -> u32, mut visit: impl FnMut(usize)) {
-        if self.blocks == 0 {
-            return;
+    pub(super) fn ask(&self, query: impl Query) {
+        if self.blocks > 0 {
+            run(Traversal { tree: self, query });
         }
+    }
+
+    #[inline(always)]
+    fn walk(&self, wide: impl Wide, mut query: impl Query) {
         let levels = self.starts.len() - 1;
         debug_assert!(levels <= MAX_LEVELS, "{levels} levels");
         // Lanes still to be visited and the index of the first child, per level from the blocks up. So the
         // stack is as high as the tree and cannot overflow.
         let mut lanes = [0_u32; MAX_LEVELS];
         let mut children = [0_usize; MAX_LEVELS];
-        let mut level = levels - 1;
-        lanes[level] = self.test(level, 0, &test);
+        let (mut level, mut node) = (levels - 1, 0);
         loop {
+            // Children that do not exist must not count: a test may accept empty boxes when the radius is infinite.
+            let below = if level == 0 { self.blocks } else { self.starts[level] - self.starts[level - 1] };
+            let existing = (1 << (below - node * WIDTH).min(WIDTH)) - 1;
+            let mut met = query.boxes(wide, &self.nodes[self.starts[level] + node]) & existing;
+            if level == 0 {
+                while met != 0 {
+                    query.block(wide, node * WIDTH + met.trailing_zeros() as usize);
+                    met &= met - 1;
+                }
+            }
+            children[level] = node * WIDTH;
+            lanes[level] = met;
             while lanes[level] == 0 {
                 level += 1;
                 if level == levels {
                     return;
                 }
             }
-            let child = children[level] + lanes[level].trailing_zeros() as usize;
+            node = children[level] + lanes[level].trailing_zeros() as usize;
             lanes[level] &= lanes[level] - 1;
-            if level == 0 {
-                visit(child);
-            } else {
-                level -= 1;
-                children[level] = child * WIDTH;
-                lanes[level] = self.test(level, child, &test);
-            }
+            level -= 1;
         }
     }
+}
 
-    /// The children of a node that pass `test` and exist: a test may accept empty boxes when the radius
-    /// is infinite.
-    #[inline]
-    fn test(&self, level: usize, node: usize, test: &impl Fn(&Boxes) -> u32) -> u32 {
-        let below = if level == 0 { self.blocks } else { self.starts[level] - self.starts[level - 1] };
-        let children = (below - node * WIDTH).min(WIDTH);
-        test(&self.nodes[self.starts[level] + node]) & ((1 << children) - 1)
+struct Traversal<'a, Q> {
+    tree: &'a PackedTree,
+    query: Q,
+}
+
+impl<Q: Query> Task for Traversal<'_, Q> {
+    #[inline(always)]
+    fn run(self, wide: impl Wide) {
+        self.tree.walk(wide, self.query);
     }
 }
 
@@ -200,19 +245,16 @@ fn arrange(entries: &mut [Entry], capacity: usize) {
 
 /// Moves the `middle` least entries along an axis to the front.
 fn partition<const AXIS: usize>(entries: &mut [Entry], middle: usize) {
-    entries.select_nth_unstable_by(middle, |a, b| {
-        a.centre[AXIS].total_cmp(&b.centre[AXIS]).then(a.index.cmp(&b.index))
-    });
+    entries.select_nth_unstable_by_key(middle, Entry::key::<AXIS>);
 }
 
 fn widest_axis(entries: &[Entry]) -> usize {
-    let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    let (mut min, mut max) = ([u32::MAX; 3], [0; 3]);
     for entry in entries {
         for axis in 0..3 {
-            let x = entry.centre[axis];
-            min[axis] = if x < min[axis] { x } else { min[axis] };
-            max[axis] = if x > max[axis] { x } else { max[axis] };
+            min[axis] = min[axis].min(entry.centre[axis]);
+            max[axis] = max[axis].max(entry.centre[axis]);
         }
     }
-    (Vec3::from(max) - Vec3::from(min)).max_position()
+    (Vec3::from(max.map(number)) - Vec3::from(min.map(number))).max_position()
 }

@@ -3,12 +3,18 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::packed::{PackedTree, WIDTH};
-use super::probe::{BallProbe, RayProbe, bits};
+use super::packed::{Boxes, PackedTree, Query, WIDTH};
+use super::probe::{BallProbe, RayProbe, lanes};
+use super::wide::Wide;
 use crate::ray::Ray;
 
-/// Eight points. An unused lane is NaN, which no comparison accepts.
-type Block = [[f32; WIDTH]; 3];
+/// Eight points; with small payloads two cache lines. An unused lane is NaN, which no comparison accepts.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Block<P> {
+    position: [[f32; WIDTH]; 3],
+    payload: [P; WIDTH],
+}
 
 /// Points with a payload each, for look-ups with any radius.
 ///
@@ -16,9 +22,8 @@ type Block = [[f32; WIDTH]; 3];
 #[derive(Clone, Debug)]
 pub struct PointTree<P> {
     tree: PackedTree,
-    blocks: Vec<Block>,
-    /// In the order of the blocks.
-    payloads: Vec<P>,
+    blocks: Vec<Block<P>>,
+    count: usize,
     dropped: usize,
 }
 
@@ -38,17 +43,19 @@ impl<P: Copy + Send + Sync> PointTree<P> {
             .par_chunks(WIDTH)
             .with_min_len(1024)
             .map(|items| {
-                let mut block = [[f32::NAN; WIDTH]; 3];
+                let payload = points[items[0] as usize].1;
+                let mut block = Block { position: [[f32::NAN; WIDTH]; 3], payload: [payload; WIDTH] };
                 for (lane, &index) in items.iter().enumerate() {
-                    for (axis, x) in points[index as usize].0.to_array().into_iter().enumerate() {
-                        block[axis][lane] = x;
+                    let (position, payload) = points[index as usize];
+                    block.payload[lane] = payload;
+                    for axis in 0..3 {
+                        block.position[axis][lane] = position[axis];
                     }
                 }
                 block
             })
             .collect();
-        let payloads = order.par_iter().with_min_len(8192).map(|&index| points[index as usize].1).collect();
-        Self { tree, blocks, payloads, dropped }
+        Self { tree, blocks, count: points.len(), dropped }
     }
 
     /// Visits every point nearer than `radius` to `centre`, with the squared distance.
@@ -56,62 +63,78 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         if radius.is_nan() || radius <= 0.0 {
             return;
         }
+        let visit = |payload, _, distance2| visit(payload, distance2);
         let probe = BallProbe::exact(centre, radius);
-        let radius2 = radius * radius;
-        self.tree.traverse(
-            |boxes| probe.test(boxes),
-            |index| {
-                let [x, y, z] = &self.blocks[index];
-                let mut distance2 = [0.0; WIDTH];
-                let mut inside = [false; WIDTH];
-                for lane in 0..WIDTH {
-                    let (dx, dy, dz) = (x[lane] - centre.x, y[lane] - centre.y, z[lane] - centre.z);
-                    distance2[lane] = dx * dx + dy * dy + dz * dz;
-                    inside[lane] = distance2[lane] < radius2;
-                }
-                self.report(index, bits(inside), |payload, lane| visit(payload, distance2[lane]));
-            },
-        );
+        self.tree.ask(InBall { points: self, probe, centre, radius2: radius * radius, visit });
     }
 
     /// Visits every point nearer than `radius` to the ray, with the distance `t` along the ray to the foot of
     /// the perpendicular and the squared distance from it. `t` is in `[t_min, t_max)`.
-    #[expect(clippy::needless_bitwise_bool, reason = "branches would keep the loop from being vectorised")]
-    pub fn around_ray(&self, ray: &Ray, radius: f32, mut visit: impl FnMut(P, f32, f32)) {
+    pub fn around_ray(&self, ray: &Ray, radius: f32, visit: impl FnMut(P, f32, f32)) {
         if radius.is_nan() || radius <= 0.0 {
             return;
         }
         let probe = RayProbe::new(ray, radius, self.tree.extent_from(ray.origin));
-        let radius2 = radius * radius;
-        let (origin, direction) = (ray.origin, ray.direction);
-        self.tree.traverse(
-            |boxes| probe.test(boxes),
-            |index| {
-                let [x, y, z] = &self.blocks[index];
-                let mut t = [0.0; WIDTH];
-                let mut distance2 = [0.0; WIDTH];
-                let mut inside = [false; WIDTH];
-                for lane in 0..WIDTH {
-                    // Differences first: dot products of positions cancel far from the origin.
-                    let (dx, dy, dz) = (x[lane] - origin.x, y[lane] - origin.y, z[lane] - origin.z);
-                    t[lane] = dx * direction.x + dy * direction.y + dz * direction.z;
-                    let (dx, dy, dz) =
-                        (dx - t[lane] * direction.x, dy - t[lane] * direction.y, dz - t[lane] * direction.z);
-                    distance2[lane] = dx * dx + dy * dy + dz * dz;
-                    inside[lane] =
-                        (distance2[lane] < radius2) & (t[lane] >= ray.t_min) & (t[lane] < ray.t_max);
-                }
-                self.report(index, bits(inside), |payload, lane| visit(payload, t[lane], distance2[lane]));
-            },
-        );
+        self.tree.ask(AroundRay { points: self, probe, ray: *ray, radius2: radius * radius, visit });
+    }
+}
+
+struct InBall<'a, P, V> {
+    points: &'a PointTree<P>,
+    probe: BallProbe,
+    centre: Vec3,
+    radius2: f32,
+    visit: V,
+}
+
+impl<P: Copy, V: FnMut(P, f32, f32)> Query for InBall<'_, P, V> {
+    #[inline(always)]
+    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+        self.probe.test(wide, boxes)
     }
 
-    #[inline]
-    fn report(&self, block: usize, mut lanes: u32, mut visit: impl FnMut(P, usize)) {
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            visit(self.payloads[block * WIDTH + lane], lane);
+    #[inline(always)]
+    fn block<W: Wide>(&mut self, wide: W, index: usize) {
+        let block = &self.points.blocks[index];
+        let offset = wide.sub3(wide.load3(&block.position), wide.splat3(self.centre.to_array()));
+        let distance2 = wide.dot(offset, offset);
+        let inside = wide.less(distance2, wide.splat(self.radius2));
+        let distance2 = wide.store(distance2);
+        for lane in lanes(inside) {
+            (self.visit)(block.payload[lane], 0.0, distance2[lane]);
+        }
+    }
+}
+
+struct AroundRay<'a, P, V> {
+    points: &'a PointTree<P>,
+    probe: RayProbe,
+    ray: Ray,
+    radius2: f32,
+    visit: V,
+}
+
+impl<P: Copy, V: FnMut(P, f32, f32)> Query for AroundRay<'_, P, V> {
+    #[inline(always)]
+    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+        self.probe.test(wide, boxes)
+    }
+
+    #[inline(always)]
+    fn block<W: Wide>(&mut self, wide: W, index: usize) {
+        let block = &self.points.blocks[index];
+        let direction = wide.splat3(self.ray.direction.to_array());
+        // Differences first: dot products of positions cancel far from the origin.
+        let offset = wide.sub3(wide.load3(&block.position), wide.splat3(self.ray.origin.to_array()));
+        let t = wide.dot(offset, direction);
+        let across = wide.sub3(offset, wide.scale3(direction, t));
+        let distance2 = wide.dot(across, across);
+        let inside = wide.less(distance2, wide.splat(self.radius2))
+            & wide.less_equal(wide.splat(self.ray.t_min), t)
+            & wide.less(t, wide.splat(self.ray.t_max));
+        let (t, distance2) = (wide.store(t), wide.store(distance2));
+        for lane in lanes(inside) {
+            (self.visit)(block.payload[lane], t[lane], distance2[lane]);
         }
     }
 }
@@ -120,13 +143,13 @@ impl<P> PointTree<P> {
     /// The number of points.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.payloads.len()
+        self.count
     }
 
     /// Whether there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.payloads.is_empty()
+        self.count == 0
     }
 
     /// The number of points that were not finite.
@@ -138,8 +161,6 @@ impl<P> PointTree<P> {
     /// Memory in use, bytes.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
-        self.tree.memory_bytes()
-            + self.blocks.capacity() * size_of::<Block>()
-            + self.payloads.capacity() * size_of::<P>()
+        self.tree.memory_bytes() + self.blocks.capacity() * size_of::<Block<P>>()
     }
 }

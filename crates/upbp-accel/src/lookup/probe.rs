@@ -2,21 +2,22 @@
 
 use glam::Vec3;
 
-use super::packed::{Boxes, WIDTH};
+use super::packed::Boxes;
+use super::wide::Wide;
 use crate::ray::Ray;
 
 /// Rounding of the tests on items, as a multiple of the greatest distance in their computation: what an
 /// item's test accepts in single precision, its box must not lose.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
-/// Collects one bit per lane.
-#[inline]
-pub(super) fn bits(lanes: [bool; WIDTH]) -> u32 {
-    let mut bits = 0;
-    for (lane, &set) in lanes.iter().enumerate() {
-        bits |= u32::from(set) << lane;
-    }
-    bits
+/// The lanes whose bit is set.
+#[inline(always)]
+pub(super) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
+        bits &= bits - 1;
+        Some(lane)
+    })
 }
 
 /// A ray with a radius.
@@ -47,10 +48,10 @@ impl RayProbe {
     ///
     /// A zero component of the direction gives infinite distances, or NaN for a plane that holds the origin.
     /// The comparisons are written so that a NaN does not constrain.
-    #[inline]
-    pub(super) fn test(&self, boxes: &Boxes) -> u32 {
-        let mut near = [self.t_min; WIDTH];
-        let mut far = [self.t_max; WIDTH];
+    #[inline(always)]
+    pub(super) fn test<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+        let mut near = wide.splat(self.t_min);
+        let mut far = wide.splat(self.t_max);
         for axis in 0..3 {
             let negative = self.negative[axis];
             let (enter, exit) = if negative {
@@ -58,20 +59,14 @@ impl RayProbe {
             } else {
                 (&boxes.min[axis], &boxes.max[axis])
             };
-            let outwards = if negative { self.radius } else { -self.radius };
-            let (origin, inverse) = (self.origin[axis], self.inverse[axis]);
-            for lane in 0..WIDTH {
-                let from = (enter[lane] - origin + outwards) * inverse;
-                let to = (exit[lane] - origin - outwards) * inverse;
-                near[lane] = if from > near[lane] { from } else { near[lane] };
-                far[lane] = if to < far[lane] { to } else { far[lane] };
-            }
+            let outwards = wide.splat(if negative { self.radius } else { -self.radius });
+            let (origin, inverse) = (wide.splat(self.origin[axis]), wide.splat(self.inverse[axis]));
+            let from = wide.mul(wide.add(wide.sub(wide.load(enter), origin), outwards), inverse);
+            let to = wide.mul(wide.sub(wide.sub(wide.load(exit), origin), outwards), inverse);
+            near = wide.greater_of(from, near);
+            far = wide.less_of(to, far);
         }
-        let mut met = [false; WIDTH];
-        for lane in 0..WIDTH {
-            met[lane] = near[lane] <= far[lane];
-        }
-        bits(met)
+        wide.less_equal(near, far)
     }
 }
 
@@ -93,19 +88,16 @@ impl BallProbe {
     }
 
     /// The boxes that overlap the ball.
-    #[inline]
-    pub(super) fn test(&self, boxes: &Boxes) -> u32 {
-        let mut distance2 = [0.0_f32; WIDTH];
+    #[inline(always)]
+    pub(super) fn test<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+        let (mut distance2, zero) = (wide.splat(0.0), wide.splat(0.0));
         for axis in 0..3 {
-            let centre = self.centre[axis];
-            let (min, max) = (&boxes.min[axis], &boxes.max[axis]);
-            for ((sum, min), max) in distance2.iter_mut().zip(min).zip(max) {
-                let (below, above) = (min - centre, centre - max);
-                let outside = if below > above { below } else { above };
-                let outside = if outside > 0.0 { outside } else { 0.0 };
-                *sum += outside * outside;
-            }
+            let centre = wide.splat(self.centre[axis]);
+            let below = wide.sub(wide.load(&boxes.min[axis]), centre);
+            let above = wide.sub(centre, wide.load(&boxes.max[axis]));
+            let outside = wide.greater_of(wide.greater_of(below, above), zero);
+            distance2 = wide.add(distance2, wide.mul(outside, outside));
         }
-        bits(distance2.map(|distance2| distance2 <= self.radius2))
+        wide.less_equal(distance2, wide.splat(self.radius2))
     }
 }

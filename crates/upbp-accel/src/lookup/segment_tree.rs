@@ -3,14 +3,17 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::approach::{ClosestApproach, Lines, PARALLEL_SIN2, Segment, closest_approach};
-use super::packed::{PackedTree, WIDTH};
-use super::probe::{BallProbe, RayProbe, bits};
+use super::approach::{ClosestApproach, Segment, closest_approach};
+use super::packed::{Boxes, PackedTree, Query, WIDTH};
+use super::probe::{BallProbe, RayProbe, lanes};
 use super::split::{Piece, SplitParams, split};
+use super::wide::Wide;
 use crate::ray::Ray;
 
-/// Eight pieces. An unused lane is NaN, which no comparison accepts.
+/// Eight pieces; what most of them fail by is in three cache lines. An unused lane is NaN, which no comparison
+/// accepts.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 struct Block {
     origin: [[f32; WIDTH]; 3],
     direction: [[f32; WIDTH]; 3],
@@ -101,77 +104,90 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
     /// [`closest_approach`](crate::closest_approach).
     ///
     /// Among lines that are parallel within rounding, a hit at the very end of the ray's range may be missed.
-    #[expect(clippy::needless_bitwise_bool, reason = "branches would keep the loop from being vectorised")]
-    pub fn around_ray(&self, ray: &Ray, radius: f32, mut visit: impl FnMut(P, ClosestApproach)) {
+    pub fn around_ray(&self, ray: &Ray, radius: f32, visit: impl FnMut(P, ClosestApproach)) {
         if radius.is_nan() || radius <= 0.0 {
             return;
         }
         let probe = RayProbe::new(ray, radius, self.tree.extent_from(ray.origin) + self.reach);
-        // Squares lose the last bits; the decision is made once more below.
-        let radius2 = radius * radius * 1.000_01;
-        let (o, d) = (ray.origin, ray.direction.to_array());
-        self.tree.traverse(
-            |boxes| probe.test(boxes),
-            |index| {
-                let block = &self.blocks[index];
-                let mut inside = [false; WIDTH];
-                for (lane, inside) in inside.iter_mut().enumerate() {
-                    let between = [
-                        block.origin[0][lane] - o.x,
-                        block.origin[1][lane] - o.y,
-                        block.origin[2][lane] - o.z,
-                    ];
-                    let direction =
-                        [block.direction[0][lane], block.direction[1][lane], block.direction[2][lane]];
-                    let lines = Lines::solve(d, direction, between);
-                    *inside = (lines.volume * lines.volume * lines.inverse_sin2 <= radius2)
-                        & (lines.t_segment >= block.start[lane])
-                        & (lines.t_segment < block.end[lane])
-                        & (lines.t_ray >= ray.t_min)
-                        & (lines.t_ray < ray.t_max)
-                        & (lines.sin2 >= PARALLEL_SIN2);
-                }
-                for lane in lanes(bits(inside)) {
-                    if let Some(approach) = closest_approach(ray, &block.piece(lane), radius) {
-                        visit(self.payloads[block.segment[lane] as usize], approach);
-                    }
-                }
-            },
-        );
+        self.tree.ask(AroundRay { segments: self, probe, ray: *ray, radius, visit });
     }
 
     /// Visits every segment nearer than `radius` to `point`, with the distance along the segment, from its
     /// origin, to the foot of the perpendicular, and the squared distance from it. The foot is in
     /// `[start, end)`.
-    #[expect(clippy::needless_bitwise_bool, reason = "branches would keep the loop from being vectorised")]
-    pub fn around_point(&self, point: Vec3, radius: f32, mut visit: impl FnMut(P, f32, f32)) {
+    pub fn around_point(&self, point: Vec3, radius: f32, visit: impl FnMut(P, f32, f32)) {
         if radius.is_nan() || radius <= 0.0 {
             return;
         }
         let probe = BallProbe::widened(point, radius, self.tree.extent_from(point) + self.reach);
-        let radius2 = radius * radius;
-        self.tree.traverse(
-            |boxes| probe.test(boxes),
-            |index| {
-                let block = &self.blocks[index];
-                let ([ox, oy, oz], [dx, dy, dz]) = (&block.origin, &block.direction);
-                let mut t = [0.0; WIDTH];
-                let mut distance2 = [0.0; WIDTH];
-                let mut inside = [false; WIDTH];
-                for lane in 0..WIDTH {
-                    let (x, y, z) = (point.x - ox[lane], point.y - oy[lane], point.z - oz[lane]);
-                    t[lane] = x * dx[lane] + y * dy[lane] + z * dz[lane];
-                    let (x, y, z) = (x - t[lane] * dx[lane], y - t[lane] * dy[lane], z - t[lane] * dz[lane]);
-                    distance2[lane] = x * x + y * y + z * z;
-                    inside[lane] = (distance2[lane] < radius2)
-                        & (t[lane] >= block.start[lane])
-                        & (t[lane] < block.end[lane]);
-                }
-                for lane in lanes(bits(inside)) {
-                    visit(self.payloads[block.segment[lane] as usize], t[lane], distance2[lane]);
-                }
-            },
-        );
+        self.tree.ask(AroundPoint { segments: self, probe, point, radius2: radius * radius, visit });
+    }
+}
+
+struct AroundRay<'a, P, V> {
+    segments: &'a SegmentTree<P>,
+    probe: RayProbe,
+    ray: Ray,
+    radius: f32,
+    visit: V,
+}
+
+impl<P: Copy, V: FnMut(P, ClosestApproach)> Query for AroundRay<'_, P, V> {
+    #[inline(always)]
+    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+        self.probe.test(wide, boxes)
+    }
+
+    #[inline(always)]
+    fn block<W: Wide>(&mut self, wide: W, index: usize) {
+        let block = &self.segments.blocks[index];
+        let direction = wide.load3(&block.direction);
+        let between = wide.sub3(wide.load3(&block.origin), wide.splat3(self.ray.origin.to_array()));
+        let normal = wide.cross(wide.splat3(self.ray.direction.to_array()), direction);
+        let volume = wide.dot(between, normal);
+        let sin2 = wide.dot(normal, normal);
+        // The distance between the lines, without a division. Squares lose the last bits, or vanish; the decision
+        // is made once more below.
+        let radius2 = wide.splat(self.radius * self.radius * 1.000_01);
+        let limit = wide.add(wide.mul(radius2, sin2), wide.splat(f32::MIN_POSITIVE));
+        let near = wide.less_equal(wide.mul(volume, volume), limit);
+        for lane in lanes(near) {
+            if let Some(approach) = closest_approach(&self.ray, &block.piece(lane), self.radius) {
+                (self.visit)(self.segments.payloads[block.segment[lane] as usize], approach);
+            }
+        }
+    }
+}
+
+struct AroundPoint<'a, P, V> {
+    segments: &'a SegmentTree<P>,
+    probe: BallProbe,
+    point: Vec3,
+    radius2: f32,
+    visit: V,
+}
+
+impl<P: Copy, V: FnMut(P, f32, f32)> Query for AroundPoint<'_, P, V> {
+    #[inline(always)]
+    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+        self.probe.test(wide, boxes)
+    }
+
+    #[inline(always)]
+    fn block<W: Wide>(&mut self, wide: W, index: usize) {
+        let block = &self.segments.blocks[index];
+        let direction = wide.load3(&block.direction);
+        let offset = wide.sub3(wide.splat3(self.point.to_array()), wide.load3(&block.origin));
+        let t = wide.dot(offset, direction);
+        let across = wide.sub3(offset, wide.scale3(direction, t));
+        let distance2 = wide.dot(across, across);
+        let inside = wide.less(distance2, wide.splat(self.radius2))
+            & wide.less_equal(wide.load(&block.start), t)
+            & wide.less(t, wide.load(&block.end));
+        let (t, distance2) = (wide.store(t), wide.store(distance2));
+        for lane in lanes(inside) {
+            (self.visit)(self.segments.payloads[block.segment[lane] as usize], t[lane], distance2[lane]);
+        }
     }
 }
 
@@ -207,15 +223,6 @@ impl<P> SegmentTree<P> {
             + self.blocks.capacity() * size_of::<Block>()
             + self.payloads.capacity() * size_of::<P>()
     }
-}
-
-/// The lanes whose bit is set.
-fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
-        bits &= bits - 1;
-        Some(lane)
-    })
 }
 
 /// The box of a piece, rounded outwards: far from the origin the ends are coarser than a radius may be.
