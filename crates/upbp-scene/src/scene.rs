@@ -200,7 +200,7 @@ impl Scene for ReadyScene {
             let (min, max) = body.aabb;
             let near = min.cmple(point).all() && point.cmple(max).all();
             if near && self.geometry.shape(body.shape).contains(point) == Some(true) {
-                // More bodies than a stack holds: the walks count those that they cannot enter.
+                // More bodies than a stack holds: the walks count the contradictions that follow.
                 let _ = stack.enter(body.interior);
             }
         }
