@@ -17,7 +17,7 @@ use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::scene::Scene;
 use upbp_estimators::walk::{
-    Context, LightChunk, Passage, Scratch, Site, trace_camera_path, trace_light_path,
+    Context, Extent, LightChunk, Passage, Scratch, Site, trace_camera_path, trace_light_path,
 };
 use upbp_estimators::{
     Counters, Kernel, Kernels, LightMap, PathLengths, Plan, PlanChoices, Stream, StreamKind, Technique,
@@ -356,7 +356,8 @@ fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
         let mut point = || 3.0 * Vec3::new(random.uniform(), random.uniform(), random.uniform()) - 1.5;
         let (from, towards) = (point(), point());
         let direction = (towards - from).normalize();
-        passage.trace(&scene, from, direction, &scene.stack_at(from));
+        let mut walk = Stream::new(2, 0, StreamKind::Camera, 0);
+        passage.trace(&scene, from, direction, &scene.stack_at(from), Extent::ToSurface, &mut walk);
         for span in &passage.spans {
             let t = span.start + (span.end.min(10.0) - span.start) * random.uniform();
             let found = passage.stack_in(span, t);

@@ -165,7 +165,9 @@ fn intersections_lie_on_the_surface() {
                 assert!(across < 1e-5 * scale, "{across} off at scale {scale}");
                 assert!((point.geometric_normal.length() - 1.0).abs() < 1e-6);
                 assert_eq!(point.shading_normal, point.geometric_normal);
-                assert!(point.uv.iter().all(|u| (-1e-6..=1.0 + 1e-6).contains(u)), "{:?}", point.uv);
+                let uv = scene.uv(&hit, &point);
+                assert!(uv.iter().all(|u| (-1e-6..=1.0 + 1e-6).contains(u)), "{uv:?}");
+                assert_eq!(scene.is_entering(&ray, &hit), point.geometric_normal.dot(ray.direction) < 0.0);
             }
         }
     }

@@ -178,6 +178,13 @@ impl Plan {
         self.mis.volume.iter().any(|v| v.bp2d > 0.0 || v.bb1d > 0.0)
     }
 
+    /// Whether camera sub-paths are query beams beyond where they stop.
+    #[must_use]
+    pub fn has_long_query_beams(&self) -> bool {
+        self.mis.query_beams == BeamExtent::Long
+            && self.mis.volume.iter().any(|v| v.pb2d > 0.0 || v.bb1d > 0.0)
+    }
+
     /// Whether light sub-paths are of any use.
     #[must_use]
     pub fn needs_light_paths(&self) -> bool {

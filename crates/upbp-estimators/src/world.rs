@@ -13,6 +13,7 @@ pub struct World<'a, S: Scene> {
     selection: Selection,
     environments: Vec<EmitterId>,
     camera_stack: Option<MediumStack>,
+    emitting_media: bool,
 }
 
 impl<'a, S: Scene> World<'a, S> {
@@ -69,7 +70,9 @@ impl<'a, S: Scene> World<'a, S> {
                 camera.ray(centre, [0.5; 2]).map(|ray| scene.stack_at(ray.origin))
             })
             .flatten();
-        Ok(Self { scene, bounds, selection: Selection::new(&powers), environments, camera_stack })
+        let emitting_media = scene.media().iter().any(Medium::emits);
+        let selection = Selection::new(&powers);
+        Ok(Self { scene, bounds, selection, environments, camera_stack, emitting_media })
     }
 
     /// Chooses an emitter by power; returns its probability. `None` without light.
@@ -94,6 +97,12 @@ impl<'a, S: Scene> World<'a, S> {
     #[must_use]
     pub fn has_emitters(&self) -> bool {
         self.selection.total > 0.0
+    }
+
+    /// Whether any medium emits light.
+    #[must_use]
+    pub const fn has_emitting_media(&self) -> bool {
+        self.emitting_media
     }
 
     /// The bodies around a point of the lens.

@@ -43,6 +43,9 @@ pub trait Medium: Send + Sync {
     ///
     /// `u_channel` and `u_distance` are uniform in `[0, 1)`. With `u_distance = 0` a walk may stop
     /// exactly at the start.
+    ///
+    /// The end may be infinite, even in a medium that fills a finite body: the walks ask before they know where the body
+    /// ends. Up to rounding the distance must not depend on the end, but for the `None` of one that is not reached.
     fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32>;
 
     /// Scattering coefficient at `position`, in inverse scene units.

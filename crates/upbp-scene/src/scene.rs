@@ -5,7 +5,7 @@
 //! coincide are all found.
 
 use glam::Vec3;
-use upbp_accel::{Candidate, Ray, SceneGeometry, Shape, ShapeId, Visit};
+use upbp_accel::{Candidate, Ray, SceneGeometry, ShapeId, Visit};
 use upbp_estimators::scene::{BoundingSphere, Crossing, EmitterId, Hit, Scene};
 use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
 
@@ -83,16 +83,8 @@ impl ReadyScene {
         }
     }
 
-    /// Whether the ray goes into the body whose surface it meets.
-    fn is_entering(&self, ray: &Ray, candidate: &Candidate) -> bool {
-        match self.geometry.shape(candidate.shape) {
-            Shape::Sphere(_) => candidate.primitive == 0,
-            _ => self.geometry.surface(ray, candidate).geometric_normal.dot(ray.direction) < 0.0,
-        }
-    }
-
     fn crossing(&self, ray: &Ray, candidate: &Candidate, interior: Interior, scatters: bool) -> Crossing {
-        Crossing { t: candidate.t, interior, entering: self.is_entering(ray, candidate), scatters }
+        Crossing { t: candidate.t, interior, entering: self.geometry.is_entering(ray, candidate), scatters }
     }
 }
 

@@ -7,7 +7,7 @@
 use std::ops::{ControlFlow, Range};
 use std::time::Duration;
 
-use glam::{Vec3, Vec3A};
+use glam::{BVec3A, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
@@ -17,12 +17,13 @@ use crate::ray::Ray;
 /// Widens a slab's far end by the rounding of a difference, a reciprocal and a product, twice over.
 const SLAB_MARGIN: f32 = 1.0 + 8.0 * f32::EPSILON;
 
+/// Aligned vectors: a slab test is a handful of vector instructions.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    min: Vec3,
+    min: Vec3A,
+    max: Vec3A,
     /// First primitive of a leaf, first of two children otherwise.
     first: u32,
-    max: Vec3,
     /// Number of primitives; zero for an inner node.
     count: u32,
 }
@@ -60,7 +61,7 @@ impl Bvh {
             .iter()
             .map(|node| {
                 let aabb = node.aabb();
-                let (min, max) = (Vec3::from(aabb.min), Vec3::from(aabb.max));
+                let (min, max) = (aabb.min, aabb.max);
                 if !node.is_leaf() {
                     return Node { min, first: node.first_index, max, count: 0 };
                 }
@@ -154,17 +155,18 @@ fn group_by_centre(boxes: &[(Vec3, Vec3)]) -> (Vec<u32>, Vec<Group>) {
 
 /// A ray, prepared for tests against boxes.
 struct Slabs {
-    origin: Vec3,
-    inverse: Vec3,
-    negative: [bool; 3],
+    origin: Vec3A,
+    inverse: Vec3A,
+    /// Axes along which the ray goes down.
+    negative: BVec3A,
     t_min: f32,
 }
 
 impl Slabs {
     fn new(ray: &Ray) -> Self {
-        let inverse = ray.direction.recip();
-        let negative = inverse.to_array().map(f32::is_sign_negative);
-        Self { origin: ray.origin, inverse, negative, t_min: ray.t_min }
+        let inverse = Vec3A::from(ray.direction).recip();
+        let negative = BVec3A::from_array(inverse.to_array().map(f32::is_sign_negative));
+        Self { origin: ray.origin.into(), inverse, negative, t_min: ray.t_min }
     }
 
     /// Where the ray enters the box, if it does before `t_max`.
@@ -174,30 +176,28 @@ impl Slabs {
     /// lies in a face, or in a box without thickness, meets it.
     #[inline]
     fn entry(&self, node: &Node, t_max: f32) -> Option<f32> {
-        let below = (node.min - self.origin) * self.inverse;
-        let above = (node.max - self.origin) * self.inverse;
-        let (mut near, mut far) = (self.t_min, t_max);
-        for (axis, &negative) in self.negative.iter().enumerate() {
-            let (enter, exit) =
-                if negative { (above[axis], below[axis]) } else { (below[axis], above[axis]) };
-            let exit = exit * SLAB_MARGIN;
-            near = if enter > near { enter } else { near };
-            far = if exit < far { exit } else { far };
-        }
+        let (near, far) = (Vec3A::splat(self.t_min), Vec3A::splat(t_max));
+        let enter = (Vec3A::select(self.negative, node.max, node.min) - self.origin) * self.inverse;
+        let exit = (Vec3A::select(self.negative, node.min, node.max) - self.origin) * self.inverse;
+        let exit = exit * SLAB_MARGIN;
+        let near = Vec3A::select(enter.cmpgt(near), enter, near).max_element();
+        let far = Vec3A::select(exit.cmplt(far), exit, far).min_element();
         (near <= far).then_some(near)
     }
 }
 
 /// A stack that lives in an array and moves to the heap when a hierarchy is deeper than usual.
+///
+/// Short, because every ray clears it: depth grows with the logarithm of the number of primitives.
 struct Stack {
-    array: [(u32, f32); 64],
+    array: [(u32, f32); 24],
     length: usize,
     spilled: Vec<(u32, f32)>,
 }
 
 impl Stack {
     fn new() -> Self {
-        Self { array: [(0, 0.0); 64], length: 0, spilled: Vec::new() }
+        Self { array: [(0, 0.0); 24], length: 0, spilled: Vec::new() }
     }
 
     #[inline]

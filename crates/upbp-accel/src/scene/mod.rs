@@ -28,7 +28,7 @@ pub struct Candidate {
     /// side), 0 where a line enters a sphere and 1 where it leaves, 0 for a quad.
     pub primitive: u32,
     /// Where on a quad (`[0, 1]²`), or the weights of the second and third corner of a triangle. Zero
-    /// for spheres and boxes: see [`SurfacePoint::uv`].
+    /// for spheres and boxes: see [`SceneGeometry::uv`].
     pub uv: [f32; 2],
 }
 
@@ -53,9 +53,6 @@ pub struct SurfacePoint {
     pub geometric_normal: Vec3,
     /// Interpolated unit normal, in the hemisphere of the geometric one.
     pub shading_normal: Vec3,
-    /// Azimuth and polar angle of a sphere around y, coordinates on a quad or on a box's face, all in
-    /// `[0, 1]`; weights of the second and third corner of a triangle.
-    pub uv: [f32; 2],
 }
 
 /// The shapes of a scene, ready for rays.
@@ -65,6 +62,8 @@ pub struct SceneGeometry {
     bvh: Bvh,
     /// Primitives in the order of the hierarchy's leaves.
     items: Vec<Item>,
+    /// Whether there is any mesh: a ray is prepared for triangles only then.
+    triangles: bool,
 }
 
 impl SceneGeometry {
@@ -77,7 +76,8 @@ impl SceneGeometry {
         let boxes: Vec<(Vec3, Vec3)> = items.iter().map(Item::aabb).collect();
         let (bvh, order) = Bvh::build(&boxes);
         let items = order.iter().map(|&index| items[index as usize]).collect();
-        Ok(Self { shapes, bvh, items })
+        let triangles = shapes.iter().any(|shape| matches!(shape, Shape::Mesh(_)));
+        Ok(Self { shapes, bvh, items, triangles })
     }
 
     /// The least and the greatest coordinates; both zero for an empty scene.
@@ -108,7 +108,7 @@ impl SceneGeometry {
     /// Spheres and boxes report where the line enters and where it leaves. The visitor may shorten the ray
     /// or stop.
     pub fn for_each_hit(&self, ray: Ray, mut visit: impl FnMut(&Candidate) -> Visit) {
-        let probe = primitive::Probe::new(&ray);
+        let probe = primitive::Probe::new(&ray, self.triangles);
         self.bvh.traverse(&ray, |range, t_max| {
             for item in &self.items[range] {
                 let hits = probe.intersect(item);
@@ -159,17 +159,15 @@ impl SceneGeometry {
         match self.shape(candidate.shape) {
             Shape::Sphere(sphere) => {
                 let outwards = (along - sphere.centre().as_dvec3()).normalize();
-                let normal = outwards.as_vec3();
-                flat(sphere.on_surface(outwards), normal, Sphere::uv(normal))
+                flat(sphere.on_surface(outwards), outwards.as_vec3())
             }
             Shape::Quad(quad) => {
                 let (position, normal) = quad.sample_area(candidate.uv);
-                flat(position, normal, candidate.uv)
+                flat(position, normal)
             }
             Shape::Box(axis_box) => {
                 let position = axis_box.on_face(candidate.primitive, along.as_vec3());
-                let uv = axis_box.uv(candidate.primitive, position);
-                flat(position, AxisBox::face_normal(candidate.primitive), uv)
+                flat(position, AxisBox::face_normal(candidate.primitive))
             }
             Shape::Mesh(mesh) => {
                 let [b, c] = candidate.uv;
@@ -178,14 +176,43 @@ impl SceneGeometry {
                     position: mesh.point(candidate.primitive, b as f64, c as f64),
                     geometric_normal,
                     shading_normal: mesh.shading_normal(candidate.primitive, b, c, geometric_normal),
-                    uv: candidate.uv,
                 }
             }
+        }
+    }
+
+    /// Whether `ray` meets the surface of an intersection from its front, the side of the geometric normal: goes into
+    /// a closed shape.
+    ///
+    /// # Panics
+    /// If the candidate does not belong to this scene.
+    #[must_use]
+    pub fn is_entering(&self, ray: &Ray, candidate: &Candidate) -> bool {
+        let normal = match self.shape(candidate.shape) {
+            Shape::Sphere(_) => return candidate.primitive == 0,
+            Shape::Quad(quad) => quad.normal(),
+            Shape::Box(_) => AxisBox::face_normal(candidate.primitive),
+            Shape::Mesh(mesh) => mesh.geometric_normal(candidate.primitive),
+        };
+        normal.dot(ray.direction) < 0.0
+    }
+
+    /// Coordinates of a point of a surface: azimuth and polar angle of a sphere around y, coordinates on a quad or on a
+    /// box's face, all in `[0, 1]`; weights of the second and third corner of a triangle.
+    ///
+    /// # Panics
+    /// If the candidate does not belong to this scene.
+    #[must_use]
+    pub fn uv(&self, candidate: &Candidate, point: &SurfacePoint) -> [f32; 2] {
+        match self.shape(candidate.shape) {
+            Shape::Sphere(_) => Sphere::uv(point.geometric_normal),
+            Shape::Box(axis_box) => axis_box.uv(candidate.primitive, point.position),
+            Shape::Quad(_) | Shape::Mesh(_) => candidate.uv,
         }
     }
 }
 
 /// A point of a surface that is shaded as it is.
-fn flat(position: Vec3, normal: Vec3, uv: [f32; 2]) -> SurfacePoint {
-    SurfacePoint { position, geometric_normal: normal, shading_normal: normal, uv }
+fn flat(position: Vec3, normal: Vec3) -> SurfacePoint {
+    SurfacePoint { position, geometric_normal: normal, shading_normal: normal }
 }

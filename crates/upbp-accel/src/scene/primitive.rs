@@ -58,12 +58,13 @@ impl Item {
 pub(super) struct Probe {
     origin: Vec3,
     direction: Vec3,
-    shear: RayShear,
+    /// Only where there are triangles.
+    shear: Option<RayShear>,
 }
 
 impl Probe {
-    pub(super) fn new(ray: &Ray) -> Self {
-        let shear = RayShear::new(ray.origin, ray.direction);
+    pub(super) fn new(ray: &Ray, triangles: bool) -> Self {
+        let shear = triangles.then(|| RayShear::new(ray.origin, ray.direction));
         Self { origin: ray.origin, direction: ray.direction, shear }
     }
 
@@ -74,10 +75,12 @@ impl Probe {
             Some(Candidate { t: t as f32, shape: item.shape, primitive, uv })
         };
         match &item.geometry {
-            Geometry::Triangle(corners) => match self.shear.intersect(*corners) {
-                Some(hit) => [at(hit.t, item.primitive, hit.weights), None],
-                None => [None, None],
-            },
+            Geometry::Triangle(corners) => {
+                match self.shear.as_ref().and_then(|shear| shear.intersect(*corners)) {
+                    Some(hit) => [at(hit.t, item.primitive, hit.weights), None],
+                    None => [None, None],
+                }
+            }
             Geometry::Quad(quad) => match quad.intersect(self.origin, self.direction) {
                 Some((t, uv)) => [at(t, 0, uv), None],
                 None => [None, None],

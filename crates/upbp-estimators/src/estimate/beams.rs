@@ -14,12 +14,11 @@ use crate::scene::{Scene, Walk};
 use crate::technique::Technique;
 use crate::walk::{Context, Output, Passage, PhotonBeam, QueryEdge, Site, Span};
 
-/// The merges along an edge of the camera sub-path, through all its media. A short query beam ends at `stop`.
+/// The merges along an edge of the camera sub-path, through all its media. A short query beam ends where the walk stops.
 pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf>,
     passage: &Passage<S::Bsdf>,
-    stop: Option<(usize, f32)>,
     edge: &QueryEdge,
     out: &mut Output<'_, O>,
 ) {
@@ -29,7 +28,7 @@ pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf>>(
         return;
     }
     let stop = match plan.mis.query_beams {
-        BeamExtent::Short => stop,
+        BeamExtent::Short => passage.stop,
         BeamExtent::Long => None,
     };
     for (i, span) in passage.spans.iter().enumerate() {

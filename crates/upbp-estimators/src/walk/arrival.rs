@@ -1,34 +1,13 @@
 //! The end of an edge, the same for both walks: where it stops, what is there, what it passes on.
 
 use glam::Vec3;
-use upbp_media::{EdgeDensity, Medium};
+use upbp_media::EdgeDensity;
 
 use super::context::Context;
 use super::passage::Passage;
 use super::site::{Scattered, Sides, Site};
 use crate::mis::{MergeSite, Pending, Tip};
-use crate::random::Stream;
 use crate::scene::Scene;
-
-/// Where a walk stops in a medium: the index of the span and the distance.
-pub(super) fn sample_stop<S: Scene>(
-    scene: &S,
-    passage: &Passage<S::Bsdf>,
-    stream: &mut Stream,
-) -> Option<(usize, f32)> {
-    for (i, span) in passage.spans.iter().enumerate() {
-        let Some(medium) = span.medium else { continue };
-        let medium = &scene.media()[medium.0 as usize];
-        if !medium.scatters() {
-            continue;
-        }
-        let [u_channel, u_distance] = stream.pair();
-        if let Some(t) = medium.sample_distance(&passage.segment(span, span.end), u_channel, u_distance) {
-            return Some((i, t));
-        }
-    }
-    None
-}
 
 /// The end of an edge.
 pub(super) struct Arrived<B> {
@@ -55,12 +34,8 @@ pub(super) enum Arrival<B> {
     Lost,
 }
 
-pub(super) fn arrive<S: Scene>(
-    scene: &S,
-    passage: &Passage<S::Bsdf>,
-    stop: Option<(usize, f32)>,
-) -> Arrival<S::Bsdf> {
-    if let Some((i, t)) = stop {
+pub(super) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival<S::Bsdf> {
+    if let Some((i, t)) = passage.stop {
         let span = &passage.spans[i];
         let Some(medium) = span.medium else { return Arrival::Lost };
         let position = passage.origin + t * passage.direction;

@@ -3,8 +3,9 @@
 use glam::{Vec2, Vec3};
 use upbp_media::Spectrum;
 
-use super::arrival::{Arrival, arrive, pend, sample_stop};
+use super::arrival::{Arrival, arrive, pend};
 use super::context::{Context, Scratch};
+use super::passage::Extent;
 use super::site::{Sides, Site};
 use super::visibility::ray_origin;
 use crate::counters::Counters;
@@ -89,6 +90,11 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
     let Some(ray) = scene.camera().ray(film, stream.pair()) else { return walk };
     observer.camera_end(ray.origin, ray.direction, ray.pdf);
     let mut out = Output { layers: &mut walk.layers, counters, observer };
+    let extent = if plan.has_long_query_beams() || (plan.mis.hit > 0.0 && world.has_emitting_media()) {
+        Extent::ToSurface
+    } else {
+        Extent::ToStop
+    };
     let mut stack = world.stack_at_camera(ray.origin);
     let mut origin = ray.origin;
     let mut direction = ray.direction;
@@ -102,14 +108,13 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
         edge.depth = depth;
-        scratch.passage.trace(scene, origin, direction, &stack);
+        scratch.passage.trace(scene, origin, direction, &stack, extent, &mut stream);
         out.counters.boundary_conflicts += scratch.passage.take_conflicts();
         let passage = &scratch.passage;
         estimate::emission_along(context, passage, &edge, &mut out);
-        let stop = sample_stop(scene, passage, &mut stream);
-        estimate::along_beam(context, map, passage, stop, &edge, &mut out);
+        estimate::along_beam(context, map, passage, &edge, &mut out);
 
-        let arrived = match arrive(scene, passage, stop) {
+        let arrived = match arrive(scene, passage) {
             Arrival::Vertex(arrived) => arrived,
             Arrival::Escaped => {
                 estimate::environment(context, passage, &edge, &mut out);

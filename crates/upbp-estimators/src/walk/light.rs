@@ -4,9 +4,9 @@ use glam::Vec3;
 use upbp_accel::{Segment, offset_origin};
 use upbp_media::{MediumStack, Spectrum};
 
-use super::arrival::{Arrival, Arrived, arrive, pend, sample_stop};
+use super::arrival::{Arrival, Arrived, arrive, pend};
 use super::context::{Context, Scratch};
-use super::passage::{Passage, Span};
+use super::passage::{Extent, Passage, Span};
 use super::photon::{EdgeSource, LightChunk, LightVertex, PhotonBeam};
 use super::visibility::ray_origin;
 use crate::estimate::light_tracing;
@@ -42,19 +42,23 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
     let scene = world.scene;
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
+    let extent = if leaves_beams && plan.mis.photon_beams == BeamExtent::Long {
+        Extent::ToSurface
+    } else {
+        Extent::ToStop
+    };
 
     // The shortest completion adds one edge, by light tracing or a merge on the camera's first edge.
     for depth in 1..plan.lengths.max {
         out.counters.light_edges += 1;
         let passage = &mut scratch.passage;
-        passage.trace(scene, flight.origin, flight.direction, &flight.stack);
+        passage.trace(scene, flight.origin, flight.direction, &flight.stack, extent, &mut stream);
         out.counters.boundary_conflicts += passage.take_conflicts();
-        let stop = sample_stop(scene, passage, &mut stream);
         if leaves_beams {
-            store_beams(context, passage, stop, &flight, depth, index, out);
+            store_beams(context, passage, &flight, depth, index, out);
         }
 
-        let arrival = match arrive(scene, passage, stop) {
+        let arrival = match arrive(scene, passage) {
             Arrival::Vertex(arrival) => arrival,
             Arrival::Escaped | Arrival::Absorbed => return,
             Arrival::Lost => {
@@ -162,16 +166,18 @@ fn emit<S: Scene, O: Observer<S::Bsdf>>(
 fn store_beams<S: Scene>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
-    stop: Option<(usize, f32)>,
     flight: &Flight,
     depth: u32,
     path: u32,
     out: &mut LightChunk<S::Bsdf>,
 ) {
     let Context { world, plan } = *context;
-    let short = plan.mis.photon_beams == BeamExtent::Short;
+    let stop = match plan.mis.photon_beams {
+        BeamExtent::Short => passage.stop,
+        BeamExtent::Long => None,
+    };
     for (i, span) in passage.spans.iter().enumerate() {
-        if let Some(end) = beam_end(world, passage, span, if short { stop } else { None }, i)
+        if let Some(end) = beam_end(world, passage, span, stop, i)
             && let Some(medium) = span.medium
         {
             let merges = plan.mis.merges_in(medium);
@@ -195,7 +201,7 @@ fn store_beams<S: Scene>(
                 });
             }
         }
-        if short && stop.is_some_and(|(last, _)| last == i) {
+        if stop.is_some_and(|(last, _)| last == i) {
             break;
         }
     }

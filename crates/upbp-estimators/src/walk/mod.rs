@@ -13,7 +13,7 @@ pub use camera::{CameraWalk, trace_camera_path};
 pub(crate) use camera::{Output, QueryEdge, QueryVertex};
 pub use context::{Context, Scratch};
 pub use light::trace_light_path;
-pub use passage::{Passage, Span};
+pub use passage::{Extent, Passage, Span};
 pub use photon::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
 pub use site::{Evaluation, Scattered, Sides, Site, SurfaceSite};
 pub(crate) use visibility::ray_origin;

@@ -1,12 +1,25 @@
-//! The way of a ray from a vertex to the next surface, as a list of stretches inside one medium each.
+//! The way of a ray from a vertex to the next surface, as a list of stretches inside one medium each, and where on it a walk
+//! stops.
 //!
-//! Index-matched boundaries are not vertices: they cut an edge into segments (`docs/theory.md`, section 1.7).
+//! Index-matched boundaries are not vertices: they cut an edge into segments (`docs/theory.md`, section 1.7). In a dense
+//! medium a walk stops long before the next surface, so the distance is drawn first and the ray is followed no farther,
+//! unless somebody needs all of it.
 
 use glam::Vec3;
 use upbp_accel::Ray;
 use upbp_media::{EdgeDensity, Interior, Medium, MediumId, MediumStack, RaySegment};
 
+use crate::random::Stream;
 use crate::scene::{Crossing, Hit, Scene};
+
+/// How much of a ray's way is needed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// All of it, to the next surface: long beams, emission along the ray.
+    ToSurface,
+    /// Until the walk stops: what lies behind is unknown.
+    ToStop,
+}
 
 /// A stretch of an edge inside one medium.
 #[derive(Clone, Copy, Debug)]
@@ -23,15 +36,18 @@ pub struct Span {
     crossings: usize,
 }
 
-/// A ray from a vertex to the next surface that scatters, or to infinity.
+/// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a medium.
 pub struct Passage<B> {
     /// Where the ray starts.
     pub origin: Vec3,
     /// Its direction.
     pub direction: Vec3,
-    /// Stretches in order, adjoining, from 0 to the surface.
+    /// Stretches in order, adjoining, from 0 to the surface. With [`Extent::ToStop`] the one in which the walk stops is the
+    /// last, and its end means nothing.
     pub spans: Vec<Span>,
-    /// The surface.
+    /// Where the walk stops in a medium: index of the stretch and distance along the ray.
+    pub stop: Option<(usize, f32)>,
+    /// The surface; with [`Extent::ToStop`] only if the walk gets there.
     pub hit: Option<Hit<B>>,
     /// The bodies at the start.
     start: MediumStack,
@@ -41,6 +57,18 @@ pub struct Passage<B> {
     found: Vec<Crossing>,
     /// Boundaries that contradicted the bodies that the ray was in, since they were last taken.
     conflicts: u64,
+}
+
+/// A distance is followed by this share farther than it was drawn: some roundings.
+const REACH_MARGIN: f32 = 8.0 * f32::EPSILON;
+
+/// The decision where a walk stops, while it is followed.
+struct Flight {
+    extent: Extent,
+    /// The random numbers that decide in the current stretch.
+    decision: Option<[f32; 2]>,
+    /// How far the ray has to be followed if the current medium goes on.
+    reach: f32,
 }
 
 /// What happens at the boundary of a body, given the bodies that a ray is in.
@@ -63,6 +91,7 @@ impl<B: Copy> Passage<B> {
             origin: Vec3::ZERO,
             direction: Vec3::Z,
             spans: Vec::new(),
+            stop: None,
             hit: None,
             start: MediumStack::new(None),
             end: MediumStack::new(None),
@@ -72,73 +101,142 @@ impl<B: Copy> Passage<B> {
         }
     }
 
-    /// Follows a ray from `origin`, which lies in the bodies of `stack`.
+    /// Follows a ray from `origin`, which lies in the bodies of `stack`, and draws from `stream` where the walk stops.
     pub fn trace<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
         origin: Vec3,
         direction: Vec3,
         stack: &MediumStack,
+        extent: Extent,
+        stream: &mut Stream,
     ) {
         self.origin = origin;
         self.direction = direction;
         self.start = *stack;
         self.spans.clear();
         self.crossings.clear();
-        let mut ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
-        let mut now = *stack;
+        self.stop = None;
+        self.hit = None;
+        self.end = *stack;
+        let mut flight = Flight { extent, decision: None, reach: f32::INFINITY };
         let mut span =
-            Span { start: 0.0, end: 0.0, medium: now.medium(), before: EdgeDensity::EMPTY, crossings: 0 };
-        self.hit = loop {
+            Span { start: 0.0, end: 0.0, medium: stack.medium(), before: EdgeDensity::EMPTY, crossings: 0 };
+        self.enter(scene, &span, &mut flight, stream);
+        let mut ray = Ray { origin, direction, t_min: 0.0, t_max: flight.reach };
+        loop {
             self.found.clear();
             let hit = scene.trace(&ray, &mut self.found);
             for i in 0..self.found.len() {
                 let crossing = self.found[i];
-                self.cross(scene, &mut now, &mut span, crossing);
-            }
-            match hit {
-                Some(Hit { interior: Some(interior), t, geometric_normal, .. }) => {
-                    let entering = direction.dot(geometric_normal) < 0.0;
-                    if !is_hidden(&now, &interior, entering) {
-                        break hit;
-                    }
-                    self.cross(
-                        scene,
-                        &mut now,
-                        &mut span,
-                        Crossing { t, interior, entering, scatters: true },
-                    );
-                    ray.t_min = t * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
+                if crossing.t > flight.reach {
+                    break;
                 }
-                _ => break hit,
+                if self.cross(scene, &mut span, &mut flight, crossing, stream) {
+                    return;
+                }
             }
-        };
-        span.end = self.hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
-        if span.end > span.start || self.spans.is_empty() {
-            self.spans.push(span);
+            let known = hit.as_ref().map_or(ray.t_max, |hit| hit.t);
+            if let Some(hit) = hit
+                && known <= flight.reach
+            {
+                if let Some(interior) = hit.interior
+                    && let entering = direction.dot(hit.geometric_normal) < 0.0
+                    && is_hidden(&self.end, &interior, entering)
+                {
+                    let crossing = Crossing { t: known, interior, entering, scatters: true };
+                    if self.cross(scene, &mut span, &mut flight, crossing, stream) {
+                        return;
+                    }
+                    ray.t_min = known * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
+                } else {
+                    if !self.close(scene, &mut span, &flight, known) {
+                        self.hit = Some(hit);
+                    }
+                    return;
+                }
+            } else if flight.reach <= known {
+                self.close(scene, &mut span, &flight, f32::INFINITY);
+                return;
+            } else {
+                // The walk goes on in a thinner medium. A boundary at the end of what is known is still to come.
+                ray.t_min = known.next_down();
+            }
+            ray.t_max = flight.reach;
         }
-        self.end = now;
     }
 
-    fn cross<S: Scene>(&mut self, scene: &S, now: &mut MediumStack, span: &mut Span, crossing: Crossing) {
-        if now.cross(crossing.interior, crossing.entering) != upbp_media::Crossing::Done {
+    /// Begins `span`: draws the distance in its medium.
+    fn enter<S: Scene<Bsdf = B>>(&self, scene: &S, span: &Span, flight: &mut Flight, stream: &mut Stream) {
+        flight.reach = f32::INFINITY;
+        if self.stop.is_some() {
+            return;
+        }
+        let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize]) else { return };
+        if !medium.scatters() {
+            return;
+        }
+        // A stretch without length has not used its draw.
+        let u = *flight.decision.get_or_insert_with(|| stream.pair());
+        if flight.extent == Extent::ToStop
+            && let Some(t) = medium.sample_distance(&self.segment(span, f32::INFINITY), u[0], u[1])
+        {
+            flight.reach = t + REACH_MARGIN * t;
+        }
+    }
+
+    /// Ends `span` at `end`, a boundary, a surface or infinity, and decides whether the walk stops inside; whether that
+    /// is all.
+    fn close<S: Scene<Bsdf = B>>(&mut self, scene: &S, span: &mut Span, flight: &Flight, end: f32) -> bool {
+        span.end = end;
+        if !(end > span.start || self.spans.is_empty()) {
+            return false;
+        }
+        if self.stop.is_none()
+            && let Some([u_channel, u_distance]) = flight.decision
+            && let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize])
+            && medium.scatters()
+        {
+            // Decided for the segment as it is: the rounding of a distance far from the origin must not carry the stop over
+            // its end.
+            let t = medium.sample_distance(&self.segment(span, end), u_channel, u_distance);
+            self.stop = t.map(|t| (self.spans.len(), t));
+        }
+        self.spans.push(*span);
+        self.stop.is_some() && flight.extent == Extent::ToStop
+    }
+
+    /// Crosses a boundary; whether the walk has stopped before.
+    fn cross<S: Scene<Bsdf = B>>(
+        &mut self,
+        scene: &S,
+        span: &mut Span,
+        flight: &mut Flight,
+        crossing: Crossing,
+        stream: &mut Stream,
+    ) -> bool {
+        if self.end.cross(crossing.interior, crossing.entering) != upbp_media::Crossing::Done {
             self.conflicts += 1;
         }
         self.crossings.push(crossing);
         // An invisible boundary between two parts of the same medium changes nothing, not even a density.
-        if now.medium() == span.medium {
-            return;
+        if self.end.medium() == span.medium {
+            return false;
         }
         // Rounding may put a boundary behind one that was crossed before.
         let t = crossing.t.max(span.start);
         if t > span.start {
-            span.end = t;
-            self.spans.push(*span);
+            if self.close(scene, span, flight, t) {
+                return true;
+            }
             span.before = self.density_to(scene, span, t);
+            flight.decision = None;
         }
         span.start = t;
-        span.medium = now.medium();
+        span.medium = self.end.medium();
         span.crossings = self.crossings.len();
+        self.enter(scene, span, flight, stream);
+        false
     }
 
     /// What the edge accumulates from its start to `t` in `span`.
