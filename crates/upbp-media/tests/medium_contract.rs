@@ -74,7 +74,7 @@ fn a_medium_is_dark_unless_it_says_otherwise() {
 
 #[test]
 fn what_is_copied_per_edge_is_small() {
-    assert!(size_of::<MediumStack>() <= 192);
+    assert!(size_of::<MediumStack>() <= 128);
     assert!(size_of::<EdgeDensity>() <= 48);
     assert_eq!(size_of::<Spectrum>(), 12);
 }
