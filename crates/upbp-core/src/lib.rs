@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod census;
+mod emitters;
 mod error;
 mod film;
 mod output;

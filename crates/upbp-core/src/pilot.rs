@@ -14,6 +14,7 @@ use upbp_estimators::{
     Counters, Kernel, Kernels, LightMap, PathLengths, Plan, PlanChoices, StreamKind, TechniqueSet, World,
 };
 
+use crate::emitters::pixel;
 use crate::passes::light_pass;
 use crate::settings::CheckedSettings;
 
@@ -199,19 +200,12 @@ fn camera_queries<S: Scene>(world: &World<'_, S>, plan: &Plan) -> Queries {
     let mut queries = Queries::default();
     let mut scratch = Scratch::default();
     let mut counters = Counters::default();
-    let pixels = u64::from(crop.width) * u64::from(crop.height);
     for index in 0..CAMERA_PATHS {
-        // Spread over the picture by a step that is prime to almost every width.
-        let place = (index * 7919) % pixels;
-        let pixel = [
-            crop.x + (place % u64::from(crop.width)) as u32,
-            crop.y + (place / u64::from(crop.width)) as u32,
-        ];
         trace_camera_path(
             &context,
             &map,
             StreamKind::PilotCamera,
-            pixel,
+            pixel(crop, index),
             index,
             &mut scratch,
             &mut counters,

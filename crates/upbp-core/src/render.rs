@@ -12,6 +12,7 @@ use upbp_estimators::{
 };
 
 use crate::census::Census;
+use crate::emitters;
 use crate::error::RenderError;
 use crate::film::{Film, Pixel};
 use crate::passes::{add_splats, black, camera_pass, light_pass};
@@ -108,7 +109,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
     /// A scene whose bounds, powers or crop make no sense, or a film that exceeds the memory budget.
     pub fn new(scene: &'a S, settings: CheckedSettings) -> Result<Self, RenderError> {
         let start = Instant::now();
-        let world = World::new(scene)?;
+        let mut world = World::new(scene)?;
         let census = Census::take(&world, settings.techniques, settings.max_length);
         let techniques = census.techniques;
         let rect = scene.camera().crop();
@@ -124,11 +125,23 @@ impl<'a, S: Scene> Renderer<'a, S> {
         }
         let without_pilot: TechniqueSet =
             [Technique::Hit, Technique::Nee, Technique::LightTracing].into_iter().collect();
-        let pilot = if techniques.without(without_pilot).is_empty() {
-            Pilot::default()
-        } else {
-            pilot::run(&world, &settings, techniques)
+        let look = |world: &World<'_, S>| {
+            if techniques.without(without_pilot).is_empty() {
+                Pilot::default()
+            } else {
+                pilot::run(world, &settings, techniques)
+            }
         };
+        let mut pilot = look(&world);
+        if scene.emitters().len() > 1 {
+            let light_paths = emitters::light_paths(pilot.vertices_per_path);
+            let radii = first_radii(&world, &settings, techniques, &pilot, light_paths, light_paths / 8);
+            let plan = plan(&world, &settings, techniques, &pilot, &radii, [light_paths, light_paths / 8], 0);
+            let (emission, next_event) = emitters::measure(&world, &plan);
+            world.choose_emitters_by(&emission, &next_event);
+            // Other light sub-paths than before.
+            pilot = look(&world);
+        }
         let pixel_count = rect.width.saturating_mul(rect.height);
         let wanted = match settings.light_paths {
             LightPaths::Auto => pixel_count,
@@ -165,25 +178,8 @@ impl<'a, S: Scene> Renderer<'a, S> {
     /// The plan of an iteration.
     #[must_use]
     pub fn plan(&self, iteration: u64) -> Plan {
-        let settings = &self.settings;
-        Plan::new(
-            self.world.scene,
-            &PlanChoices {
-                seed: settings.seed,
-                iteration,
-                techniques: self.census.techniques,
-                light_paths: self.light_paths,
-                beam_paths: self.beam_paths,
-                connections: settings.connections,
-                vertices_per_light_path: self.pilot.vertices_per_path,
-                lengths: PathLengths { min: settings.min_length, max: settings.max_length },
-                roulette: settings.roulette,
-                kernels: self.radii.kernels(iteration),
-                heuristic: settings.heuristic,
-                photon_beams: settings.photon_beams,
-                query_beams: settings.query_beams,
-            },
-        )
+        let paths = [self.light_paths, self.beam_paths];
+        plan(&self.world, &self.settings, self.census.techniques, &self.pilot, &self.radii, paths, iteration)
     }
 
     /// Renders one more iteration. `false` if it was cancelled: then it is as if it had not begun.
@@ -331,6 +327,36 @@ impl<'a, S: Scene> Renderer<'a, S> {
             series: self.series.clone(),
         }
     }
+}
+
+/// The plan of an iteration with this many light sub-paths, and this many with beams.
+fn plan<S: Scene>(
+    world: &World<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    pilot: &Pilot,
+    radii: &RadiusSchedule,
+    [light_paths, beam_paths]: [u32; 2],
+    iteration: u64,
+) -> Plan {
+    Plan::new(
+        world.scene,
+        &PlanChoices {
+            seed: settings.seed,
+            iteration,
+            techniques,
+            light_paths,
+            beam_paths,
+            connections: settings.connections,
+            vertices_per_light_path: pilot.vertices_per_path,
+            lengths: PathLengths { min: settings.min_length, max: settings.max_length },
+            roulette: settings.roulette,
+            kernels: radii.kernels(iteration),
+            heuristic: settings.heuristic,
+            photon_beams: settings.photon_beams,
+            query_beams: settings.query_beams,
+        },
+    )
 }
 
 /// As many light sub-paths, and as many with beams, as `wanted` and as `bytes` have room for.

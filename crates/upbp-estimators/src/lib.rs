@@ -22,4 +22,4 @@ pub use random::{Stream, StreamKind};
 pub use technique::{Layer, Technique, TechniqueSet, UnknownTechnique};
 pub use upbp_accel::{Ray, offset_origin};
 pub use upbp_media::{BodyId, Interior, MediumId, MediumStack, Spectrum};
-pub use world::{World, WorldError};
+pub use world::{EmitterShares, World, WorldError};

@@ -10,7 +10,10 @@ pub struct World<'a, S: Scene> {
     pub scene: &'a S,
     /// Its bounds.
     pub bounds: BoundingSphere,
-    selection: Selection,
+    /// By power.
+    power: Selection,
+    emission: Selection,
+    next_event: Selection,
     environments: Vec<EmitterId>,
     camera_stack: Option<MediumStack>,
     emitting_media: bool,
@@ -71,20 +74,42 @@ impl<'a, S: Scene> World<'a, S> {
             })
             .flatten();
         let emitting_media = scene.media().iter().any(Medium::emits);
-        let selection = Selection::new(&powers);
-        Ok(Self { scene, bounds, selection, environments, camera_stack, emitting_media })
+        let power = Selection::new(&powers);
+        let (emission, next_event) = (power.clone(), power.clone());
+        Ok(Self { scene, bounds, power, emission, next_event, environments, camera_stack, emitting_media })
     }
 
-    /// Chooses an emitter by power; returns its probability. `None` without light.
-    #[must_use]
-    pub fn choose_emitter(&self, u: f32) -> Option<(EmitterId, f32)> {
-        self.selection.choose(u)
+    /// Chooses emitters by what they bring instead of by power: `emission` where light sub-paths start, `next_event` where
+    /// camera vertices look for light. Either way the choice must not depend on samples that it serves.
+    ///
+    /// Power keeps a share, so that no emitter is lost that was not seen.
+    pub fn choose_emitters_by(&mut self, emission: &EmitterShares, next_event: &EmitterShares) {
+        self.emission = self.power.blend(emission);
+        self.next_event = self.power.blend(next_event);
     }
 
-    /// The probability with which an emitter is chosen; 0 if it does not exist.
+    /// Chooses the emitter of a light sub-path; returns its probability. `None` without light.
     #[must_use]
-    pub fn emitter_probability(&self, emitter: EmitterId) -> f32 {
-        self.selection.probability(emitter)
+    pub fn choose_emission(&self, u: f32) -> Option<(EmitterId, f32)> {
+        self.emission.choose(u)
+    }
+
+    /// The probability of [`choose_emission`](Self::choose_emission); 0 if the emitter does not exist.
+    #[must_use]
+    pub fn emission_probability(&self, emitter: EmitterId) -> f32 {
+        self.emission.probability(emitter)
+    }
+
+    /// Chooses the emitter of a next event; returns its probability. `None` without light.
+    #[must_use]
+    pub fn choose_next_event(&self, u: f32) -> Option<(EmitterId, f32)> {
+        self.next_event.choose(u)
+    }
+
+    /// The probability of [`choose_next_event`](Self::choose_next_event); 0 if the emitter does not exist.
+    #[must_use]
+    pub fn next_event_probability(&self, emitter: EmitterId) -> f32 {
+        self.next_event.probability(emitter)
     }
 
     /// The emitters that every escaping ray hits.
@@ -96,7 +121,7 @@ impl<'a, S: Scene> World<'a, S> {
     /// Whether any emitter can be chosen.
     #[must_use]
     pub fn has_emitters(&self) -> bool {
-        self.selection.total > 0.0
+        self.power.total > 0.0
     }
 
     /// Whether any medium emits light.
@@ -111,6 +136,21 @@ impl<'a, S: Scene> World<'a, S> {
         self.camera_stack.unwrap_or_else(|| self.scene.stack_at(lens))
     }
 }
+
+/// What each emitter was seen to bring, as [`World::choose_emitters_by`] takes it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EmitterShares {
+    /// Light by emitter, in any unit; emitters that are left out bring nothing.
+    pub light: Vec<f64>,
+    /// Samples that this was measured with.
+    pub samples: f64,
+}
+
+/// Power keeps at least this share of a choice.
+const POWER_SHARE: f64 = 0.1;
+
+/// Samples per emitter from which on a measured share counts more than power.
+const TELLING_SAMPLES: f64 = 16.0;
 
 /// A discrete distribution over emitters.
 #[derive(Clone, Debug)]
@@ -131,6 +171,25 @@ impl Selection {
             })
             .collect();
         Self { cumulative, total }
+    }
+
+    /// This distribution with a part that follows `shares`, the larger the more samples they stand on.
+    fn blend(&self, shares: &EmitterShares) -> Self {
+        let count = self.cumulative.len();
+        let power = |i: usize| f64::from(self.probability(EmitterId(i as u32)));
+        let light = |i: usize| match shares.light.get(i) {
+            Some(&light) if light > 0.0 && power(i) > 0.0 => light,
+            _ => 0.0,
+        };
+        let sum: f64 = (0..count).map(light).sum();
+        if !(sum > 0.0 && sum.is_finite() && self.total > 0.0) {
+            return self.clone();
+        }
+        let evidence = shares.samples / TELLING_SAMPLES;
+        let trust = (1.0 - POWER_SHARE) * evidence / (evidence + count as f64);
+        let weights: Vec<f64> =
+            (0..count).map(|i| trust * light(i) / sum + (1.0 - trust) * power(i)).collect();
+        Self::new(&weights)
     }
 
     fn choose(&self, u: f32) -> Option<(EmitterId, f32)> {
@@ -202,5 +261,27 @@ mod tests {
         assert_eq!(Selection::new(&[]).choose(0.5), None);
         assert_eq!(Selection::new(&[0.0]).choose(0.5), None);
         assert_eq!(selection.probability(EmitterId(9)), 0.0);
+    }
+
+    #[test]
+    fn shares_move_the_choice_and_power_keeps_a_floor() {
+        let power = Selection::new(&[0.0, 1.0, 0.0, 3.0]);
+        let seen = |light: &[f64], samples| EmitterShares { light: light.to_vec(), samples };
+        let probabilities = |shares| {
+            let blend = power.blend(&shares);
+            [0, 1, 2, 3].map(|i| blend.probability(EmitterId(i)))
+        };
+        // All the light comes from the weaker one, and there is no doubt about it. What is dark stays out.
+        let [dark, weak, _, strong] = probabilities(seen(&[5.0, 2.0, 0.0, 0.0], 1e9));
+        assert_eq!(dark, 0.0);
+        assert!((weak - 0.925).abs() < 1e-6 && (strong - 0.075).abs() < 1e-6, "{weak}, {strong}");
+        // Nothing seen, or nothing that is a number: power decides.
+        for shares in [seen(&[], 1e9), seen(&[0.0; 4], 1e9), seen(&[0.0, f64::NAN, 0.0, f64::INFINITY], 1.0)]
+        {
+            assert_eq!(probabilities(shares), [0.0, 0.25, 0.0, 0.75]);
+        }
+        // A few samples say little.
+        let [_, weak, ..] = probabilities(seen(&[0.0, 1.0], 4.0));
+        assert!((0.25..0.35).contains(&weak), "{weak}");
     }
 }

@@ -99,13 +99,12 @@ fn shine<S: Scene, O: Observer<S::Bsdf>>(
         // Nothing else makes a path of one edge.
         1.0
     } else {
-        let probability = f64::from(world.emitter_probability(emitter));
         // On arrival at a light the vertex before is connected by next event estimation.
         let tip = edge.pending.arrive(mis, Walk::Camera, mis_edge, mis.nee);
         mis.hit_weight(
             &tip,
-            probability * f64::from(densities.pdf_incident),
-            probability * f64::from(densities.pdf_position),
+            f64::from(world.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
+            f64::from(world.emission_probability(emitter)) * f64::from(densities.pdf_position),
             f64::from(densities.pdf_direction),
         )
     };

@@ -21,7 +21,7 @@ pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
         return;
     }
     let scene = world.scene;
-    let Some((emitter, probability)) = world.choose_emitter(stream.uniform()) else { return };
+    let Some((emitter, probability)) = world.choose_next_event(stream.uniform()) else { return };
     let light = &scene.emitters()[emitter.0 as usize];
     let Some(incident) = light.sample_incident(&world.bounds, vertex.position, stream.pair()) else {
         return;
@@ -58,8 +58,8 @@ pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
 
     let in_medium = vertex.site.in_medium();
     let distance2 = if kind.is_infinite() { 1.0 } else { f64::from(incident.distance).powi(2) };
-    let probability = f64::from(probability);
-    let pdf = probability * f64::from(incident.pdf);
+    let pdf = f64::from(probability) * f64::from(incident.pdf);
+    let pdf_position = f64::from(world.emission_probability(emitter)) * f64::from(incident.pdf_position);
     let geometry = f64::from(cos_light) * scattering.cos / distance2;
 
     let hit_density = if kind.is_hittable() {
@@ -80,8 +80,7 @@ pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
         ),
         before: vertex.tip.before(mis, scattering.rho_opposite),
     };
-    let weight =
-        mis.nee_weight(pdf, probability * f64::from(incident.pdf_position), hit_density, end, camera_density);
+    let weight = mis.nee_weight(pdf, pdf_position, hit_density, end, camera_density);
     let value = vertex.throughput
         * scattering.value
         * density.transmittance

@@ -120,7 +120,7 @@ fn emit<S: Scene, O: Observer<S::Bsdf>>(
     stream: &mut Stream,
     observer: &mut O,
 ) -> Option<Flight> {
-    let (emitter, probability) = world.choose_emitter(stream.uniform())?;
+    let (emitter, probability) = world.choose_emission(stream.uniform())?;
     let light = &world.scene.emitters()[emitter.0 as usize];
     let emission = light.sample_emission(&world.bounds, stream.pair(), stream.pair())?;
     let kind = light.kind();

@@ -65,7 +65,9 @@ impl EdgeSource {
                     position,
                     *pdf_position,
                 );
-                mis.nee * f64::from(pdf) / f64::from(*pdf_position)
+                let choice = f64::from(world.next_event_probability(*emitter))
+                    / f64::from(world.emission_probability(*emitter));
+                mis.nee * choice * f64::from(pdf) / f64::from(*pdf_position)
             }
         }
     }

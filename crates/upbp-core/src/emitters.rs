@@ -1,0 +1,193 @@
+//! Which emitters are worth samples: measured before the first iteration.
+//!
+//! By power, a sky takes most of the light sub-paths and next events of a room with a window, and most of them are lost:
+//! the light goes past the scene, or emission hits find it anyway. So a small run counts the weighted contributions that
+//! come from each emitter, by next events and by light sub-paths, as far as no other technique would find them, and emitters
+//! are then chosen in proportion. Weights are exact for any choice, and the choice is fixed before any sample of the image.
+
+use rayon::prelude::*;
+use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, Observer};
+use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
+use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
+use upbp_estimators::{Counters, EmitterShares, LightMap, Plan, StreamKind, World};
+
+/// Camera sub-paths.
+const CAMERA_PATHS: u64 = 2048;
+/// Light sub-paths, unless they are long.
+const LIGHT_PATHS: u32 = 4096;
+/// Light vertices that are enough.
+const LIGHT_VERTICES: f64 = 2e5;
+/// Sub-paths per piece of work.
+const CHUNK: u32 = 256;
+/// Steps towards probabilities that reproduce themselves.
+const ROUNDS: u32 = 16;
+
+/// The number of light sub-paths for sub-paths of `vertices` vertices.
+pub(crate) fn light_paths(vertices: f64) -> u32 {
+    (LIGHT_VERTICES / vertices.max(1.0)).clamp(64.0, f64::from(LIGHT_PATHS)) as u32
+}
+
+/// What every emitter brings under `plan`: by light sub-paths, by next events.
+pub(crate) fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, EmitterShares) {
+    let context = Context { world, plan };
+    let camera = world.scene.camera().crop();
+    let pixels = u64::from(camera.width) * u64::from(camera.height);
+    let emitters = world.scene.emitters().len();
+    let mut emission = Tally::new(emitters, |emitter| world.emission_probability(emitter));
+    let mut next_event = Tally::new(emitters, |emitter| world.next_event_probability(emitter));
+    let mut by_path = |seen: &[(u32, Contribution)], starts: &[Option<u32>], scale| {
+        for &(path, contribution) in seen {
+            if let Some(emitter) = starts[path as usize] {
+                emission.add(emitter, contribution, scale);
+            }
+        }
+    };
+
+    let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
+    let chunks: Vec<_> = (0..paths.div_ceil(CHUNK))
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, chunk| {
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(paths);
+            let mut seen = Seen { first: range.start, starts: vec![None; range.len()], ..Seen::default() };
+            let mut out = LightChunk::default();
+            for index in range {
+                trace_light_path(&context, StreamKind::PilotLight, index, scratch, &mut out, &mut seen);
+            }
+            (out, seen)
+        })
+        .collect();
+    let mut starts = Vec::with_capacity(paths as usize);
+    let mut vertices = Vec::new();
+    let mut beams = Vec::new();
+    for (out, seen) in chunks {
+        vertices.extend(out.vertices);
+        beams.extend(out.beams);
+        starts.extend(seen.starts);
+        by_path(&seen.emission, &starts, 1.0);
+    }
+    let map = if plan.stores_vertices() || plan.stores_beams() {
+        LightMap::build(plan, vertices, beams)
+    } else {
+        LightMap::empty()
+    };
+
+    let walks: Vec<_> = (0..CAMERA_PATHS.div_ceil(u64::from(CHUNK)))
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, chunk| {
+            let mut seen = Seen::default();
+            for index in chunk * u64::from(CHUNK)..(chunk + 1) * u64::from(CHUNK) {
+                let (pixel, counters) = (pixel(camera, index), &mut Counters::default());
+                let kind = StreamKind::PilotCamera;
+                trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, &mut seen);
+            }
+            seen
+        })
+        .collect();
+    // Light tracing fills the whole picture, camera sub-paths a part of it.
+    let scale = pixels as f64 / CAMERA_PATHS as f64;
+    for seen in walks {
+        by_path(&seen.emission, &starts, scale);
+        for (emitter, contribution) in seen.next_event {
+            next_event.add(emitter, contribution, scale);
+        }
+    }
+    (emission.shares(), next_event.shares())
+}
+
+/// A pixel of a sequence that is spread over the picture by a step that is prime to almost every width.
+pub(crate) fn pixel(crop: PixelRect, index: u64) -> [u32; 2] {
+    let width = u64::from(crop.width);
+    let place = (index * 7919) % (width * u64::from(crop.height));
+    [crop.x + (place % width) as u32, crop.y + (place / width) as u32]
+}
+
+/// Weighted contributions by emitter.
+struct Tally {
+    /// The probabilities that they were made with.
+    chosen: Vec<f64>,
+    samples: Vec<Sample>,
+}
+
+struct Sample {
+    emitter: usize,
+    /// Contribution before weighting, for a probability of one.
+    value: f64,
+    /// All other techniques, relative to this one with a probability of one.
+    others: f64,
+}
+
+impl Tally {
+    fn new(emitters: usize, probability: impl Fn(EmitterId) -> f32) -> Self {
+        let chosen = (0..emitters).map(|i| f64::from(probability(EmitterId(i as u32)))).collect();
+        Self { chosen, samples: Vec::new() }
+    }
+
+    fn add(&mut self, emitter: u32, seen: Contribution, scale: f64) {
+        let emitter = emitter as usize;
+        let p = self.chosen[emitter];
+        let others = p * (1.0 - seen.weight) / seen.weight;
+        self.samples.push(Sample { emitter, value: scale * seen.value * p, others });
+    }
+
+    /// What the emitters bring that nothing else would: contributions times the square of their weights, at the probabilities
+    /// that follow from just that. A sky that emission hits find anyway so fades out of the next events.
+    fn shares(&self) -> EmitterShares {
+        let mut p = self.chosen.clone();
+        let mut light = vec![0.0; p.len()];
+        for _ in 0..ROUNDS {
+            light.fill(0.0);
+            for sample in &self.samples {
+                let weight = p[sample.emitter] / (p[sample.emitter] + sample.others);
+                if weight > 0.0 {
+                    // Made with `chosen`, so each stands for one over that many.
+                    light[sample.emitter] += sample.value / self.chosen[sample.emitter] * weight * weight;
+                }
+            }
+            let sum: f64 = light.iter().sum();
+            if !(sum > 0.0 && sum.is_finite()) {
+                break;
+            }
+            for (p, light) in p.iter_mut().zip(&light) {
+                *p = light / sum;
+            }
+        }
+        EmitterShares { light, samples: self.samples.len() as f64 }
+    }
+}
+
+/// What one piece of work saw.
+#[derive(Default)]
+struct Seen {
+    /// The first light sub-path.
+    first: u32,
+    /// The emitter of each light sub-path.
+    starts: Vec<Option<u32>>,
+    /// By light sub-path.
+    emission: Vec<(u32, Contribution)>,
+    /// By emitter.
+    next_event: Vec<(u32, Contribution)>,
+}
+
+#[derive(Clone, Copy)]
+struct Contribution {
+    /// Before weighting.
+    value: f64,
+    weight: f64,
+}
+
+impl<B> Observer<B> for Seen {
+    fn light_end(&mut self, path: u32, end: &LightEnd) {
+        self.starts[(path - self.first) as usize] = Some(end.emitter.0);
+    }
+
+    fn sample(&mut self, sample: &ObservedSample<B>) {
+        let seen = Contribution { value: f64::from(sample.value.mean()), weight: sample.weight };
+        match sample.joint {
+            Joint::Hit(_) => {}
+            Joint::Nee { light: end, .. } => self.next_event.push((end.emitter.0, seen)),
+            Joint::Connect { path, .. } | Joint::LightTracing { path, .. } | Joint::Merge { path, .. } => {
+                self.emission.push((path, seen));
+            }
+        }
+    }
+}
