@@ -61,6 +61,7 @@ impl Stream {
     }
 
     /// Uniform in `[0, 1)`, a multiple of 2⁻²⁴.
+    #[inline]
     pub fn uniform(&mut self) -> f32 {
         match self.next_decision() {
             Some(key) => to_unit(scramble(order(self.point, key).reverse_bits(), (key >> 32) as u32)),
@@ -72,10 +73,10 @@ impl Stream {
     pub fn pair(&mut self) -> [f32; 2] {
         if let Some(key) = self.next_decision() {
             let point = order(self.point, key);
-            let other = mix(key);
+            let other = key.wrapping_mul(0xd1b5_4a32_d192_ed03) >> 32;
             [
-                to_unit(scramble(point.reverse_bits(), other as u32)),
-                to_unit(scramble(sobol(point), (other >> 32) as u32)),
+                to_unit(scramble(point.reverse_bits(), (key >> 32) as u32)),
+                to_unit(scramble(sobol(point), other as u32)),
             ]
         } else {
             let bits = self.rest.next_u64();
@@ -90,6 +91,7 @@ impl Stream {
     }
 
     /// The key of the next decision, while decisions are stratified.
+    #[inline]
     fn next_decision(&mut self) -> Option<u64> {
         self.draws += 1;
         (self.draws <= STRATIFIED_DRAWS)

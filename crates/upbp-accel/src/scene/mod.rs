@@ -111,17 +111,14 @@ impl SceneGeometry {
         let probe = primitive::Probe::new(&ray, self.triangles);
         self.bvh.traverse(&ray, |range, t_max| {
             for item in &self.items[range] {
-                let hits = probe.intersect(item);
-                for candidate in hits.into_iter().flatten() {
-                    if !(candidate.t > ray.t_min && candidate.t < *t_max) {
-                        continue;
-                    }
-                    match visit(&candidate) {
+                probe.intersect(item, ray.t_min, t_max, |candidate, t_max| {
+                    match visit(candidate) {
                         Visit::Continue => {}
                         Visit::ShrinkTo(t) => *t_max = t_max.min(t),
                         Visit::Stop => return ControlFlow::Break(()),
                     }
-                }
+                    ControlFlow::Continue(())
+                })?;
             }
             ControlFlow::Continue(())
         });

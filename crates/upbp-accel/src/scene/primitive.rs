@@ -1,5 +1,7 @@
 //! The primitives under the leaves of the hierarchy, and a ray's test against one.
 
+use std::ops::ControlFlow;
+
 use glam::Vec3;
 
 use super::{Candidate, ShapeId};
@@ -68,31 +70,48 @@ impl Probe {
         Self { origin: ray.origin, direction: ray.direction, shear }
     }
 
-    /// Where the line meets the primitive, whatever the range of the ray.
+    /// Calls `found` with the intersections of the line and the primitive that lie in the open interval `(t_min, t_max)`,
+    /// where `found` may lower `t_max`.
     #[inline]
-    pub(super) fn intersect(&self, item: &Item) -> [Option<Candidate>; 2] {
-        let at = |t: f64, primitive: u32, uv: [f32; 2]| {
-            Some(Candidate { t: t as f32, shape: item.shape, primitive, uv })
+    pub(super) fn intersect(
+        &self,
+        item: &Item,
+        t_min: f32,
+        t_max: &mut f32,
+        mut found: impl FnMut(&Candidate, &mut f32) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut at = |t: f64, primitive: u32, uv: [f32; 2]| {
+            let t = t as f32;
+            if t > t_min && t < *t_max {
+                found(&Candidate { t, shape: item.shape, primitive, uv }, t_max)
+            } else {
+                ControlFlow::Continue(())
+            }
         };
         match &item.geometry {
             Geometry::Triangle(corners) => {
-                match self.shear.as_ref().and_then(|shear| shear.intersect(*corners)) {
-                    Some(hit) => [at(hit.t, item.primitive, hit.weights), None],
-                    None => [None, None],
+                if let Some(hit) = self.shear.as_ref().and_then(|shear| shear.intersect(*corners)) {
+                    at(hit.t, item.primitive, hit.weights)?;
                 }
             }
-            Geometry::Quad(quad) => match quad.intersect(self.origin, self.direction) {
-                Some((t, uv)) => [at(t, 0, uv), None],
-                None => [None, None],
-            },
-            Geometry::Sphere(sphere) => match sphere.intersect(self.origin, self.direction) {
-                Some([entry, exit]) => [at(entry, 0, [0.0; 2]), at(exit, 1, [0.0; 2])],
-                None => [None, None],
-            },
-            Geometry::Box(axis_box) => match axis_box.intersect(self.origin, self.direction) {
-                Some([entry, exit]) => [at(entry.0, entry.1, [0.0; 2]), at(exit.0, exit.1, [0.0; 2])],
-                None => [None, None],
-            },
+            Geometry::Quad(quad) => {
+                if let Some((t, uv)) = quad.intersect(self.origin, self.direction) {
+                    at(t, 0, uv)?;
+                }
+            }
+            Geometry::Sphere(sphere) => {
+                if let Some([entry, exit]) = sphere.intersect(self.origin, self.direction) {
+                    at(entry, 0, [0.0; 2])?;
+                    at(exit, 1, [0.0; 2])?;
+                }
+            }
+            Geometry::Box(axis_box) => {
+                if let Some([entry, exit]) = axis_box.intersect(self.origin, self.direction) {
+                    at(entry.0, entry.1, [0.0; 2])?;
+                    at(exit.0, exit.1, [0.0; 2])?;
+                }
+            }
         }
+        ControlFlow::Continue(())
     }
 }

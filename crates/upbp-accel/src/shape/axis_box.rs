@@ -89,22 +89,19 @@ impl AxisBox {
 
     /// Distance and face at which the line enters and leaves. A face is `2·axis`, plus one on the upper side.
     pub(crate) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[(f64, u32); 2]> {
+        let direction = direction.as_dvec3();
+        let low = self.min.as_dvec3() - origin.as_dvec3();
+        let high = self.max.as_dvec3() - origin.as_dvec3();
+        let inverse = direction.recip();
+        let (low, high) = (low * inverse, high * inverse);
         let (mut entry, mut exit) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
-        for axis in 0..3 {
-            let (o, d) = (f64::from(origin[axis]), f64::from(direction[axis]));
-            let (low, high) = (f64::from(self.min[axis]) - o, f64::from(self.max[axis]) - o);
-            if d == 0.0 {
-                // In a face's plane counts as inside: the other axes decide.
-                if low > 0.0 || high < 0.0 {
-                    return None;
-                }
-                continue;
-            }
-            let face = 2 * axis as u32;
-            let (near, far) = if d > 0.0 {
-                ((low / d, face), (high / d, face + 1))
+        for (axis, face) in [(0, 0), (1, 2), (2, 4)] {
+            // Along a face: in its plane, where the product is not a number, counts as inside; beside the box both
+            // distances have the same sign and are infinite.
+            let (near, far) = if inverse[axis].is_sign_positive() {
+                ((low[axis], face), (high[axis], face + 1))
             } else {
-                ((high / d, face + 1), (low / d, face))
+                ((high[axis], face + 1), (low[axis], face))
             };
             if near.0 > entry.0 {
                 entry = near;
@@ -113,7 +110,7 @@ impl AxisBox {
                 exit = far;
             }
         }
-        (entry.0 <= exit.0).then_some([entry, exit])
+        (entry.0 <= exit.0 && entry.0 < f64::INFINITY && exit.0 > f64::NEG_INFINITY).then_some([entry, exit])
     }
 
     /// The outward normal of a face.

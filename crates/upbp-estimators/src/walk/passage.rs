@@ -69,6 +69,8 @@ struct Flight {
     decision: Option<[f32; 2]>,
     /// How far the ray has to be followed if the current medium goes on.
     reach: f32,
+    /// Where the walk stops if the current medium goes on for so long; known only with a finite reach.
+    stop: f32,
 }
 
 /// What happens at the boundary of a body, given the bodies that a ray is in.
@@ -119,7 +121,7 @@ impl<B: Copy> Passage<B> {
         self.stop = None;
         self.hit = None;
         self.end = *stack;
-        let mut flight = Flight { extent, decision: None, reach: f32::INFINITY };
+        let mut flight = Flight { extent, decision: None, reach: f32::INFINITY, stop: f32::INFINITY };
         let mut span =
             Span { start: 0.0, end: 0.0, medium: stack.medium(), before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
@@ -182,6 +184,7 @@ impl<B: Copy> Passage<B> {
             && let Some(t) = medium.sample_distance(&self.segment(span, f32::INFINITY), u[0], u[1])
         {
             flight.reach = t + REACH_MARGIN * t;
+            flight.stop = t;
         }
     }
 
@@ -199,7 +202,11 @@ impl<B: Copy> Passage<B> {
         {
             // Decided for the segment as it is: the rounding of a distance far from the origin must not carry the stop over
             // its end.
-            let t = medium.sample_distance(&self.segment(span, end), u_channel, u_distance);
+            let t = if flight.reach < end {
+                Some(flight.stop)
+            } else {
+                medium.sample_distance(&self.segment(span, end), u_channel, u_distance)
+            };
             self.stop = t.map(|t| (self.spans.len(), t));
         }
         self.spans.push(*span);

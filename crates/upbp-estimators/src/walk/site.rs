@@ -206,11 +206,12 @@ impl<B: Bsdf> Site<B> {
         stream: &mut Stream,
     ) -> Option<Scattered> {
         let u_continue = stream.uniform();
-        let u_lobe = stream.uniform();
-        let u = stream.pair();
         match self {
-            Self::Surface(surface) => surface.scatter(roulette, walk, from, u_continue, u_lobe, u),
+            Self::Surface(surface) => {
+                surface.scatter(roulette, walk, from, u_continue, stream.uniform(), stream.pair())
+            }
             Self::Medium(medium) => {
+                let u = stream.pair();
                 let medium = &scene.media()[medium.0 as usize];
                 let survival = continuation(medium, position, roulette);
                 if u_continue >= survival {
