@@ -30,8 +30,10 @@ pub(crate) fn light_paths(vertices: f64) -> u32 {
 /// What every emitter brings under `plan`: by light sub-paths, by next events.
 pub(crate) fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, EmitterShares) {
     let context = Context { world, plan };
-    let camera = world.scene.camera().crop();
-    let pixels = u64::from(camera.width) * u64::from(camera.height);
+    // The whole film: a crop shows the same camera samples.
+    let (width, height) = world.scene.camera().resolution();
+    let film = PixelRect { x: 0, y: 0, width, height };
+    let pixels = u64::from(width) * u64::from(height);
     let emitters = world.scene.emitters().len();
     let mut emission = Tally::new(emitters, |emitter| world.emission_probability(emitter));
     let mut next_event = Tally::new(emitters, |emitter| world.next_event_probability(emitter));
@@ -76,7 +78,7 @@ pub(crate) fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterSh
         .map_init(Scratch::default, |scratch, chunk| {
             let mut seen = Seen::default();
             for index in chunk * u64::from(CHUNK)..(chunk + 1) * u64::from(CHUNK) {
-                let (pixel, counters) = (pixel(camera, index), &mut Counters::default());
+                let (pixel, counters) = (pixel(film, index), &mut Counters::default());
                 let kind = StreamKind::PilotCamera;
                 trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, &mut seen);
             }
