@@ -12,7 +12,7 @@ mod rebuild;
 use closed_form::{ClosedForm, Material};
 use glam::Vec3;
 use rebuild::{Trace, Vertex};
-use upbp_estimators::mis::oracle::Strategy;
+use upbp_estimators::mis::oracle::{Path, Strategy};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::scene::Scene;
@@ -33,8 +33,8 @@ const TOLERANCE: f64 = 1e-4;
 /// The share of the weights that agree to [`TOLERANCE`] without further ado.
 const REGULAR: f64 = 0.98;
 
-/// No difference exceeds this many times the tolerance and what the path's worst place makes of rounding.
-const LARGEST_EXCESS: f64 = 5.0;
+/// No difference exceeds this many times the tolerance and what moving the vertices by rounding does to the weight.
+const LARGEST_EXCESS: f64 = 2.0;
 
 /// Differences of one technique.
 #[derive(Clone, Debug, Default)]
@@ -145,17 +145,24 @@ impl<'a> Auditor<'a> {
             self.comparisons[technique].doubtful += 1;
             return;
         };
-        let weights = path.weights(&self.plan.mis);
-        let sum: f64 = weights.iter().map(|w| w.1).sum();
-        assert!((sum - 1.0).abs() < 1e-12, "{sum}");
-        let expected = weights.iter().find(|(other, _)| *other == strategy).map_or(0.0, |w| w.1);
+        let weight = |path: &Path| {
+            let weights = path.weights(&self.plan.mis);
+            let sum: f64 = weights.iter().map(|w| w.1).sum();
+            assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+            weights.iter().find(|(other, _)| *other == strategy).map_or(0.0, |w| w.1)
+        };
+        let expected = weight(&path);
         if expected.max(sample.weight) < SMALLEST_WEIGHT {
             return;
         }
         let difference = (sample.weight / expected - 1.0).abs();
+        let mut excess = difference / TOLERANCE;
+        if excess > 1.0 {
+            let rounding = trace.sensitivity(self.scene, self.plan.roulette, weight, expected);
+            excess = difference / (TOLERANCE + rounding);
+        }
         let comparison = &mut self.comparisons[technique];
         comparison.differences.push(difference);
-        let excess = difference / (TOLERANCE + Trace::conditioning(&path));
         if excess > comparison.worst.0 {
             let text = format!("{strategy:?}: {}, expected {expected}\n{trace:?}\n{path:?}", sample.weight);
             comparison.worst = (excess, text);

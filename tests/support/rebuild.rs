@@ -192,33 +192,51 @@ fn in_medium(
     }
 }
 
+/// What rays start off their surfaces by, 32 roundings of coordinates up to 2.
+const OFFSET: f64 = 8e-6;
+
 impl Trace {
     /// Number of edges.
     pub(crate) fn length(&self) -> usize {
         self.interior.len() + 1
     }
 
-    /// By how much rounding may change a density, relative; the largest along the path.
-    ///
-    /// A ray starts off its surface by some roundings, so that a short edge is not quite the line between its
-    /// vertices; where that line is close to a surface the densities there follow its cosine, and refraction
-    /// is steep. Beams that are almost parallel have a sine of few digits.
-    pub(crate) fn conditioning(path: &Path) -> f64 {
-        // What rays start off their surfaces by, 32 roundings of coordinates up to 2.
-        const OFFSET: f64 = 8e-6;
-        let pairs = path.edges.iter().zip(path.vertices.windows(2));
-        let turned =
-            pairs.map(|(edge, ends)| OFFSET / (edge.distance * ends[0].cos_camera.min(ends[1].cos_light)));
-        let bent = path.vertices.iter().filter(|vertex| vertex.kind == VertexKind::Delta);
-        let bent = bent.map(|vertex| OFFSET / vertex.cos_camera.min(vertex.cos_light).powi(2));
-        let crossed =
-            path.vertices[1..].iter().zip(path.edges.windows(2)).map(|(vertex, edges)| match vertex.kind {
-                VertexKind::Medium(_) => {
-                    OFFSET / (edges[0].distance.min(edges[1].distance) * vertex.sin_theta)
+    /// By how much rounding may change a weight, relative: tried out, with every vertex moved along every axis by what rays
+    /// start off their surfaces by. Steep are refraction and cosines at grazing angles, short edges, beams that are
+    /// almost parallel, chords through bodies that are only just touched.
+    pub(crate) fn sensitivity(
+        &self,
+        scene: &ClosedForm,
+        roulette: bool,
+        weight: impl Fn(&Path) -> f64,
+        expected: f64,
+    ) -> f64 {
+        // Vertices may be off their surfaces by no more than rounding, so the step is smaller and the result scaled.
+        const STEP: f64 = 1e-6;
+        let mut sum = 0.0;
+        for i in 0..self.interior.len() {
+            for axis in DVec3::AXES {
+                let mut moved = self.clone();
+                moved.interior[i].light += STEP * axis;
+                moved.interior[i].camera += STEP * axis;
+                if let Ok(path) = moved.rebuild(scene, roulette) {
+                    sum += (weight(&path) / expected - 1.0).abs();
                 }
-                _ => 0.0,
-            });
-        turned.chain(bent).chain(crossed).fold(0.0, f64::max)
+            }
+        }
+        sum * OFFSET / STEP
+    }
+
+    /// The ends of the edges: edge i runs from the camera's side of vertex i to the light's side of vertex i + 1.
+    fn ends(&self, scene: &ClosedForm) -> Vec<(DVec3, DVec3)> {
+        let lens = self.lens.as_dvec3();
+        let light = &scene.lights[self.light.emitter.0 as usize];
+        let infinite = matches!(light.source, Source::Directional(_) | Source::Environment);
+        let receiver = self.interior.first().map_or(lens, |vertex| vertex.light);
+        let outwards = self.light.direction.as_dvec3();
+        let start = if infinite { receiver - 20.0 * outwards } else { self.light.point.position.as_dvec3() };
+        let starts = [start].into_iter().chain(self.interior.iter().map(|v| v.camera));
+        starts.zip(self.interior.iter().map(|v| v.light).chain([lens])).collect()
     }
 
     /// All densities of the path.
@@ -232,11 +250,8 @@ impl Trace {
         let infinite = matches!(light.source, Source::Directional(_) | Source::Environment);
         let receiver = self.interior.first().map_or(lens, |vertex| vertex.light);
         let outwards = self.light.direction.as_dvec3();
-        let start = if infinite { receiver - 20.0 * outwards } else { self.light.point.position.as_dvec3() };
-
-        // Edge i runs from the camera's side of vertex i to the light's side of vertex i + 1.
-        let starts: Vec<DVec3> = [start].into_iter().chain(self.interior.iter().map(|v| v.camera)).collect();
-        let ends: Vec<DVec3> = self.interior.iter().map(|v| v.light).chain([lens]).collect();
+        let (starts, ends): (Vec<DVec3>, Vec<DVec3>) = self.ends(scene).into_iter().unzip();
+        let start = starts[0];
         let mut passed = Vec::with_capacity(k);
         for (a, b) in starts.iter().zip(&ends) {
             passed.push(pass(scene, *a, *b)?);

@@ -107,6 +107,7 @@ impl MediumStack {
     }
 
     /// The bodies that the point is inside of, the current one last.
+    #[must_use]
     pub fn bodies(&self) -> impl DoubleEndedIterator<Item = Interior> + '_ {
         self.entries().iter().map(|entry| entry.interior())
     }
@@ -209,7 +210,7 @@ impl std::fmt::Debug for MediumStack {
         f.debug_struct("MediumStack")
             .field("outside", &self.outside.get())
             .field("bodies", &self.bodies().collect::<Vec<_>>())
-            .finish()
+            .finish_non_exhaustive()
     }
 }
 
