@@ -6,10 +6,12 @@
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
 
 mod approach;
+mod boxes;
 mod packed;
 mod point_tree;
 mod probe;
 mod segment_tree;
+mod sort;
 mod split;
 mod wide;
 

@@ -1,153 +1,133 @@
 //! The tree under both look-up structures.
 //!
-//! Items are sorted so that every eight neighbours form a block, every eight blocks a node, every eight nodes
-//! a node of the level above. Children follow from the index of the parent; nothing but boxes is stored,
-//! eight at a time per axis and side, so that one node is one vectorised test. The sort splits at the median
-//! across the widest extent of the centres; as ties are broken by index, coincident items make a
-//! tree like any other: the depth depends on their number alone.
+//! [Sorted](super::sort) items are packed eight to a block, and blocks and nodes eight to a node. The nodes
+//! above the blocks are the many: they are rounded to one cache line, and their place says where their blocks
+//! are. They and the blocks are what misses the cache. So both are gathered in lists before they are
+//! looked at: many are fetched at the same time.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::boxes::{Bounds, Boxes, Exact, Rounded, union};
+use super::probe::lanes;
+use super::sort::{Buckets, Item, split};
 use super::wide::{Task, Wide, run};
 
 /// Items per block and children per node.
 pub(super) const WIDTH: usize = 8;
 
-/// Levels that 2³² items can have.
-const MAX_LEVELS: usize = 11;
+/// Items of a leaf: of all blocks under a rounded node.
+const LEAF: usize = WIDTH * WIDTH;
 
-/// Below this number of items a thread works alone.
-const SERIAL: usize = 1 << 13;
+/// Levels that 2³² items can have above the leaves: nine if all are in one bucket, and as many above the buckets.
+const MAX_LEVELS: usize = 18;
 
-/// Eight boxes, arranged for vectorised tests. An unused lane has an empty box.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(super) struct Boxes {
-    pub(super) min: [[f32; WIDTH]; 3],
-    pub(super) max: [[f32; WIDTH]; 3],
-}
-
-impl Boxes {
-    const EMPTY: Self = Self { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3] };
-
-    fn set(&mut self, lane: usize, (min, max): (Vec3, Vec3)) {
-        for axis in 0..3 {
-            self.min[axis][lane] = min[axis];
-            self.max[axis][lane] = max[axis];
-        }
-    }
-
-    fn union(&self) -> (Vec3, Vec3) {
-        let least = |lanes: &[f32; WIDTH]| lanes.iter().copied().fold(f32::INFINITY, f32::min);
-        let greatest = |lanes: &[f32; WIDTH]| lanes.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        (Vec3::from(self.min.each_ref().map(least)), Vec3::from(self.max.each_ref().map(greatest)))
-    }
-}
+/// The greatest number of blocks or leaves that wait to be looked at.
+pub(super) const WAITING: usize = 24;
 
 /// What a traversal asks. Its methods are compiled into the traversal, for the instruction set of that.
 pub(super) trait Query {
     /// The boxes that may hold what is looked for, one bit per lane.
-    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32;
+    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32;
 
-    /// Looks at the items of a block.
-    fn block<W: Wide>(&mut self, wide: W, index: usize);
+    /// Looks at the items of up to [`WAITING`] blocks.
+    fn blocks<W: Wide>(&mut self, wide: W, blocks: &[u32]);
 }
 
-/// A hierarchy over blocks of eight items.
-#[derive(Clone, Debug)]
-pub(super) struct PackedTree {
-    /// Level after level, the one above the blocks first, the root last.
-    nodes: Vec<Boxes>,
-    /// Where each level starts, and after the last one the number of nodes.
-    starts: Vec<usize>,
-    blocks: usize,
-    bounds: (Vec3, Vec3),
+/// A node above other nodes.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    boxes: Exact,
+    /// The first child; the others follow.
+    first: u32,
+    /// One bit for each child.
+    existing: u8,
+    over_leaves: bool,
 }
 
-/// An item while it is sorted.
-#[derive(Clone, Copy)]
-struct Entry {
-    /// As [`ordered`] integers, which compare faster.
-    centre: [u32; 3],
-    index: u32,
-}
-
-impl Entry {
-    /// Ties go to the lesser index.
-    #[inline]
-    fn key<const AXIS: usize>(&self) -> u64 {
-        u64::from(self.centre[AXIS]) << 32 | u64::from(self.index)
+impl Node {
+    fn new(boxes: &[Bounds], first: usize, over_leaves: bool) -> Self {
+        let existing = ((1_u32 << boxes.len()) - 1) as u8;
+        Self { boxes: Exact::new(boxes), first: first as u32, existing, over_leaves }
     }
 }
 
-/// An integer in the place of a number in the total order.
-#[inline]
-fn ordered(x: f32) -> u32 {
-    let bits = x.to_bits();
-    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
-}
-
-/// The number at a place in the total order.
-fn number(ordered: u32) -> f32 {
-    f32::from_bits(if ordered >> 31 == 1 { ordered ^ 1 << 31 } else { !ordered })
+/// A hierarchy over blocks of eight items.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PackedTree {
+    /// The root first.
+    nodes: Vec<Node>,
+    /// The blocks of a leaf start at eight times its place.
+    leaves: Vec<Rounded>,
+    bounds: Bounds,
 }
 
 impl PackedTree {
-    /// Builds over `count` items with the given finite bounds; also returns their order in the blocks.
-    pub(super) fn build(count: usize, bounds: impl Fn(usize) -> (Vec3, Vec3) + Sync) -> (Self, Vec<u32>) {
-        assert!(u32::try_from(count).is_ok(), "{count} items are more than can be indexed");
-        let mut entries: Vec<Entry> = (0..count)
-            .into_par_iter()
-            .with_min_len(SERIAL)
-            .map(|index| {
-                let (min, max) = bounds(index);
-                Entry { centre: (min * 0.5 + max * 0.5).to_array().map(ordered), index: index as u32 }
-            })
-            .collect();
-        let mut capacity = WIDTH;
-        while capacity < count {
-            capacity *= WIDTH;
-        }
-        arrange(&mut entries, capacity);
-        let order: Vec<u32> = entries.par_iter().with_min_len(SERIAL).map(|entry| entry.index).collect();
-
-        let blocks = count.div_ceil(WIDTH);
-        let mut level: Vec<Boxes> = order
-            .par_chunks(WIDTH * WIDTH)
-            .with_min_len(SERIAL / (WIDTH * WIDTH))
-            .map(|items| {
-                let mut boxes = Boxes::EMPTY;
-                for (lane, block) in items.chunks(WIDTH).enumerate() {
-                    let each = block.iter().map(|&index| bounds(index as usize));
-                    if let Some(union) = each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) {
-                        boxes.set(lane, union);
-                    }
-                }
-                boxes
-            })
-            .collect();
-        let mut nodes = Vec::with_capacity(level.len() + level.len() / 4);
-        let mut starts = vec![0];
-        loop {
-            nodes.extend_from_slice(&level);
-            starts.push(nodes.len());
-            if level.len() <= 1 {
-                break;
+    /// Builds over items at finite places with the given finite bounds, and packs up to eight items at a time
+    /// into a block; there are `empty` blocks in between.
+    pub(super) fn build<T: Copy + Send + Sync, B: Copy + Send + Sync>(
+        items: &[Item<T>],
+        bounds: impl Fn(&Item<T>) -> Bounds + Sync,
+        empty: B,
+        block: impl Fn(&[Item<T>]) -> B + Sync,
+    ) -> (Self, Vec<B>) {
+        assert!(u32::try_from(items.len()).is_ok(), "{} items are more than can be indexed", items.len());
+        let buckets = Buckets::new(items);
+        let leaves = || buckets.counts.iter().map(|count| count.div_ceil(LEAF));
+        let mut blocks = vec![empty; leaves().sum::<usize>() * WIDTH];
+        let (mut rest, mut first) = (&mut blocks[..], 0);
+        let mut work = Vec::new();
+        for (bucket, leaves) in leaves().enumerate() {
+            let (own, others) = rest.split_at_mut(leaves * WIDTH);
+            if leaves > 0 {
+                work.push((bucket, first, own));
             }
-            level = level
-                .chunks(WIDTH)
-                .map(|children| {
-                    let mut boxes = Boxes::EMPTY;
-                    for (lane, child) in children.iter().enumerate() {
-                        boxes.set(lane, child.union());
-                    }
-                    boxes
-                })
-                .collect();
+            rest = others;
+            first += leaves;
         }
-        let bounds = nodes.last().map_or((Vec3::ZERO, Vec3::ZERO), Boxes::union);
-        (Self { nodes, starts, blocks, bounds }, order)
+        let branches = work.into_par_iter().map(|(bucket, first, own)| {
+            let mut items = buckets.items(bucket);
+            let branch = Branch::new(&mut items, first, &bounds);
+            for (to, items) in own.iter_mut().zip(items.chunks(WIDTH)) {
+                *to = block(items);
+            }
+            branch
+        });
+        (Self::join(&branches.collect::<Vec<_>>()), blocks)
+    }
+
+    /// Puts branches under common nodes, eight at a time.
+    fn join(branches: &[Branch]) -> Self {
+        // The levels above the branches, from the root down.
+        let mut levels = vec![branches.iter().map(|branch| branch.bounds).collect::<Vec<_>>()];
+        while levels[0].len() > 1 {
+            let around = |boxes: &[Bounds]| boxes.iter().copied().reduce(union).unwrap_or_default();
+            levels.insert(0, levels[0].chunks(WIDTH).map(around).collect());
+        }
+        let below: usize = branches.iter().map(|branch| branch.nodes.len()).sum();
+        let above: usize = levels[1..].iter().map(|level| level.len().div_ceil(WIDTH)).sum();
+        let mut nodes = Vec::with_capacity(above + below);
+        for level in &levels[1..] {
+            let first = nodes.len() + level.len().div_ceil(WIDTH);
+            let children = level.chunks(WIDTH).enumerate();
+            nodes.extend(children.map(|(index, boxes)| Node::new(boxes, first + index * WIDTH, false)));
+        }
+        // The roots of the branches are neighbours, what is below follows.
+        let first = above + branches.len();
+        let starts = branches.iter().scan(first, |next, branch| {
+            let start = *next;
+            *next += branch.nodes.len() - 1;
+            Some(start as u32)
+        });
+        let moved = |node: &Node, start: u32| Node { first: if node.over_leaves { node.first } else { node.first + start }, ..*node };
+        nodes.extend(branches.iter().zip(starts.clone()).map(|(branch, start)| moved(&branch.nodes[0], start)));
+        for (branch, start) in branches.iter().zip(starts) {
+            nodes.extend(branch.nodes[1..].iter().map(|node| moved(node, start)));
+        }
+        let leaves = branches.iter().flat_map(|branch| &branch.leaves);
+        let mut all = Vec::with_capacity(branches.iter().map(|branch| branch.leaves.len()).sum());
+        all.extend(leaves);
+        Self { nodes, leaves: all, bounds: levels[0].first().copied().unwrap_or_default() }
     }
 
     /// The greatest sum of coordinate differences between `point` and anything in the tree.
@@ -156,48 +136,14 @@ impl PackedTree {
     }
 
     pub(super) fn memory_bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<Boxes>() + self.starts.capacity() * size_of::<usize>()
+        self.nodes.capacity() * size_of::<Node>() + self.leaves.capacity() * size_of::<Rounded>()
     }
 
     /// Asks `query` about every block under the boxes that it accepts, in the order of the blocks.
     #[inline]
     pub(super) fn ask(&self, query: impl Query) {
-        if self.blocks > 0 {
+        if !self.nodes.is_empty() {
             run(Traversal { tree: self, query });
-        }
-    }
-
-    #[inline(always)]
-    fn walk(&self, wide: impl Wide, mut query: impl Query) {
-        let levels = self.starts.len() - 1;
-        debug_assert!(levels <= MAX_LEVELS, "{levels} levels");
-        // Lanes still to be visited and the index of the first child, per level from the blocks up. So the
-        // stack is as high as the tree and cannot overflow.
-        let mut lanes = [0_u32; MAX_LEVELS];
-        let mut children = [0_usize; MAX_LEVELS];
-        let (mut level, mut node) = (levels - 1, 0);
-        loop {
-            // Children that do not exist must not count: a test may accept empty boxes when the radius is infinite.
-            let below = if level == 0 { self.blocks } else { self.starts[level] - self.starts[level - 1] };
-            let existing = (1 << (below - node * WIDTH).min(WIDTH)) - 1;
-            let mut met = query.boxes(wide, &self.nodes[self.starts[level] + node]) & existing;
-            if level == 0 {
-                while met != 0 {
-                    query.block(wide, node * WIDTH + met.trailing_zeros() as usize);
-                    met &= met - 1;
-                }
-            }
-            children[level] = node * WIDTH;
-            lanes[level] = met;
-            while lanes[level] == 0 {
-                level += 1;
-                if level == levels {
-                    return;
-                }
-            }
-            node = children[level] + lanes[level].trailing_zeros() as usize;
-            lanes[level] &= lanes[level] - 1;
-            level -= 1;
         }
     }
 }
@@ -209,52 +155,140 @@ struct Traversal<'a, Q> {
 
 impl<Q: Query> Task for Traversal<'_, Q> {
     #[inline(always)]
-    fn run(self, wide: impl Wide) {
-        self.tree.walk(wide, self.query);
+    fn run(mut self, wide: impl Wide) {
+        // Lanes still to be visited and the first child, per level. So the stack is as high as the tree.
+        let mut stack = [(0_u32, 0_u32); MAX_LEVELS];
+        let (mut level, mut index) = (0, 0);
+        let mut leaves = List::default();
+        loop {
+            let node = &self.tree.nodes[index];
+            let met = self.query.boxes(wide, &node.boxes) & u32::from(node.existing);
+            if node.over_leaves {
+                leaves.extend(node.first, met);
+                if leaves.is_full() {
+                    self.leaves(wide, &mut leaves);
+                }
+            } else if met != 0 {
+                stack[level] = (met, node.first);
+                level += 1;
+            }
+            while level > 0 && stack[level - 1].0 == 0 {
+                level -= 1;
+            }
+            if level == 0 {
+                return self.leaves(wide, &mut leaves);
+            }
+            let (met, first) = &mut stack[level - 1];
+            index = (*first + met.trailing_zeros()) as usize;
+            *met &= *met - 1;
+        }
     }
 }
 
-/// Sorts entries so that every run of `capacity / 8` items, and of an eighth of that and so on, is compact.
-fn arrange(entries: &mut [Entry], capacity: usize) {
-    let mut capacity = capacity;
-    let mut parts = 1;
-    while parts == 1 {
-        if capacity <= WIDTH {
-            return;
+impl<Q: Query> Traversal<'_, Q> {
+    #[inline(always)]
+    fn leaves(&mut self, wide: impl Wide, leaves: &mut List) {
+        let mut blocks = List::default();
+        for &leaf in leaves.take() {
+            let met = self.query.boxes(wide, &self.tree.leaves[leaf as usize]);
+            blocks.extend(leaf * WIDTH as u32, met);
+            if blocks.is_full() {
+                self.query.blocks(wide, blocks.take());
+            }
         }
-        parts = entries.len().div_ceil(capacity / WIDTH);
-        if parts <= 1 {
-            capacity /= WIDTH;
-        }
-    }
-    let middle = parts.div_ceil(2) * (capacity / WIDTH);
-    match widest_axis(entries) {
-        0 => partition::<0>(entries, middle),
-        1 => partition::<1>(entries, middle),
-        _ => partition::<2>(entries, middle),
-    }
-    let parallel = entries.len() > SERIAL;
-    let (left, right) = entries.split_at_mut(middle);
-    if parallel {
-        rayon::join(|| arrange(left, capacity), || arrange(right, capacity));
-    } else {
-        arrange(left, capacity);
-        arrange(right, capacity);
+        self.query.blocks(wide, blocks.take());
     }
 }
 
-/// Moves the `middle` least entries along an axis to the front.
-fn partition<const AXIS: usize>(entries: &mut [Entry], middle: usize) {
-    entries.select_nth_unstable_by_key(middle, Entry::key::<AXIS>);
+/// Blocks or leaves that wait.
+#[derive(Default)]
+struct List {
+    indices: [u32; WAITING],
+    len: usize,
 }
 
-fn widest_axis(entries: &[Entry]) -> usize {
-    let (mut min, mut max) = ([u32::MAX; 3], [0; 3]);
-    for entry in entries {
-        for axis in 0..3 {
-            min[axis] = min[axis].min(entry.centre[axis]);
-            max[axis] = max[axis].max(entry.centre[axis]);
+impl List {
+    /// Adds those after `first` whose bit is set.
+    #[inline(always)]
+    fn extend(&mut self, first: u32, bits: u32) {
+        for lane in lanes(bits) {
+            self.indices[self.len] = first + lane as u32;
+            self.len += 1;
         }
     }
-    (Vec3::from(max.map(number)) - Vec3::from(min.map(number))).max_position()
+
+    /// Whether not all lanes of another node have room.
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        self.len > WAITING - WIDTH
+    }
+
+    /// Empties the list.
+    #[inline(always)]
+    fn take(&mut self) -> &[u32] {
+        let len = std::mem::take(&mut self.len);
+        &self.indices[..len]
+    }
+}
+
+/// The tree over a bucket. Its nodes are numbered from its second one: the root goes elsewhere.
+struct Branch {
+    nodes: Vec<Node>,
+    leaves: Vec<Rounded>,
+    bounds: Bounds,
+}
+
+impl Branch {
+    /// Sorts items and builds over them; their leaves start with `first`.
+    fn new<T>(items: &mut [Item<T>], first: usize, bounds: &impl Fn(&Item<T>) -> Bounds) -> Self {
+        let mut branch = Self { nodes: Vec::new(), leaves: Vec::new(), bounds: Bounds::default() };
+        let mut capacity = LEAF;
+        while capacity * WIDTH < items.len() {
+            capacity *= WIDTH;
+        }
+        branch.nodes.push(Node::new(&[], 0, true));
+        branch.bounds = branch.fill(0, items, capacity, first, bounds);
+        branch
+    }
+
+    /// Makes a node over up to eight runs of `capacity` items.
+    fn fill<T>(
+        &mut self,
+        node: usize,
+        items: &mut [Item<T>],
+        capacity: usize,
+        first_leaf: usize,
+        bounds: &impl Fn(&Item<T>) -> Bounds,
+    ) -> Bounds {
+        split(items, capacity);
+        let mut boxes = [Bounds::default(); WIDTH];
+        let boxes = &mut boxes[..items.len().div_ceil(capacity)];
+        let runs = boxes.iter_mut().zip(items.chunks_mut(capacity)).enumerate();
+        if capacity == LEAF {
+            for (_, (own, items)) in runs {
+                *own = self.add_leaf(items, bounds);
+            }
+            self.nodes[node] = Node::new(boxes, first_leaf, true);
+        } else {
+            let first = self.nodes.len();
+            self.nodes.resize(first + runs.len(), Node::new(&[], 0, true));
+            for (index, (own, items)) in runs {
+                let first_leaf = first_leaf + index * (capacity / LEAF);
+                *own = self.fill(first + index, items, capacity / WIDTH, first_leaf, bounds);
+            }
+            self.nodes[node] = Node::new(boxes, first - 1, false);
+        }
+        boxes.iter().copied().reduce(union).unwrap_or_default()
+    }
+
+    fn add_leaf<T>(&mut self, items: &mut [Item<T>], bounds: &impl Fn(&Item<T>) -> Bounds) -> Bounds {
+        split(items, WIDTH);
+        let mut boxes = [Bounds::default(); WIDTH];
+        let boxes = &mut boxes[..items.len().div_ceil(WIDTH)];
+        for (own, items) in boxes.iter_mut().zip(items.chunks(WIDTH)) {
+            *own = items.iter().map(bounds).reduce(union).unwrap_or_default();
+        }
+        self.leaves.push(Rounded::new(boxes));
+        boxes.iter().copied().reduce(union).unwrap_or_default()
+    }
 }

@@ -1,9 +1,10 @@
 //! Points, looked up in a ball (PP3D, SURF) or around a ray (PB2D).
 
 use glam::Vec3;
-use rayon::prelude::*;
 
-use super::packed::{Boxes, PackedTree, Query, WIDTH};
+use super::boxes::Boxes;
+use super::packed::{PackedTree, Query, WAITING, WIDTH};
+use super::sort::Item;
 use super::probe::{BallProbe, RayProbe, lanes};
 use super::wide::Wide;
 use crate::ray::Ray;
@@ -14,6 +15,19 @@ use crate::ray::Ray;
 struct Block<P> {
     position: [[f32; WIDTH]; 3],
     payload: [P; WIDTH],
+}
+
+impl<P: Copy> Block<P> {
+    fn pack(items: &[Item<P>]) -> Self {
+        let mut block = Self { position: [[f32::NAN; WIDTH]; 3], payload: [items[0].1; WIDTH] };
+        for (lane, &(position, payload)) in items.iter().enumerate() {
+            block.payload[lane] = payload;
+            for axis in 0..3 {
+                block.position[axis][lane] = position[axis];
+            }
+        }
+        block
+    }
 }
 
 /// Points with a payload each, for look-ups with any radius.
@@ -38,23 +52,11 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         let count = points.len();
         points.retain(|(position, _)| position.is_finite());
         let dropped = count - points.len();
-        let (tree, order) = PackedTree::build(points.len(), |index| (points[index].0, points[index].0));
-        let blocks = order
-            .par_chunks(WIDTH)
-            .with_min_len(1024)
-            .map(|items| {
-                let payload = points[items[0] as usize].1;
-                let mut block = Block { position: [[f32::NAN; WIDTH]; 3], payload: [payload; WIDTH] };
-                for (lane, &index) in items.iter().enumerate() {
-                    let (position, payload) = points[index as usize];
-                    block.payload[lane] = payload;
-                    for axis in 0..3 {
-                        block.position[axis][lane] = position[axis];
-                    }
-                }
-                block
-            })
-            .collect();
+        let Some(&(_, payload)) = points.first() else {
+            return Self { tree: PackedTree::default(), blocks: Vec::new(), count: 0, dropped };
+        };
+        let empty = Block { position: [[f32::NAN; WIDTH]; 3], payload: [payload; WIDTH] };
+        let (tree, blocks) = PackedTree::build(&points, |&(position, _)| (position, position), empty, Block::pack);
         Self { tree, blocks, count: points.len(), dropped }
     }
 
@@ -89,19 +91,27 @@ struct InBall<'a, P, V> {
 
 impl<P: Copy, V: FnMut(P, f32, f32)> Query for InBall<'_, P, V> {
     #[inline(always)]
-    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
         self.probe.test(wide, boxes)
     }
 
     #[inline(always)]
-    fn block<W: Wide>(&mut self, wide: W, index: usize) {
-        let block = &self.points.blocks[index];
-        let offset = wide.sub3(wide.load3(&block.position), wide.splat3(self.centre.to_array()));
-        let distance2 = wide.dot(offset, offset);
-        let inside = wide.less(distance2, wide.splat(self.radius2));
-        let distance2 = wide.store(distance2);
-        for lane in lanes(inside) {
-            (self.visit)(block.payload[lane], 0.0, distance2[lane]);
+    fn blocks<W: Wide>(&mut self, wide: W, blocks: &[u32]) {
+        let centre = wide.splat3(self.centre.to_array());
+        let radius2 = wide.splat(self.radius2);
+        let mut inside = [0_u32; WAITING];
+        let mut distances2 = [[0.0; WIDTH]; WAITING];
+        for (slot, &block) in blocks.iter().enumerate() {
+            let offset = wide.sub3(wide.load3(&self.points.blocks[block as usize].position), centre);
+            let distance2 = wide.dot(offset, offset);
+            inside[slot] = wide.less(distance2, radius2);
+            distances2[slot] = wide.store(distance2);
+        }
+        for (slot, &block) in blocks.iter().enumerate() {
+            let payload = &self.points.blocks[block as usize].payload;
+            for lane in lanes(inside[slot]) {
+                (self.visit)(payload[lane], 0.0, distances2[slot][lane]);
+            }
         }
     }
 }
@@ -116,13 +126,21 @@ struct AroundRay<'a, P, V> {
 
 impl<P: Copy, V: FnMut(P, f32, f32)> Query for AroundRay<'_, P, V> {
     #[inline(always)]
-    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
         self.probe.test(wide, boxes)
     }
 
     #[inline(always)]
-    fn block<W: Wide>(&mut self, wide: W, index: usize) {
-        let block = &self.points.blocks[index];
+    fn blocks<W: Wide>(&mut self, wide: W, blocks: &[u32]) {
+        for &block in blocks {
+            self.block(wide, &self.points.blocks[block as usize]);
+        }
+    }
+}
+
+impl<P: Copy, V: FnMut(P, f32, f32)> AroundRay<'_, P, V> {
+    #[inline(always)]
+    fn block<W: Wide>(&mut self, wide: W, block: &Block<P>) {
         let direction = wide.splat3(self.ray.direction.to_array());
         // Differences first: dot products of positions cancel far from the origin.
         let offset = wide.sub3(wide.load3(&block.position), wide.splat3(self.ray.origin.to_array()));

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::packed::Boxes;
+use super::boxes::Boxes;
 use super::wide::Wide;
 use crate::ray::Ray;
 
@@ -49,20 +49,20 @@ impl RayProbe {
     /// A zero component of the direction gives infinite distances, or NaN for a plane that holds the origin.
     /// The comparisons are written so that a NaN does not constrain.
     #[inline(always)]
-    pub(super) fn test<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+    pub(super) fn test<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
         let mut near = wide.splat(self.t_min);
         let mut far = wide.splat(self.t_max);
         for axis in 0..3 {
             let negative = self.negative[axis];
             let (enter, exit) = if negative {
-                (&boxes.max[axis], &boxes.min[axis])
+                (boxes.max(wide, axis), boxes.min(wide, axis))
             } else {
-                (&boxes.min[axis], &boxes.max[axis])
+                (boxes.min(wide, axis), boxes.max(wide, axis))
             };
             let outwards = wide.splat(if negative { self.radius } else { -self.radius });
             let (origin, inverse) = (wide.splat(self.origin[axis]), wide.splat(self.inverse[axis]));
-            let from = wide.mul(wide.add(wide.sub(wide.load(enter), origin), outwards), inverse);
-            let to = wide.mul(wide.sub(wide.sub(wide.load(exit), origin), outwards), inverse);
+            let from = wide.mul(wide.add(wide.sub(enter, origin), outwards), inverse);
+            let to = wide.mul(wide.sub(wide.sub(exit, origin), outwards), inverse);
             near = wide.greater_of(from, near);
             far = wide.less_of(to, far);
         }
@@ -89,12 +89,12 @@ impl BallProbe {
 
     /// The boxes that overlap the ball.
     #[inline(always)]
-    pub(super) fn test<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+    pub(super) fn test<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
         let (mut distance2, zero) = (wide.splat(0.0), wide.splat(0.0));
         for axis in 0..3 {
             let centre = wide.splat(self.centre[axis]);
-            let below = wide.sub(wide.load(&boxes.min[axis]), centre);
-            let above = wide.sub(centre, wide.load(&boxes.max[axis]));
+            let below = wide.sub(boxes.min(wide, axis), centre);
+            let above = wide.sub(centre, boxes.max(wide, axis));
             let outside = wide.greater_of(wide.greater_of(below, above), zero);
             distance2 = wide.add(distance2, wide.mul(outside, outside));
         }

@@ -4,8 +4,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::approach::{ClosestApproach, Segment, closest_approach};
-use super::packed::{Boxes, PackedTree, Query, WIDTH};
+use super::boxes::Boxes;
+use super::packed::{PackedTree, Query, WIDTH};
 use super::probe::{BallProbe, RayProbe, lanes};
+use super::sort::Item;
 use super::split::{Piece, SplitParams, split};
 use super::wide::Wide;
 use crate::ray::Ray;
@@ -78,22 +80,27 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
         segments.retain(|(segment, _)| segment.is_usable());
         let dropped = count - segments.len();
         let pieces = split(segments.iter().map(|(segment, _)| segment), params);
-        let (tree, order) = PackedTree::build(pieces.len(), |index| {
-            let piece = pieces[index];
-            bounds(&segments[piece.segment as usize].0, piece)
+        let item = |index: usize| {
+            let (min, max) = bounds(&segments[pieces[index].segment as usize].0, pieces[index]);
+            (min * 0.5 + max * 0.5, index as u32)
+        };
+        let items: Vec<_> = (0..pieces.len()).into_par_iter().with_min_len(1024).map(item).collect();
+        let piece_of = |&(_, index): &Item<u32>| {
+            let piece = pieces[index as usize];
+            (piece, &segments[piece.segment as usize].0)
+        };
+        let bounds = |item: &Item<u32>| {
+            let (piece, segment) = piece_of(item);
+            bounds(segment, piece)
+        };
+        let (tree, blocks) = PackedTree::build(&items, bounds, Block::EMPTY, |items| {
+            let mut block = Block::EMPTY;
+            for (lane, item) in items.iter().enumerate() {
+                let (piece, segment) = piece_of(item);
+                block.set(lane, piece, segment);
+            }
+            block
         });
-        let blocks = order
-            .par_chunks(WIDTH)
-            .with_min_len(1024)
-            .map(|items| {
-                let mut block = Block::EMPTY;
-                for (lane, &index) in items.iter().enumerate() {
-                    let piece = pieces[index as usize];
-                    block.set(lane, piece, &segments[piece.segment as usize].0);
-                }
-                block
-            })
-            .collect();
         let ends = segments.iter().flat_map(|(segment, _)| [segment.start, segment.end]);
         let reach = ends.fold(0.0, |reach: f32, end| reach.max(end.abs()));
         let payloads = segments.into_iter().map(|(_, payload)| payload).collect();
@@ -134,13 +141,21 @@ struct AroundRay<'a, P, V> {
 
 impl<P: Copy, V: FnMut(P, ClosestApproach)> Query for AroundRay<'_, P, V> {
     #[inline(always)]
-    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
         self.probe.test(wide, boxes)
     }
 
     #[inline(always)]
-    fn block<W: Wide>(&mut self, wide: W, index: usize) {
-        let block = &self.segments.blocks[index];
+    fn blocks<W: Wide>(&mut self, wide: W, blocks: &[u32]) {
+        for &block in blocks {
+            self.block(wide, &self.segments.blocks[block as usize]);
+        }
+    }
+}
+
+impl<P: Copy, V: FnMut(P, ClosestApproach)> AroundRay<'_, P, V> {
+    #[inline(always)]
+    fn block<W: Wide>(&mut self, wide: W, block: &Block) {
         let direction = wide.load3(&block.direction);
         let between = wide.sub3(wide.load3(&block.origin), wide.splat3(self.ray.origin.to_array()));
         let normal = wide.cross(wide.splat3(self.ray.direction.to_array()), direction);
@@ -169,13 +184,21 @@ struct AroundPoint<'a, P, V> {
 
 impl<P: Copy, V: FnMut(P, f32, f32)> Query for AroundPoint<'_, P, V> {
     #[inline(always)]
-    fn boxes<W: Wide>(&self, wide: W, boxes: &Boxes) -> u32 {
+    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
         self.probe.test(wide, boxes)
     }
 
     #[inline(always)]
-    fn block<W: Wide>(&mut self, wide: W, index: usize) {
-        let block = &self.segments.blocks[index];
+    fn blocks<W: Wide>(&mut self, wide: W, blocks: &[u32]) {
+        for &block in blocks {
+            self.block(wide, &self.segments.blocks[block as usize]);
+        }
+    }
+}
+
+impl<P: Copy, V: FnMut(P, f32, f32)> AroundPoint<'_, P, V> {
+    #[inline(always)]
+    fn block<W: Wide>(&mut self, wide: W, block: &Block) {
         let direction = wide.load3(&block.direction);
         let offset = wide.sub3(wide.splat3(self.point.to_array()), wide.load3(&block.origin));
         let t = wide.dot(offset, direction);

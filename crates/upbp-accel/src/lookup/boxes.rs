@@ -1,0 +1,121 @@
+//! Eight boxes, as they are or in a cache line.
+
+use glam::Vec3;
+
+use super::packed::WIDTH;
+use super::wide::Wide;
+
+/// The box around some items: least and greatest corner.
+pub(super) type Bounds = (Vec3, Vec3);
+
+/// The box around two boxes.
+pub(super) fn union(a: Bounds, b: Bounds) -> Bounds {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+/// Eight boxes for vectorised tests. The box of an unused lane ends before it begins.
+pub(super) trait Boxes {
+    /// The least coordinates along an axis.
+    fn min<W: Wide>(&self, wide: W, axis: usize) -> W::F;
+    /// The greatest coordinates along an axis.
+    fn max<W: Wide>(&self, wide: W, axis: usize) -> W::F;
+}
+
+/// Boxes as they are.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Exact {
+    min: [[f32; WIDTH]; 3],
+    max: [[f32; WIDTH]; 3],
+}
+
+impl Exact {
+    /// Of up to eight boxes.
+    pub(super) fn new(boxes: &[Bounds]) -> Self {
+        let mut exact =
+            Self { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3] };
+        for (lane, (min, max)) in boxes.iter().enumerate() {
+            for axis in 0..3 {
+                exact.min[axis][lane] = min[axis];
+                exact.max[axis][lane] = max[axis];
+            }
+        }
+        exact
+    }
+}
+
+impl Boxes for Exact {
+    #[inline(always)]
+    fn min<W: Wide>(&self, wide: W, axis: usize) -> W::F {
+        wide.load(&self.min[axis])
+    }
+
+    #[inline(always)]
+    fn max<W: Wide>(&self, wide: W, axis: usize) -> W::F {
+        wide.load(&self.max[axis])
+    }
+}
+
+/// Boxes rounded outwards to a grid with the same step along all axes. For boxes of like size only: small ones
+/// among large ones would grow many times.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Rounded {
+    min: [[u8; WIDTH]; 3],
+    max: [[u8; WIDTH]; 3],
+    origin: [f32; 3],
+    step: f32,
+}
+
+impl Rounded {
+    /// Around up to eight boxes.
+    pub(super) fn new(boxes: &[Bounds]) -> Self {
+        let mut rounded =
+            Self { min: [[u8::MAX; WIDTH]; 3], max: [[0; WIDTH]; 3], origin: [0.0; 3], step: 0.0 };
+        let Some((low, high)) = boxes.iter().copied().reduce(union) else { return rounded };
+        rounded.origin = low.to_array();
+        // Divided first: the difference may be more than the greatest number.
+        rounded.step = (high / 255.0 - low / 255.0).max_element();
+        while (0..3).any(|axis| rounded.at(axis, u8::MAX) < high[axis]) {
+            rounded.step = rounded.step.next_up();
+        }
+        let inverse = rounded.step.recip();
+        for (lane, (min, max)) in boxes.iter().enumerate() {
+            for axis in 0..3 {
+                let place = |x: f32| ((x - low[axis]) * inverse) as u8;
+                let (mut least, mut greatest) = (place(min[axis]), place(max[axis]));
+                // Rounding may be off by some.
+                while rounded.at(axis, least) > min[axis] {
+                    least -= 1;
+                }
+                while rounded.at(axis, greatest) < max[axis] {
+                    greatest += 1;
+                }
+                (rounded.min[axis][lane], rounded.max[axis][lane]) = (least, greatest);
+            }
+        }
+        rounded
+    }
+
+    /// As the tests compute it.
+    fn at(&self, axis: usize, place: u8) -> f32 {
+        self.origin[axis] + f32::from(place) * self.step
+    }
+
+    #[inline(always)]
+    fn places<W: Wide>(&self, wide: W, axis: usize, places: &[u8; WIDTH]) -> W::F {
+        wide.add(wide.splat(self.origin[axis]), wide.mul(wide.load_bytes(places), wide.splat(self.step)))
+    }
+}
+
+impl Boxes for Rounded {
+    #[inline(always)]
+    fn min<W: Wide>(&self, wide: W, axis: usize) -> W::F {
+        self.places(wide, axis, &self.min[axis])
+    }
+
+    #[inline(always)]
+    fn max<W: Wide>(&self, wide: W, axis: usize) -> W::F {
+        self.places(wide, axis, &self.max[axis])
+    }
+}
