@@ -42,7 +42,7 @@ const FOCUS: Vec3 = Vec3::new(0.3, -0.2, 0.1);
 enum Spread {
     /// Everywhere alike: fog after many scatterings.
     Uniform,
-    /// Around one place, denser towards its middle: a caustic.
+    /// Around one place, denser towards its middle, which is of finite size: a caustic.
     Clustered,
     /// On straight lines from one point: the first flight from a small lamp.
     FromOnePoint,
@@ -70,7 +70,7 @@ impl Spread {
     fn point(self, random: &mut Stream) -> Vec3 {
         match self {
             Self::Uniform => cube(random),
-            Self::Clustered => FOCUS + cube(random) * (0.5 * random.uniform().powi(4)),
+            Self::Clustered => FOCUS + cube(random) * (0.5 * random.uniform().powi(4).max(1e-3)),
             Self::FromOnePoint => {
                 let direction = direction(random);
                 // A mean free path of a quarter of the cube's width.
@@ -229,6 +229,9 @@ impl<E: Clone, T, Q> Question<E, T, Q> {
 }
 
 /// The radius at which all queries together have `hits` hits each on average, by bisection of its logarithm.
+///
+/// # Panics
+/// If there are more hits at any radius.
 fn radius_for(hits: f64, count: impl Fn(f32) -> usize) -> f32 {
     let (mut low, mut high) = (1e-6_f32, 2.0_f32);
     for _ in 0..16 {
@@ -239,6 +242,7 @@ fn radius_for(hits: f64, count: impl Fn(f32) -> usize) -> f32 {
             low = middle;
         }
     }
+    assert!(low > 1e-6, "more than {hits} hits at any radius");
     high
 }
 

@@ -14,7 +14,9 @@ pub(super) fn union(a: Bounds, b: Bounds) -> Bounds {
 }
 
 /// Eight boxes for vectorised tests. The box of an unused lane ends before it begins.
-pub(super) trait Boxes {
+pub(super) trait Boxes: Copy + Send {
+    /// Around up to eight boxes.
+    fn around(boxes: &[Bounds]) -> Self;
     /// The least coordinates along an axis.
     fn min<W: Wide>(&self, wide: W, axis: usize) -> W::F;
     /// The greatest coordinates along an axis.
@@ -29,11 +31,9 @@ pub(super) struct Exact {
     max: [[f32; WIDTH]; 3],
 }
 
-impl Exact {
-    /// Of up to eight boxes.
-    pub(super) fn new(boxes: &[Bounds]) -> Self {
-        let mut exact =
-            Self { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3] };
+impl Boxes for Exact {
+    fn around(boxes: &[Bounds]) -> Self {
+        let mut exact = Self { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3] };
         for (lane, (min, max)) in boxes.iter().enumerate() {
             for axis in 0..3 {
                 exact.min[axis][lane] = min[axis];
@@ -42,9 +42,7 @@ impl Exact {
         }
         exact
     }
-}
 
-impl Boxes for Exact {
     #[inline(always)]
     fn min<W: Wide>(&self, wide: W, axis: usize) -> W::F {
         wide.load(&self.min[axis])
@@ -68,8 +66,19 @@ pub(super) struct Rounded {
 }
 
 impl Rounded {
-    /// Around up to eight boxes.
-    pub(super) fn new(boxes: &[Bounds]) -> Self {
+    /// As the tests compute it.
+    fn at(&self, axis: usize, place: u8) -> f32 {
+        self.origin[axis] + f32::from(place) * self.step
+    }
+
+    #[inline(always)]
+    fn places<W: Wide>(&self, wide: W, axis: usize, places: &[u8; WIDTH]) -> W::F {
+        wide.add(wide.splat(self.origin[axis]), wide.mul(wide.load_bytes(places), wide.splat(self.step)))
+    }
+}
+
+impl Boxes for Rounded {
+    fn around(boxes: &[Bounds]) -> Self {
         let mut rounded =
             Self { min: [[u8::MAX; WIDTH]; 3], max: [[0; WIDTH]; 3], origin: [0.0; 3], step: 0.0 };
         let Some((low, high)) = boxes.iter().copied().reduce(union) else { return rounded };
@@ -97,18 +106,6 @@ impl Rounded {
         rounded
     }
 
-    /// As the tests compute it.
-    fn at(&self, axis: usize, place: u8) -> f32 {
-        self.origin[axis] + f32::from(place) * self.step
-    }
-
-    #[inline(always)]
-    fn places<W: Wide>(&self, wide: W, axis: usize, places: &[u8; WIDTH]) -> W::F {
-        wide.add(wide.splat(self.origin[axis]), wide.mul(wide.load_bytes(places), wide.splat(self.step)))
-    }
-}
-
-impl Boxes for Rounded {
     #[inline(always)]
     fn min<W: Wide>(&self, wide: W, axis: usize) -> W::F {
         self.places(wide, axis, &self.min[axis])

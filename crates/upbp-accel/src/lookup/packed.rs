@@ -1,14 +1,13 @@
 //! The tree under both look-up structures.
 //!
 //! [Sorted](super::sort) items are packed eight to a block, and blocks and nodes eight to a node. The nodes
-//! above the blocks are the many: they are rounded to one cache line, and their place says where their blocks
-//! are. They and the blocks are what misses the cache. So both are gathered in lists before they are
-//! looked at: many are fetched at the same time.
+//! above the blocks, the leaves, are the many; their place says where their blocks are. They and the blocks are what
+//! misses the cache. So both are gathered in lists before they are looked at: many are fetched at the same time.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::boxes::{Bounds, Boxes, Exact, Rounded, union};
+use super::boxes::{Bounds, Boxes, Exact, union};
 use super::probe::lanes;
 use super::sort::{Buckets, Item, split};
 use super::wide::{Task, Wide, run};
@@ -16,7 +15,7 @@ use super::wide::{Task, Wide, run};
 /// Items per block and children per node.
 pub(super) const WIDTH: usize = 8;
 
-/// Items of a leaf: of all blocks under a rounded node.
+/// Items of a leaf, of all its blocks.
 const LEAF: usize = WIDTH * WIDTH;
 
 /// Levels that 2³² items can have above the leaves: nine if all are in one bucket, and as many above the buckets.
@@ -48,23 +47,27 @@ struct Node {
 impl Node {
     fn new(boxes: &[Bounds], first: usize, over_leaves: bool) -> Self {
         let existing = ((1_u32 << boxes.len()) - 1) as u8;
-        Self { boxes: Exact::new(boxes), first: first as u32, existing, over_leaves }
+        Self { boxes: Exact::around(boxes), first: first as u32, existing, over_leaves }
     }
 }
 
-/// A hierarchy over blocks of eight items.
-#[derive(Clone, Debug, Default)]
-pub(super) struct PackedTree {
+/// A hierarchy over blocks of eight items, with leaves of a kind of boxes.
+#[derive(Clone, Debug)]
+pub(super) struct PackedTree<L> {
     /// The root first.
     nodes: Vec<Node>,
     /// The blocks of a leaf start at eight times its place.
-    leaves: Vec<Rounded>,
+    leaves: Vec<L>,
     bounds: Bounds,
 }
 
-impl PackedTree {
+impl<L: Boxes> PackedTree<L> {
+    /// A tree over nothing.
+    pub(super) const EMPTY: Self =
+        Self { nodes: Vec::new(), leaves: Vec::new(), bounds: (Vec3::ZERO, Vec3::ZERO) };
+
     /// Builds over items at finite places with the given finite bounds, and packs up to eight items at a time
-    /// into a block; there are `empty` blocks in between.
+    /// into a block; the leaves that are not full have `empty` ones.
     pub(super) fn build<T: Copy + Send + Sync, B: Copy + Send + Sync>(
         items: &[Item<T>],
         bounds: impl Fn(&Item<T>) -> Bounds + Sync,
@@ -97,7 +100,7 @@ impl PackedTree {
     }
 
     /// Puts branches under common nodes, eight at a time.
-    fn join(branches: &[Branch]) -> Self {
+    fn join(branches: &[Branch<L>]) -> Self {
         // The levels above the branches, from the root down.
         let mut levels = vec![branches.iter().map(|branch| branch.bounds).collect::<Vec<_>>()];
         while levels[0].len() > 1 {
@@ -119,15 +122,18 @@ impl PackedTree {
             *next += branch.nodes.len() - 1;
             Some(start as u32)
         });
-        let moved = |node: &Node, start: u32| Node { first: if node.over_leaves { node.first } else { node.first + start }, ..*node };
-        nodes.extend(branches.iter().zip(starts.clone()).map(|(branch, start)| moved(&branch.nodes[0], start)));
+        let moved = |node: &Node, start: u32| Node {
+            first: if node.over_leaves { node.first } else { node.first + start },
+            ..*node
+        };
+        nodes.extend(
+            branches.iter().zip(starts.clone()).map(|(branch, start)| moved(&branch.nodes[0], start)),
+        );
         for (branch, start) in branches.iter().zip(starts) {
             nodes.extend(branch.nodes[1..].iter().map(|node| moved(node, start)));
         }
-        let leaves = branches.iter().flat_map(|branch| &branch.leaves);
-        let mut all = Vec::with_capacity(branches.iter().map(|branch| branch.leaves.len()).sum());
-        all.extend(leaves);
-        Self { nodes, leaves: all, bounds: levels[0].first().copied().unwrap_or_default() }
+        let leaves = branches.iter().map(|branch| &branch.leaves[..]).collect::<Vec<_>>().concat();
+        Self { nodes, leaves, bounds: levels[0].first().copied().unwrap_or_default() }
     }
 
     /// The greatest sum of coordinate differences between `point` and anything in the tree.
@@ -136,7 +142,7 @@ impl PackedTree {
     }
 
     pub(super) fn memory_bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<Node>() + self.leaves.capacity() * size_of::<Rounded>()
+        self.nodes.capacity() * size_of::<Node>() + self.leaves.capacity() * size_of::<L>()
     }
 
     /// Asks `query` about every block under the boxes that it accepts, in the order of the blocks.
@@ -148,12 +154,12 @@ impl PackedTree {
     }
 }
 
-struct Traversal<'a, Q> {
-    tree: &'a PackedTree,
+struct Traversal<'a, L, Q> {
+    tree: &'a PackedTree<L>,
     query: Q,
 }
 
-impl<Q: Query> Task for Traversal<'_, Q> {
+impl<L: Boxes, Q: Query> Task for Traversal<'_, L, Q> {
     #[inline(always)]
     fn run(mut self, wide: impl Wide) {
         // Lanes still to be visited and the first child, per level. So the stack is as high as the tree.
@@ -185,7 +191,7 @@ impl<Q: Query> Task for Traversal<'_, Q> {
     }
 }
 
-impl<Q: Query> Traversal<'_, Q> {
+impl<L: Boxes, Q: Query> Traversal<'_, L, Q> {
     #[inline(always)]
     fn leaves(&mut self, wide: impl Wide, leaves: &mut List) {
         let mut blocks = List::default();
@@ -232,15 +238,19 @@ impl List {
 }
 
 /// The tree over a bucket. Its nodes are numbered from its second one: the root goes elsewhere.
-struct Branch {
+struct Branch<L> {
     nodes: Vec<Node>,
-    leaves: Vec<Rounded>,
+    leaves: Vec<L>,
     bounds: Bounds,
 }
 
-impl Branch {
+impl<L: Boxes> Branch<L> {
     /// Sorts items and builds over them; their leaves start with `first`.
-    fn new<T>(items: &mut [Item<T>], first: usize, bounds: &impl Fn(&Item<T>) -> Bounds) -> Self {
+    fn new<T: Copy + Send>(
+        items: &mut [Item<T>],
+        first: usize,
+        bounds: &impl Fn(&Item<T>) -> Bounds,
+    ) -> Self {
         let mut branch = Self { nodes: Vec::new(), leaves: Vec::new(), bounds: Bounds::default() };
         let mut capacity = LEAF;
         while capacity * WIDTH < items.len() {
@@ -252,7 +262,7 @@ impl Branch {
     }
 
     /// Makes a node over up to eight runs of `capacity` items.
-    fn fill<T>(
+    fn fill<T: Copy + Send>(
         &mut self,
         node: usize,
         items: &mut [Item<T>],
@@ -281,14 +291,18 @@ impl Branch {
         boxes.iter().copied().reduce(union).unwrap_or_default()
     }
 
-    fn add_leaf<T>(&mut self, items: &mut [Item<T>], bounds: &impl Fn(&Item<T>) -> Bounds) -> Bounds {
+    fn add_leaf<T: Copy + Send>(
+        &mut self,
+        items: &mut [Item<T>],
+        bounds: &impl Fn(&Item<T>) -> Bounds,
+    ) -> Bounds {
         split(items, WIDTH);
         let mut boxes = [Bounds::default(); WIDTH];
         let boxes = &mut boxes[..items.len().div_ceil(WIDTH)];
         for (own, items) in boxes.iter_mut().zip(items.chunks(WIDTH)) {
             *own = items.iter().map(bounds).reduce(union).unwrap_or_default();
         }
-        self.leaves.push(Rounded::new(boxes));
+        self.leaves.push(L::around(boxes));
         boxes.iter().copied().reduce(union).unwrap_or_default()
     }
 }

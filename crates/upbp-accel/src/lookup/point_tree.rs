@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-use super::boxes::Boxes;
+use super::boxes::{Boxes, Rounded};
 use super::packed::{PackedTree, Query, WAITING, WIDTH};
-use super::sort::Item;
 use super::probe::{BallProbe, RayProbe, lanes};
+use super::sort::Item;
 use super::wide::Wide;
 use crate::ray::Ray;
 
@@ -18,15 +18,15 @@ struct Block<P> {
 }
 
 impl<P: Copy> Block<P> {
-    fn pack(items: &[Item<P>]) -> Self {
-        let mut block = Self { position: [[f32::NAN; WIDTH]; 3], payload: [items[0].1; WIDTH] };
+    /// With items in the first lanes.
+    fn with(mut self, items: &[Item<P>]) -> Self {
         for (lane, &(position, payload)) in items.iter().enumerate() {
-            block.payload[lane] = payload;
+            self.payload[lane] = payload;
             for axis in 0..3 {
-                block.position[axis][lane] = position[axis];
+                self.position[axis][lane] = position[axis];
             }
         }
-        block
+        self
     }
 }
 
@@ -35,7 +35,7 @@ impl<P: Copy> Block<P> {
 /// The same points give the same tree and the same order of visits, whatever the number of threads.
 #[derive(Clone, Debug)]
 pub struct PointTree<P> {
-    tree: PackedTree,
+    tree: PackedTree<Rounded>,
     blocks: Vec<Block<P>>,
     count: usize,
     dropped: usize,
@@ -53,10 +53,11 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         points.retain(|(position, _)| position.is_finite());
         let dropped = count - points.len();
         let Some(&(_, payload)) = points.first() else {
-            return Self { tree: PackedTree::default(), blocks: Vec::new(), count: 0, dropped };
+            return Self { tree: PackedTree::EMPTY, blocks: Vec::new(), count: 0, dropped };
         };
         let empty = Block { position: [[f32::NAN; WIDTH]; 3], payload: [payload; WIDTH] };
-        let (tree, blocks) = PackedTree::build(&points, |&(position, _)| (position, position), empty, Block::pack);
+        let bounds = |&(position, _): &Item<P>| (position, position);
+        let (tree, blocks) = PackedTree::build(&points, bounds, empty, |items| empty.with(items));
         Self { tree, blocks, count: points.len(), dropped }
     }
 

@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::approach::{ClosestApproach, Segment, closest_approach};
-use super::boxes::Boxes;
+use super::boxes::{Boxes, Exact};
 use super::packed::{PackedTree, Query, WIDTH};
 use super::probe::{BallProbe, RayProbe, lanes};
 use super::sort::Item;
@@ -59,7 +59,7 @@ impl Block {
 /// give the same tree and the same order of visits, whatever the number of threads.
 #[derive(Clone, Debug)]
 pub struct SegmentTree<P> {
-    tree: PackedTree,
+    tree: PackedTree<Exact>,
     blocks: Vec<Block>,
     payloads: Vec<P>,
     /// The greatest distance from a segment to the point that it is measured from.
