@@ -233,8 +233,8 @@ impl<E: Clone, T, Q> Question<E, T, Q> {
 /// # Panics
 /// If there are more hits at any radius.
 fn radius_for(hits: f64, count: impl Fn(f32) -> usize) -> f32 {
-    let (mut low, mut high) = (1e-6_f32, 2.0_f32);
-    for _ in 0..16 {
+    let (mut low, mut high) = (1e-8_f32, 2.0_f32);
+    for _ in 0..20 {
         let middle = (low * high).sqrt();
         if count(middle) as f64 > hits * TRIALS as f64 {
             high = middle;
@@ -242,7 +242,7 @@ fn radius_for(hits: f64, count: impl Fn(f32) -> usize) -> f32 {
             low = middle;
         }
     }
-    assert!(low > 1e-6, "more than {hits} hits at any radius");
+    assert!(low > 1e-8, "more than {hits} hits at any radius");
     high
 }
 

@@ -72,7 +72,7 @@ impl Rounded {
     }
 
     #[inline(always)]
-    fn places<W: Wide>(&self, wide: W, axis: usize, places: &[u8; WIDTH]) -> W::F {
+    fn places<W: Wide>(&self, wide: W, axis: usize, places: [u8; WIDTH]) -> W::F {
         wide.add(wide.splat(self.origin[axis]), wide.mul(wide.load_bytes(places), wide.splat(self.step)))
     }
 }
@@ -108,11 +108,11 @@ impl Boxes for Rounded {
 
     #[inline(always)]
     fn min<W: Wide>(&self, wide: W, axis: usize) -> W::F {
-        self.places(wide, axis, &self.min[axis])
+        self.places(wide, axis, self.min[axis])
     }
 
     #[inline(always)]
     fn max<W: Wide>(&self, wide: W, axis: usize) -> W::F {
-        self.places(wide, axis, &self.max[axis])
+        self.places(wide, axis, self.max[axis])
     }
 }

@@ -273,16 +273,16 @@ impl<L: Boxes> Branch<L> {
         split(items, capacity);
         let mut boxes = [Bounds::default(); WIDTH];
         let boxes = &mut boxes[..items.len().div_ceil(capacity)];
-        let runs = boxes.iter_mut().zip(items.chunks_mut(capacity)).enumerate();
+        let runs = boxes.iter_mut().zip(items.chunks_mut(capacity));
         if capacity == LEAF {
-            for (_, (own, items)) in runs {
+            for (own, items) in runs {
                 *own = self.add_leaf(items, bounds);
             }
             self.nodes[node] = Node::new(boxes, first_leaf, true);
         } else {
             let first = self.nodes.len();
             self.nodes.resize(first + runs.len(), Node::new(&[], 0, true));
-            for (index, (own, items)) in runs {
+            for (index, (own, items)) in runs.enumerate() {
                 let first_leaf = first_leaf + index * (capacity / LEAF);
                 *own = self.fill(first + index, items, capacity / WIDTH, first_leaf, bounds);
             }

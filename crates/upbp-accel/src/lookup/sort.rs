@@ -170,7 +170,7 @@ fn sort_few<const N: usize, T: Copy>(items: &mut [Item<T>], axis: usize, extent:
     for (index, (key, item)) in keys.iter_mut().zip(&*items).enumerate() {
         // In range even if the difference or the scale is not.
         let place = ((item.0[axis] - first) * scale).min((1 << 24) as f32) as i32;
-        *key = place << 6 | index as i32;
+        *key = place << 6 | i32::from(index as u8);
     }
     let mut ranks = [0_i32; N];
     for &other in &keys[..items.len()] {

@@ -15,7 +15,7 @@ pub(super) trait Wide: Copy {
 
     fn load(self, lanes: &[f32; WIDTH]) -> Self::F;
     /// Whole numbers.
-    fn load_bytes(self, lanes: &[u8; WIDTH]) -> Self::F;
+    fn load_bytes(self, lanes: [u8; WIDTH]) -> Self::F;
     fn store(self, lanes: Self::F) -> [f32; WIDTH];
     fn splat(self, x: f32) -> Self::F;
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
@@ -106,7 +106,7 @@ impl Wide for Plain {
     }
 
     #[inline(always)]
-    fn load_bytes(self, lanes: &[u8; WIDTH]) -> Self::F {
+    fn load_bytes(self, lanes: [u8; WIDTH]) -> Self::F {
         lanes.map(f32::from)
     }
 
@@ -187,8 +187,8 @@ mod avx2 {
         }
 
         #[inline(always)]
-        fn load_bytes(self, lanes: &[u8; WIDTH]) -> f32x8 {
-            let low = [u64::from_ne_bytes(*lanes), 0];
+        fn load_bytes(self, lanes: [u8; WIDTH]) -> f32x8 {
+            let low = [u64::from_ne_bytes(lanes), 0];
             self.convert_i32x8_to_f32x8(self.convert_u8x16_to_i32x8(cast(low)))
         }
 
@@ -265,7 +265,7 @@ mod tests {
                     wide.less_of(a, b),
                 ]
                 .into_iter()
-                .chain([wide.dot(triple.0, triple.1), wide.load_bytes(&[0, 1, 2, 127, 128, 200, 254, 255])])
+                .chain([wide.dot(triple.0, triple.1), wide.load_bytes([0, 1, 2, 127, 128, 200, 254, 255])])
                 .chain(wide.cross(triple.0, triple.1));
                 for lanes in results {
                     // Which NaN is not said.
