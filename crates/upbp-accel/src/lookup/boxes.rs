@@ -116,3 +116,51 @@ impl Boxes for Rounded {
         self.places(wide, axis, self.max[axis])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+
+    use super::*;
+
+    #[test]
+    fn rounded_boxes_hold_the_boxes_at_any_scale_and_place() {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut cube =
+            || Vec3::from([0; 3].map(|_| (random.next_u64() >> 40) as f32 / (1_u64 << 23) as f32 - 1.0));
+        for (scale, offset) in [
+            (1.0, 0.0),
+            (0.0, 0.0),
+            (1e-44, 0.0),
+            (1e-38, 0.0),
+            (1e-3, 1e5),
+            (1e-9, 1.0),
+            (1e30, 1.0),
+            (f32::MAX, 0.0),
+        ] {
+            for count in 1..=WIDTH {
+                let place = cube() * offset;
+                let boxes: Vec<Bounds> = (0..count)
+                    .map(|_| {
+                        let (a, b) = (place + cube() * scale, place + cube() * scale);
+                        (a.min(b), a.max(b))
+                    })
+                    .collect();
+                let rounded = Rounded::around(&boxes);
+                for (lane, (min, max)) in boxes.iter().enumerate() {
+                    for axis in 0..3 {
+                        assert!(
+                            rounded.at(axis, rounded.min[axis][lane]) <= min[axis],
+                            "{rounded:?} {boxes:?}"
+                        );
+                        assert!(
+                            rounded.at(axis, rounded.max[axis][lane]) >= max[axis],
+                            "{rounded:?} {boxes:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
