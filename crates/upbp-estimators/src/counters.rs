@@ -25,8 +25,9 @@ pub struct Counters {
     pub cut_walks: u64,
     /// Walks that escaped while still inside a body: geometry that is not closed. They are ended.
     pub lost_walks: u64,
-    /// Boundaries that were ignored because they contradict the bodies that a walk is in: a body entered twice or left
-    /// without being inside (geometry that is not closed, or starts within rounding of a boundary), or nested too deep.
+    /// Boundaries that contradict the bodies that a walk thinks to be in: a body entered twice or left without being inside.
+    /// At a start within rounding of a boundary, or on one, the bodies are corrected; where geometry is not closed or too
+    /// deeply nested, the boundary is ignored.
     pub boundary_conflicts: u64,
 }
 

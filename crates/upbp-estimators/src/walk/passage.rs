@@ -55,8 +55,33 @@ pub struct Passage<B> {
     end: MediumStack,
     crossings: Vec<Crossing>,
     found: Vec<Crossing>,
-    /// Boundaries that contradicted the bodies that the ray was in, since they were last taken.
+    /// Boundaries that contradicted the bodies that the ray was thought to be in, since they were last taken.
     conflicts: u64,
+}
+
+/// What must have happened where a ray starts, if `crossing` is the first of its body and contradicts the bodies that the ray
+/// is thought to be in: an index-matched body that is left was entered before, and one that is entered was not.
+///
+/// Vertices within rounding of a boundary come out on the wrong side of it, and cameras and lights may stand on one.
+pub(crate) fn correction(
+    stack: &MediumStack,
+    crossing: &Crossing,
+    earlier: &[Crossing],
+) -> Option<Crossing> {
+    let body = crossing.interior.body;
+    let contradicts = !crossing.scatters && stack.contains(body) == crossing.entering;
+    (contradicts && earlier.iter().all(|other| other.interior.body != body)).then_some(Crossing {
+        t: 0.0,
+        entering: !crossing.entering,
+        ..*crossing
+    })
+}
+
+/// As [`correction`], for a ray that gets to infinity: what it never crossed it was not inside of.
+pub(crate) fn correction_of_escape(stack: &MediumStack, earlier: &[Crossing]) -> Option<Crossing> {
+    let crossed = |body| earlier.iter().any(|other| other.interior.body == body);
+    let interior = stack.bodies().find(|interior| !crossed(interior.body))?;
+    Some(Crossing { t: 0.0, interior, entering: false, scatters: false })
 }
 
 /// A distance is followed by this share farther than it was drawn: some roundings.
@@ -103,7 +128,8 @@ impl<B: Copy> Passage<B> {
         }
     }
 
-    /// Follows a ray from `origin`, which lies in the bodies of `stack`, and draws from `stream` where the walk stops.
+    /// Follows a ray from `origin`, which lies in the bodies of `stack` but for rounding (what the ray meets counts more,
+    /// see [`correction`]), and draws from `stream` where the walk stops.
     pub fn trace<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
@@ -116,16 +142,40 @@ impl<B: Copy> Passage<B> {
         self.origin = origin;
         self.direction = direction;
         self.start = *stack;
-        self.spans.clear();
         self.crossings.clear();
+        let mut corrections = 0;
+        while let Some(correction) = self.follow(scene, extent, stream, corrections) {
+            self.conflicts += 1;
+            self.crossings.truncate(corrections);
+            self.crossings.push(correction);
+            corrections += 1;
+        }
+    }
+
+    /// Follows the ray, after the first crossings, which are corrections. Ends with another one if there must be.
+    fn follow<S: Scene<Bsdf = B>>(
+        &mut self,
+        scene: &S,
+        extent: Extent,
+        stream: &mut Stream,
+        corrections: usize,
+    ) -> Option<Crossing> {
+        self.spans.clear();
         self.stop = None;
         self.hit = None;
-        self.end = *stack;
+        self.end = self.start;
         let mut flight = Flight { extent, decision: None, reach: f32::INFINITY, stop: f32::INFINITY };
-        let mut span =
-            Span { start: 0.0, end: 0.0, medium: stack.medium(), before: EdgeDensity::EMPTY, crossings: 0 };
+        let medium = self.start.medium();
+        let mut span = Span { start: 0.0, end: 0.0, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
-        let mut ray = Ray { origin, direction, t_min: 0.0, t_max: flight.reach };
+        for i in 0..corrections {
+            let correction = self.crossings[i];
+            if self.cross(scene, &mut span, &mut flight, correction, i + 1, stream) {
+                return None;
+            }
+        }
+        let mut ray =
+            Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.reach };
         loop {
             self.found.clear();
             let hit = scene.trace(&ray, &mut self.found);
@@ -134,8 +184,14 @@ impl<B: Copy> Passage<B> {
                 if crossing.t > flight.reach {
                     break;
                 }
-                if self.cross(scene, &mut span, &mut flight, crossing, stream) {
-                    return;
+                let correction = correction(&self.end, &crossing, &self.crossings);
+                if correction.is_some() {
+                    return correction;
+                }
+                self.crossings.push(crossing);
+                let before = self.crossings.len();
+                if self.cross(scene, &mut span, &mut flight, crossing, before, stream) {
+                    return None;
                 }
             }
             let known = hit.as_ref().map_or(ray.t_max, |hit| hit.t);
@@ -143,23 +199,31 @@ impl<B: Copy> Passage<B> {
                 && known <= flight.reach
             {
                 if let Some(interior) = hit.interior
-                    && let entering = direction.dot(hit.geometric_normal) < 0.0
+                    && let entering = self.direction.dot(hit.geometric_normal) < 0.0
                     && is_hidden(&self.end, &interior, entering)
                 {
                     let crossing = Crossing { t: known, interior, entering, scatters: true };
-                    if self.cross(scene, &mut span, &mut flight, crossing, stream) {
-                        return;
+                    self.crossings.push(crossing);
+                    let before = self.crossings.len();
+                    if self.cross(scene, &mut span, &mut flight, crossing, before, stream) {
+                        return None;
                     }
                     ray.t_min = known * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
                 } else {
                     if !self.close(scene, &mut span, &flight, known) {
                         self.hit = Some(hit);
                     }
-                    return;
+                    return None;
                 }
             } else if flight.reach <= known {
+                if flight.reach == f32::INFINITY && !self.end.is_empty() {
+                    let correction = correction_of_escape(&self.end, &self.crossings);
+                    if correction.is_some() {
+                        return correction;
+                    }
+                }
                 self.close(scene, &mut span, &flight, f32::INFINITY);
-                return;
+                return None;
             } else {
                 // The walk goes on in a thinner medium. A boundary at the end of what is known is still to come.
                 ray.t_min = known.next_down();
@@ -213,26 +277,27 @@ impl<B: Copy> Passage<B> {
         self.stop.is_some() && flight.extent == Extent::ToStop
     }
 
-    /// Crosses a boundary; whether the walk has stopped before.
+    /// Goes on behind a crossing, whether the walk has stopped before; `crossings` lie before what follows.
     fn cross<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
         span: &mut Span,
         flight: &mut Flight,
         crossing: Crossing,
+        crossings: usize,
         stream: &mut Stream,
     ) -> bool {
         if self.end.cross(crossing.interior, crossing.entering) != upbp_media::Crossing::Done {
             self.conflicts += 1;
         }
-        self.crossings.push(crossing);
         // An invisible boundary between two parts of the same medium changes nothing, not even a density.
         if self.end.medium() == span.medium {
             return false;
         }
         // Rounding may put a boundary behind one that was crossed before.
         let t = crossing.t.max(span.start);
-        if t > span.start {
+        // The first stretch counts even without a length: a vertex in its medium has a density there.
+        if t > span.start || self.spans.is_empty() {
             if self.close(scene, span, flight, t) {
                 return true;
             }
@@ -241,7 +306,7 @@ impl<B: Copy> Passage<B> {
         }
         span.start = t;
         span.medium = self.end.medium();
-        span.crossings = self.crossings.len();
+        span.crossings = crossings;
         self.enter(scene, span, flight, stream);
         false
     }

@@ -4,7 +4,7 @@ use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
 use upbp_media::{EdgeDensity, Medium, MediumStack, RaySegment};
 
-use super::passage::is_hidden;
+use super::passage::{correction, correction_of_escape, is_hidden};
 use super::site::Site;
 use crate::scene::{Crossing, Scene};
 
@@ -32,7 +32,7 @@ pub(crate) fn ray_origin<B>(site: &Site<B>, position: Vec3, direction: Vec3) -> 
 /// `stack` holds the bodies at the near end, on the side of `target`; the far end has none of its own.
 pub fn clear_edge<S: Scene>(
     scene: &S,
-    mut stack: MediumStack,
+    stack: MediumStack,
     origin: Vec3,
     target: &Target,
     crossings: &mut Vec<Crossing>,
@@ -51,6 +51,35 @@ pub fn clear_edge<S: Scene>(
     if !(ray.t_max > 0.0) || !ray.direction.is_finite() || !scene.is_clear(&ray, crossings) {
         return None;
     }
+    // As along a walk, what the ray meets counts more than what was known where it starts.
+    let escapes = target.distance == f32::INFINITY;
+    let mut corrections = 0;
+    loop {
+        match accumulate(scene, stack, &ray, crossings, corrections, escapes) {
+            Edge::Clear(density) => return Some(density),
+            Edge::Blocked => return None,
+            Edge::Corrected(correction) => crossings.insert(corrections, correction),
+        }
+        corrections += 1;
+    }
+}
+
+/// What an edge turns out to be.
+enum Edge {
+    Clear(EdgeDensity),
+    Blocked,
+    /// Another one: with this crossing at its start.
+    Corrected(Crossing),
+}
+
+fn accumulate<S: Scene>(
+    scene: &S,
+    mut stack: MediumStack,
+    ray: &Ray,
+    crossings: &[Crossing],
+    corrections: usize,
+    escapes: bool,
+) -> Edge {
     let mut density = EdgeDensity::EMPTY;
     let mut start = 0.0;
     let mut push = |medium: Option<upbp_media::MediumId>, start: f32, end: f32| match medium {
@@ -62,22 +91,33 @@ pub fn clear_edge<S: Scene>(
         })),
         None => density.push_vacuum(),
     };
-    for crossing in crossings.iter() {
+    let mut started = false;
+    for (i, crossing) in crossings.iter().enumerate() {
+        if i >= corrections
+            && let Some(correction) = correction(&stack, crossing, &crossings[..i])
+        {
+            return Edge::Corrected(correction);
+        }
         if crossing.scatters && !is_hidden(&stack, &crossing.interior, crossing.entering) {
-            return None;
+            return Edge::Blocked;
         }
         let medium = stack.medium();
         let _ = stack.cross(crossing.interior, crossing.entering);
         if stack.medium() != medium {
             let t = crossing.t.max(start);
-            if t > start {
+            // The first stretch counts even without a length.
+            if t > start || !started {
                 push(medium, start, t);
+                started = true;
             }
             start = t;
         }
     }
-    if ray.t_max > start || start == 0.0 {
+    if escapes && let Some(correction) = correction_of_escape(&stack, crossings) {
+        return Edge::Corrected(correction);
+    }
+    if ray.t_max > start || !started {
         push(stack.medium(), start, ray.t_max);
     }
-    Some(density)
+    Edge::Clear(density)
 }

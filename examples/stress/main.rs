@@ -1,0 +1,124 @@
+//! Renders the whole stress matrix (`docs/stress.md`) and prints a table of what was run and what failed.
+//!
+//! `cargo run --release --example stress` takes the better part of an hour on two cores; `-- --filter transform` runs the
+//! cases whose line contains the words. Ends with exit code 1 if any case failed.
+
+#[path = "../../tests/stress/mod.rs"]
+mod stress;
+#[path = "../../tests/support/mod.rs"]
+mod support;
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use stress::grid::{Case, all};
+
+/// Renders scenes at the ends of what a description can say.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+struct Options {
+    /// Only cases whose line has all of these words
+    #[arg(long, value_delimiter = ',')]
+    filter: Vec<String>,
+    /// Every n-th case only
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    every: u64,
+    /// Cases at the same time [default: one per core]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    threads: Option<u64>,
+    /// Print the cases instead of rendering them
+    #[arg(long)]
+    list: bool,
+}
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn line(case: &Case) -> String {
+    format!("{} {}", case.group, case.axes)
+}
+
+fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
+    let chosen = |case: &Case| options.filter.iter().all(|word| line(case).contains(word.as_str()));
+    let cases: Vec<Case> = all().into_iter().filter(chosen).step_by(options.every as usize).collect();
+    if options.list {
+        cases.iter().for_each(|case| println!("{}", line(case)));
+        return Ok(true);
+    }
+    let workers = match options.threads {
+        Some(threads) => threads as usize,
+        None => std::thread::available_parallelism()?.get(),
+    };
+    let start = Instant::now();
+    let bar = ProgressBar::new(cases.len() as u64)
+        .with_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {eta} {msg}")?);
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(BTreeMap::new());
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some((index, case)) = {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    cases.get(index).map(|case| (index, case))
+                } {
+                    let result = case.judge();
+                    if let Err(wrong) = &result {
+                        bar.suspend(|| println!("FAILED {}: {wrong}", line(case)));
+                    }
+                    if let Ok(mut results) = results.lock() {
+                        results.insert(index, result);
+                    }
+                    bar.inc(1);
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    let results = results.into_inner().map_err(|error| error.to_string())?;
+    Ok(report(&cases, &results, start.elapsed().as_secs_f64()))
+}
+
+/// The table; whether all cases hold.
+fn report(cases: &[Case], results: &BTreeMap<usize, Result<f64, String>>, seconds: f64) -> bool {
+    #[derive(Default)]
+    struct Row {
+        run: u32,
+        failed: u32,
+        seconds: f64,
+        longest: f64,
+    }
+    let mut groups: BTreeMap<&str, Row> = BTreeMap::new();
+    for (index, result) in results {
+        let row = groups.entry(cases[*index].group).or_default();
+        row.run += 1;
+        match result {
+            Ok(seconds) => {
+                row.seconds += seconds;
+                row.longest = row.longest.max(*seconds);
+            }
+            Err(_) => row.failed += 1,
+        }
+    }
+    println!("| group | cases | failed | seconds of rendering | longest |\n|---|---|---|---|---|");
+    for (group, row) in &groups {
+        println!("| {group} | {} | {} | {:.0} | {:.1} |", row.run, row.failed, row.seconds, row.longest);
+    }
+    let failed: u32 = groups.values().map(|row| row.failed).sum();
+    println!("{} cases, {failed} failed, {seconds:.0} s", results.len());
+    failed == 0
+}
