@@ -121,7 +121,7 @@ impl<'a, S: Scene> World<'a, S> {
     /// Whether any emitter can be chosen.
     #[must_use]
     pub fn has_emitters(&self) -> bool {
-        self.power.total > 0.0
+        !self.power.is_empty()
     }
 
     /// Whether any medium emits light.
@@ -152,25 +152,46 @@ const POWER_SHARE: f64 = 0.1;
 /// Samples per emitter from which on a measured share counts more than power.
 const TELLING_SAMPLES: f64 = 16.0;
 
+/// Random numbers are multiples of 2⁻²⁴.
+const STEPS: u32 = 1 << 24;
+
+/// No light gets less than this part of an even share: it may be all that some corner of the scene sees.
+const LEAST_OF_EVEN_SHARE: f64 = 0.01;
+
 /// A discrete distribution over emitters.
 #[derive(Clone, Debug)]
 struct Selection {
-    /// Running sums of the powers.
-    cumulative: Vec<f64>,
-    total: f64,
+    /// Running sums of the probabilities, in units of the random numbers: what is chosen with these has exactly the
+    /// probability that it is said to have, and whatever shines is chosen at all.
+    cumulative: Vec<u32>,
 }
 
 impl Selection {
     fn new(powers: &[f64]) -> Self {
-        let mut total = 0.0;
+        let total: f64 = powers.iter().sum();
+        let mut waiting = powers.iter().filter(|power| **power > 0.0).count();
+        let least = LEAST_OF_EVEN_SHARE / waiting as f64;
+        let share = |power: f64| if power > 0.0 { (power / total).max(least) } else { 0.0 };
+        let shares: f64 = powers.iter().copied().map(share).sum();
+        let (mut sum, mut end) = (0.0, 0_u32);
         let cumulative = powers
             .iter()
-            .map(|power| {
-                total += power;
-                total
+            .map(|&power| {
+                if power > 0.0 {
+                    sum += share(power);
+                    waiting -= 1;
+                    let last = STEPS.saturating_sub(waiting as u32);
+                    let next = ((sum / shares * f64::from(STEPS)).round() as u32).max(end + 1);
+                    end = if waiting == 0 { STEPS } else { next.min(last) };
+                }
+                end
             })
             .collect();
-        Self { cumulative, total }
+        Self { cumulative }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.cumulative.last().is_none_or(|&end| end == 0)
     }
 
     /// This distribution with a part that follows `shares`, the larger the more samples they stand on.
@@ -182,7 +203,7 @@ impl Selection {
             _ => 0.0,
         };
         let sum: f64 = (0..count).map(light).sum();
-        if !(sum > 0.0 && sum.is_finite() && self.total > 0.0) {
+        if !(sum > 0.0 && sum.is_finite()) {
             return self.clone();
         }
         let evidence = shares.samples / TELLING_SAMPLES;
@@ -193,8 +214,8 @@ impl Selection {
     }
 
     fn choose(&self, u: f32) -> Option<(EmitterId, f32)> {
-        let target = f64::from(u) * self.total;
-        let index = self.cumulative.partition_point(|&sum| sum <= target);
+        let target = (u * STEPS as f32) as u32;
+        let index = self.cumulative.partition_point(|&end| end <= target);
         let emitter = EmitterId(u32::try_from(index).ok()?);
         (index < self.cumulative.len()).then(|| (emitter, self.probability(emitter)))
     }
@@ -202,8 +223,8 @@ impl Selection {
     fn probability(&self, emitter: EmitterId) -> f32 {
         let index = emitter.0 as usize;
         let Some(&end) = self.cumulative.get(index) else { return 0.0 };
-        let start = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
-        ((end - start) / self.total) as f32
+        let start = if index == 0 { 0 } else { self.cumulative[index - 1] };
+        end.saturating_sub(start) as f32 / STEPS as f32
     }
 }
 
@@ -283,5 +304,25 @@ mod tests {
         // A few samples say little.
         let [_, weak, ..] = probabilities(seen(&[0.0, 1.0], 4.0));
         assert!((0.25..0.35).contains(&weak), "{weak}");
+    }
+
+    #[test]
+    fn probabilities_are_exact_whatever_the_ratio_of_powers() {
+        let many = vec![1e-3; 100_000];
+        for powers in [&[1.0, 1e-12][..], &[1e-12, 1.0], &[1e-30, 0.0, 1e30, 1e-30], &[5.0, 1e12, 3.0], &many] {
+            let selection = Selection::new(powers);
+            let mut counts = vec![0_u32; powers.len()];
+            for step in 0..STEPS {
+                let (emitter, _) = selection.choose(step as f32 / STEPS as f32).unwrap();
+                counts[emitter.0 as usize] += 1;
+            }
+            for (i, (&power, &count)) in powers.iter().zip(&counts).enumerate() {
+                assert_eq!(power > 0.0, count > 0, "{i}");
+                let probability = selection.probability(EmitterId(i as u32));
+                assert_eq!(probability, count as f32 / STEPS as f32, "{i}");
+            }
+        }
+        // The strong one gets what its power is worth.
+        assert!(Selection::new(&[1.0, 1e-12]).probability(EmitterId(0)) > 0.99);
     }
 }
