@@ -11,18 +11,19 @@ pub struct Kernel {
     radius: f32,
     /// Value at the centre.
     peak: f32,
-    /// The value at distance `d` is `peak − slope d²`.
-    slope: f32,
+    /// The value at distance `d` is `peak (1 − falloff d²)`. Not the product of the two: it is beyond single precision
+    /// for radii below 10⁻⁹.
+    falloff: f32,
     /// `1 / ∫K²`, the volume that stands for the kernel in a weight.
     effective_volume: f64,
 }
 
 impl Kernel {
     /// Nothing is within reach: radius 0, of no effect in weights.
-    pub const NONE: Self = Self { radius: 0.0, peak: 0.0, slope: 0.0, effective_volume: 0.0 };
+    pub const NONE: Self = Self { radius: 0.0, peak: 0.0, falloff: 0.0, effective_volume: 0.0 };
 
     fn constant(radius: f32, volume: f64) -> Self {
-        Self { radius, peak: (1.0 / volume) as f32, slope: 0.0, effective_volume: volume }
+        Self { radius, peak: (1.0 / volume) as f32, falloff: 0.0, effective_volume: volume }
     }
 
     /// Constant on a disc: surface merging.
@@ -45,7 +46,7 @@ impl Kernel {
         Self {
             radius,
             peak: peak as f32,
-            slope: (peak / (r * r)) as f32,
+            falloff: (1.0 / (r * r)) as f32,
             effective_volume: 0.75 * PI * r * r,
         }
     }
@@ -55,7 +56,7 @@ impl Kernel {
     pub fn parabolic_line(radius: f32) -> Self {
         let r = f64::from(radius);
         let peak = 0.75 / r;
-        Self { radius, peak: peak as f32, slope: (peak / (r * r)) as f32, effective_volume: 5.0 / 3.0 * r }
+        Self { radius, peak: peak as f32, falloff: (1.0 / (r * r)) as f32, effective_volume: 5.0 / 3.0 * r }
     }
 
     /// The kernel's radius, scene units.
@@ -73,7 +74,7 @@ impl Kernel {
     /// Value at a squared distance below `radius²`.
     #[must_use]
     pub fn value(&self, distance_squared: f32) -> f32 {
-        (self.peak - self.slope * distance_squared).max(0.0)
+        self.peak * (1.0 - self.falloff * distance_squared).max(0.0)
     }
 }
 
@@ -96,7 +97,8 @@ mod tests {
 
     #[test]
     fn kernels_integrate_to_one_and_their_squares_to_the_inverse_volume() {
-        for radius in [1e-3_f32, 0.7, 30.0] {
+        // Scenes of a millionth of a unit have kernels of 10⁻¹².
+        for radius in [1e-12_f32, 1e-3, 0.7, 30.0, 1e9] {
             for (kernel, dimension) in [
                 (Kernel::disc(radius), 2),
                 (Kernel::ball(radius), 3),
