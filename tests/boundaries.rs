@@ -59,3 +59,17 @@ fn no_walk_is_lost_where_free_paths_are_as_short_as_roundings() {
     let cut = counters.cut_walks as f64 / (16.0 * 256.0);
     assert!((mean + cut - 1.0).abs() < 1e-5, "{mean} + {cut}");
 }
+
+#[test]
+fn kernels_wider_than_a_free_path_do_not_darken_a_boundary() {
+    let scene = scene(
+        "(version: 1, camera: Perspective(origin: (0, 0, 3), target: (0, 0, 0), fov_degrees: 30),
+        film: (width: 12, height: 12), media: {\"m\": Homogeneous(sigma_a: 5e4, sigma_s: 4.5e5)}, materials: {\"null\": Null},
+        shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"m\")],
+        lights: [Constant(1)])",
+    );
+    let (expected, _) = render(&scene, &settings("hit"), 64);
+    let (found, _) = render(&scene, &settings("all"), 16);
+    let slack = 5.0 * found.error.hypot(expected.error) + 0.005;
+    assert!((found.mean - expected.mean).abs() < slack, "{found:?} {expected:?}");
+}

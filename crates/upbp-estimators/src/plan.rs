@@ -108,6 +108,13 @@ pub struct PlanChoices {
     pub query_beams: BeamExtent,
 }
 
+/// How much the merges of a kernel count in a medium, in `[0, 1]` (`docs/theory.md`, section 6(c)): the light changes within a
+/// mean free path of a boundary, and a wider kernel averages over that. Where no other technique finds a path, the factor
+/// cancels out of the weights.
+fn trust(kernel: &Kernel, mean_free_path: f32) -> f64 {
+    1.0 / (1.0 + (f64::from(kernel.radius()) / f64::from(mean_free_path)).powi(4))
+}
+
 impl Plan {
     /// Derives the weights' constants, so that counts and what runs cannot disagree.
     #[must_use]
@@ -127,7 +134,18 @@ impl Plan {
         let volume = scene
             .media()
             .iter()
-            .map(|medium| if medium.scatters() { merges } else { VolumeMerges::default() })
+            .map(|medium| {
+                if !medium.scatters() {
+                    return VolumeMerges::default();
+                }
+                let trusted = |merge: f64, kernel: &Kernel| merge * trust(kernel, medium.mean_free_path());
+                VolumeMerges {
+                    pp3d: trusted(merges.pp3d, &kernels.pp3d),
+                    pb2d: trusted(merges.pb2d, &kernels.pb2d),
+                    bp2d: trusted(merges.bp2d, &kernels.bp2d),
+                    bb1d: trusted(merges.bb1d, &kernels.bb1d),
+                }
+            })
             .collect();
         // Expected samples of one connection: draws per vertex over stored vertices per light path.
         let connect = if choices.vertices_per_light_path > 0.0 && light_paths > 0 {
