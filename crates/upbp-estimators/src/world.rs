@@ -309,7 +309,8 @@ mod tests {
     #[test]
     fn probabilities_are_exact_whatever_the_ratio_of_powers() {
         let many = vec![1e-3; 100_000];
-        for powers in [&[1.0, 1e-12][..], &[1e-12, 1.0], &[1e-30, 0.0, 1e30, 1e-30], &[5.0, 1e12, 3.0], &many] {
+        for powers in [&[1.0, 1e-12][..], &[1e-12, 1.0], &[1e-30, 0.0, 1e30, 1e-30], &[5.0, 1e12, 3.0], &many]
+        {
             let selection = Selection::new(powers);
             let mut counts = vec![0_u32; powers.len()];
             for step in 0..STEPS {

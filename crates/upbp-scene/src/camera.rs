@@ -88,6 +88,12 @@ impl PerspectiveCamera {
         })
     }
 
+    /// The same camera elsewhere.
+    #[must_use]
+    pub fn translated(self, by: Vec3) -> Self {
+        Self { origin: self.origin + by, ..self }
+    }
+
     /// Pinhole, or centre of the lens, scene units.
     #[must_use]
     pub const fn origin(&self) -> Vec3 {

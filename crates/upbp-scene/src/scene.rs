@@ -48,10 +48,18 @@ pub struct ReadyScene {
     pub(crate) camera: PerspectiveCamera,
     pub(crate) outside: Option<MediumId>,
     pub(crate) bounds: BoundingSphere,
+    pub(crate) origin: Vec3,
     pub(crate) hash: u64,
 }
 
 impl ReadyScene {
+    /// The point of the description that has become the origin. A scene that is much farther from its origin than it is large
+    /// is moved, exactly; all other positions that a ready scene takes or returns are relative to this one.
+    #[must_use]
+    pub const fn origin(&self) -> Vec3 {
+        self.origin
+    }
+
     /// The shapes behind their hierarchy, in the order of the description.
     #[must_use]
     pub const fn geometry(&self) -> &SceneGeometry {

@@ -23,6 +23,10 @@ impl AxisBox {
         }
     }
 
+    pub(super) fn translated(self, by: Vec3) -> Self {
+        Self { min: self.min + by, max: self.max + by }
+    }
+
     /// The corner with the least coordinates.
     #[must_use]
     pub fn min(&self) -> Vec3 {

@@ -76,6 +76,12 @@ impl TriangleMesh {
         Ok(Self { positions, triangles, normals, cumulative_area, bounds, closed, dropped })
     }
 
+    pub(super) fn translated(mut self, by: Vec3) -> Self {
+        self.positions.iter_mut().for_each(|position| *position += by);
+        let (min, max) = self.bounds;
+        Self { bounds: (min + by, max + by), ..self }
+    }
+
     /// The vertex positions.
     #[must_use]
     pub fn positions(&self) -> &[Vec3] {

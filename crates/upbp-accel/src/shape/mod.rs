@@ -85,6 +85,17 @@ impl Shape {
         }
     }
 
+    /// The same shape elsewhere.
+    #[must_use]
+    pub fn translated(self, by: Vec3) -> Self {
+        match self {
+            Self::Sphere(sphere) => Self::Sphere(sphere.translated(by)),
+            Self::Quad(quad) => Self::Quad(quad.translated(by)),
+            Self::Box(axis_box) => Self::Box(axis_box.translated(by)),
+            Self::Mesh(mesh) => Self::Mesh(mesh.translated(by)),
+        }
+    }
+
     /// An upper bound of the enclosed volume, cubic scene units; zero for a shape that is not closed.
     ///
     /// Exact for spheres and boxes, the volume of the bounding box for meshes.

@@ -31,6 +31,10 @@ impl Quad {
         Ok(Self { origin, edge_u, edge_v, normal: (cross / area).as_vec3(), area: area as f32 })
     }
 
+    pub(super) fn translated(self, by: Vec3) -> Self {
+        Self { origin: self.origin + by, ..self }
+    }
+
     /// The corner with `u = v = 0`.
     #[must_use]
     pub fn origin(&self) -> Vec3 {

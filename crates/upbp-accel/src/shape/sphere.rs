@@ -26,6 +26,10 @@ impl Sphere {
         Ok(Self { centre, radius })
     }
 
+    pub(super) fn translated(self, by: Vec3) -> Self {
+        Self { centre: self.centre + by, ..self }
+    }
+
     /// The centre.
     #[must_use]
     pub fn centre(&self) -> Vec3 {

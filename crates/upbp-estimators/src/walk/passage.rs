@@ -63,11 +63,7 @@ pub struct Passage<B> {
 /// is thought to be in: an index-matched body that is left was entered before, and one that is entered was not.
 ///
 /// Vertices within rounding of a boundary come out on the wrong side of it, and cameras and lights may stand on one.
-pub(crate) fn correction(
-    stack: &MediumStack,
-    crossing: &Crossing,
-    earlier: &[Crossing],
-) -> Option<Crossing> {
+pub(crate) fn correction(stack: &MediumStack, crossing: &Crossing, earlier: &[Crossing]) -> Option<Crossing> {
     let body = crossing.interior.body;
     let contradicts = !crossing.scatters && stack.contains(body) == crossing.entering;
     (contradicts && earlier.iter().all(|other| other.interior.body != body)).then_some(Crossing {

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
+use glam::Vec3;
 use upbp_accel::SceneGeometry;
 use upbp_estimators::scene::{BoundingSphere, EmitterId};
 use upbp_media::{Homogeneous, MediaError, Medium as _, MediumId, PhaseFunction};
@@ -105,7 +106,7 @@ impl Builder<'_> {
             .collect();
         let outside =
             description.outside.as_deref().and_then(|name| self.medium("scene, outside", name, &medium_ids));
-        let camera = self.camera();
+        let mut camera = self.camera();
         let drafts = self.surfaces(&medium_ids);
         let mut lights = self.lights();
         self.check_shines(&media, &medium_ids);
@@ -116,7 +117,14 @@ impl Builder<'_> {
         if !self.problems.is_empty() || media.len() != description.media.len() {
             return None;
         }
-        let drafts: Vec<_> = drafts.into_iter().collect::<Option<_>>()?;
+        let mut drafts: Vec<_> = drafts.into_iter().collect::<Option<_>>()?;
+        let far = bounds(drafts.iter().map(|draft| &draft.shape), &lights, camera.as_ref()?.origin());
+        let origin = origin_near(&far);
+        if origin != Vec3::ZERO {
+            drafts.iter_mut().for_each(|draft| draft.shape = draft.shape.clone().translated(-origin));
+            lights.iter_mut().for_each(|light| light.translate(-origin));
+            camera = camera.map(|camera| camera.translated(-origin));
+        }
         let bounds = bounds(drafts.iter().map(|draft| &draft.shape), &lights, camera.as_ref()?.origin());
         let bodies = bodies::rank(drafts.iter().enumerate().filter_map(|(index, draft)| {
             let body = draft.body.as_ref()?;
@@ -153,7 +161,8 @@ impl Builder<'_> {
             }
         };
         let hash = self.hash.0;
-        Some(ReadyScene { geometry, surfaces, bodies, lights, media, camera: camera?, outside, bounds, hash })
+        let camera = camera?;
+        Some(ReadyScene { geometry, surfaces, bodies, lights, media, camera, outside, bounds, origin, hash })
     }
 
     fn problem(&mut self, item: impl Into<String>, message: impl Display) {
@@ -249,12 +258,23 @@ fn phase_function(phase: &Phase) -> Result<PhaseFunction, MediaError> {
     }
 }
 
+/// The point to which a scene is moved nearer, so that positions have all their digits where the scene is
+/// (`docs/theory.md`, section 7); zero if the scene is near enough to the origin.
+///
+/// A multiple of a power of two that is greater than any rounding in the file: moving is exact.
+fn origin_near(bounds: &BoundingSphere) -> Vec3 {
+    let step = f64::from(16.0 * bounds.radius).log2().ceil().exp2();
+    let near = (bounds.centre.as_dvec3() / step).round() * step;
+    // A scene as small as the rounding of its coordinates has no digits to save.
+    if near.is_finite() { near.as_vec3() } else { Vec3::ZERO }
+}
+
 /// A sphere around all shapes and finite lights: around the centre of their box, as small as their own
 /// boxes allow.
 fn bounds<'s>(
     shapes: impl Iterator<Item = &'s upbp_accel::Shape> + Clone,
     lights: &[Light],
-    camera: glam::Vec3,
+    camera: Vec3,
 ) -> BoundingSphere {
     use upbp_accel::Shape;
     let positions = lights.iter().filter_map(|light| match light {

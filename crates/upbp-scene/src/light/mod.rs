@@ -42,6 +42,17 @@ pub enum Light {
     Image(ImageEnvironment),
 }
 
+impl Light {
+    /// Moves a light that is somewhere. A surface that shines is made of its shape, wherever that is.
+    pub(crate) fn translate(&mut self, by: Vec3) {
+        match self {
+            Self::Point(light) => light.position += by,
+            Self::Spot(light) => light.position += by,
+            Self::Area(_) | Self::Directional(_) | Self::Constant(_) | Self::Image(_) => {}
+        }
+    }
+}
+
 macro_rules! dispatch {
     ($self:expr, $light:ident => $call:expr) => {
         match $self {
