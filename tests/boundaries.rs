@@ -39,6 +39,26 @@ fn a_camera_on_a_boundary_looks_into_the_body() {
 }
 
 #[test]
+fn a_camera_on_a_boundary_is_inside_even_if_no_ray_gets_out() {
+    let mean = |z: f32| {
+        let scene = scene(&format!(
+            "(version: 1, camera: Perspective(origin: (0.0, 0.0, {z:?}), target: (0.0, 0.0, {:?}), fov_degrees: 0.01),
+            film: (width: 4, height: 4), media: {{\"m\": Homogeneous(sigma_a: 1.0)}},
+            materials: {{\"null\": Null, \"black\": Lambert(0.0)}},
+            shapes: [
+                (geometry: Box(min: (-1, -1, -1), max: (1, 1, 1)), material: \"null\", interior: \"m\"),
+                (geometry: Sphere(centre: (0, 0, 0), radius: 0.5), material: \"black\", emission: 1.0),
+            ])",
+            z - 1.0
+        ));
+        render(&scene, &settings("hit"), 2).0.mean
+    };
+    for z in [3.0, 1.0_f32.next_up(), 1.0, 1.0_f32.next_down()] {
+        assert!((mean(z) - (-0.5_f64).exp()).abs() < 1e-5, "z = {z}: {}", mean(z));
+    }
+}
+
+#[test]
 fn no_walk_is_lost_where_free_paths_are_as_short_as_roundings() {
     let scene = scene(
         "(version: 1, camera: Perspective(origin: (0, 0, 3), target: (0, 0, 0), fov_degrees: 40),
@@ -47,8 +67,7 @@ fn no_walk_is_lost_where_free_paths_are_as_short_as_roundings() {
         lights: [Constant(1)])",
     );
     let settings = Settings { max_length: 200, ..settings("hit") };
-    let mut renderer =
-        Renderer::new(&scene, settings.validate().expect("valid settings")).expect("a scene");
+    let mut renderer = Renderer::new(&scene, settings.validate().expect("valid settings")).expect("a scene");
     for _ in 0..16 {
         renderer.iterate();
     }

@@ -70,7 +70,10 @@ impl<'a, S: Scene> World<'a, S> {
                     crop.x as f32 + 0.5 * crop.width as f32,
                     crop.y as f32 + 0.5 * crop.height as f32,
                 );
-                camera.ray(centre, [0.5; 2]).map(|ray| scene.stack_at(ray.origin))
+                // Ahead of the pinhole, which may stand on a boundary.
+                camera.ray(centre, [0.5; 2]).map(|ray| {
+                    scene.stack_at(upbp_accel::offset_origin(ray.origin, ray.direction, ray.direction))
+                })
             })
             .flatten();
         let emitting_media = scene.media().iter().any(Medium::emits);

@@ -144,7 +144,11 @@ fn emit<S: Scene, O: Observer<S::Bsdf>>(
     let stack = if kind.is_infinite() {
         MediumStack::new(world.scene.outside())
     } else {
-        world.scene.stack_at(origin)
+        // Ahead of a point, which may stand on a boundary.
+        world.scene.stack_at(match kind {
+            EmitterKind::Point => offset_origin(origin, emission.direction, emission.direction),
+            _ => origin,
+        })
     };
     Some(Flight {
         origin,
