@@ -54,7 +54,7 @@ pub trait Scene: Sync {
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Self::Bsdf>> {
         let mut rest = *ray;
         loop {
-            let hit = self.intersect(&rest)?;
+            let hit = self.intersect(&rest).filter(|hit| hit.t > rest.t_min)?;
             if hit.bsdf.is_some() {
                 return Some(hit);
             }
@@ -68,7 +68,7 @@ pub trait Scene: Sync {
     /// they are of no interest if the answer is `false`.
     fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
         let mut rest = *ray;
-        while let Some(hit) = self.intersect(&rest) {
+        while let Some(hit) = self.intersect(&rest).filter(|hit| hit.t > rest.t_min) {
             if hit.bsdf.is_some() && hit.interior.is_none() {
                 return false;
             }
@@ -86,7 +86,7 @@ pub trait Scene: Sync {
         let direction = Vec3::new(0.284_69, 0.867_42, 0.408_03).normalize();
         let mut ray = Ray { origin: point, direction, t_min: 0.0, t_max: f32::INFINITY };
         let mut balance: Vec<(upbp_media::Interior, i32)> = Vec::new();
-        while let Some(hit) = self.intersect(&ray) {
+        while let Some(hit) = self.intersect(&ray).filter(|hit| hit.t > ray.t_min) {
             if let Some(interior) = hit.interior {
                 let step = if direction.dot(hit.geometric_normal) > 0.0 { 1 } else { -1 };
                 match balance.iter_mut().find(|(known, _)| known.body == interior.body) {

@@ -59,6 +59,12 @@ pub struct Passage<B> {
     conflicts: u64,
 }
 
+/// The medium inside of the bodies of `stack`. One that the scene does not have is vacuum: a broken contract, which
+/// [`check_scene`](crate::check::check_scene) finds.
+pub(crate) fn medium_of<S: Scene>(scene: &S, stack: &MediumStack) -> Option<MediumId> {
+    stack.medium().filter(|medium| (medium.0 as usize) < scene.media().len())
+}
+
 /// What must have happened where a ray starts, if `crossing` is the first of its body and contradicts the bodies that the ray
 /// is thought to be in: an index-matched body that is left was entered before, and one that is entered was not.
 ///
@@ -161,7 +167,7 @@ impl<B: Copy> Passage<B> {
         self.hit = None;
         self.end = self.start;
         let mut flight = Flight { extent, decision: None, reach: f32::INFINITY, stop: f32::INFINITY };
-        let medium = self.start.medium();
+        let medium = medium_of(scene, &self.start);
         let mut span = Span { start: 0.0, end: 0.0, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
         for i in 0..corrections {
@@ -174,7 +180,8 @@ impl<B: Copy> Passage<B> {
             Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.reach };
         loop {
             self.found.clear();
-            let hit = scene.trace(&ray, &mut self.found);
+            // A hit that is not ahead breaks the contract, and a loop would not end.
+            let hit = scene.trace(&ray, &mut self.found).filter(|hit| hit.t > ray.t_min);
             for i in 0..self.found.len() {
                 let crossing = self.found[i];
                 if crossing.t > flight.reach {
@@ -287,7 +294,8 @@ impl<B: Copy> Passage<B> {
             self.conflicts += 1;
         }
         // An invisible boundary between two parts of the same medium changes nothing, not even a density.
-        if self.end.medium() == span.medium {
+        let medium = medium_of(scene, &self.end);
+        if medium == span.medium {
             return false;
         }
         // Rounding may put a boundary behind one that was crossed before.
@@ -301,7 +309,7 @@ impl<B: Copy> Passage<B> {
             flight.decision = None;
         }
         span.start = t;
-        span.medium = self.end.medium();
+        span.medium = medium;
         span.crossings = crossings;
         self.enter(scene, span, flight, stream);
         false

@@ -4,7 +4,7 @@ use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
 use upbp_media::{EdgeDensity, Medium, MediumStack, RaySegment};
 
-use super::passage::{correction, correction_of_escape, is_hidden};
+use super::passage::{correction, correction_of_escape, is_hidden, medium_of};
 use super::site::Site;
 use crate::scene::{Crossing, Scene};
 
@@ -101,9 +101,9 @@ fn accumulate<S: Scene>(
         if crossing.scatters && !is_hidden(&stack, &crossing.interior, crossing.entering) {
             return Edge::Blocked;
         }
-        let medium = stack.medium();
+        let medium = medium_of(scene, &stack);
         let _ = stack.cross(crossing.interior, crossing.entering);
-        if stack.medium() != medium {
+        if medium_of(scene, &stack) != medium {
             let t = crossing.t.max(start);
             // The first stretch counts even without a length.
             if t > start || !started {
@@ -117,7 +117,7 @@ fn accumulate<S: Scene>(
         return Edge::Corrected(correction);
     }
     if ray.t_max > start || !started {
-        push(stack.medium(), start, ray.t_max);
+        push(medium_of(scene, &stack), start, ray.t_max);
     }
     Edge::Clear(density)
 }
