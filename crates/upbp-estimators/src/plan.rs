@@ -112,7 +112,9 @@ pub struct PlanChoices {
 /// mean free path of a boundary, and a wider kernel averages over that. Where no other technique finds a path, the factor
 /// cancels out of the weights.
 fn trust(kernel: &Kernel, mean_free_path: f32) -> f64 {
-    1.0 / (1.0 + (f64::from(kernel.radius()) / f64::from(mean_free_path)).powi(4))
+    let ratio = f64::from(kernel.radius()) / f64::from(mean_free_path);
+    // A host may not know the mean free path.
+    if ratio.is_nan() { 1.0 } else { 1.0 / (1.0 + ratio.powi(4)) }
 }
 
 impl Plan {

@@ -74,7 +74,7 @@ pub trait Medium: Send + Sync {
     /// Depends on the position alone, so that both directions of walking agree on it.
     fn continuation(&self, position: Vec3) -> f32;
 
-    /// One over the mean extinction, in scene units; infinite if there is none. A figure for heuristics,
-    /// in no estimate.
+    /// One over the mean extinction, in scene units; infinite if there is none. A figure for heuristics:
+    /// it decides how much techniques count, not what they find on average.
     fn mean_free_path(&self) -> f32;
 }
