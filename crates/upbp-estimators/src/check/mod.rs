@@ -12,11 +12,13 @@
 mod bsdf;
 mod camera;
 mod emitter;
+mod medium;
 mod scene;
 
 pub use bsdf::check_bsdf;
 pub use camera::check_camera;
 pub use emitter::check_emitter;
+pub use medium::check_medium;
 pub use scene::check_scene;
 
 use std::f64::consts::TAU;

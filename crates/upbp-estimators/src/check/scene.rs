@@ -1,7 +1,7 @@
 //! [`check_scene`]: hits, crossings and bodies of a scene agree.
 
 use super::{Check, ContractViolation, Random, is_unit, require};
-use crate::scene::{Crossing, Scene};
+use crate::scene::{Crossing, Emitter, Scene};
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
 /// lie on their ray, `trace` and `is_clear` find what `intersect` does, and the bodies around a point
@@ -13,6 +13,16 @@ pub fn check_scene(scene: &impl Scene) -> Check {
     require(bounds.radius.is_finite() && bounds.radius > 0.0, "bounds have a radius", bounds)?;
     require(bounds.centre.is_finite(), "bounds have a centre", bounds)?;
     let mut random = Random(11);
+    for emitter in scene.emitters().iter().filter(|emitter| !emitter.kind().is_infinite()) {
+        for _ in 0..16 {
+            let Some(emission) = emitter.sample_emission(&bounds, random.pair(), random.pair()) else {
+                continue;
+            };
+            let position = emission.point.position;
+            let inside = position.distance(bounds.centre) <= bounds.radius * (1.0 + 1e-3);
+            require(inside, "lights lie within the bounds", (bounds, position))?;
+        }
+    }
     let mut violations = Vec::new();
     let rays = 2000;
     for _ in 0..rays {
@@ -43,6 +53,12 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
     }
     let mut crossings = Vec::new();
     let hit = scene.trace(ray, &mut crossings);
+    let media = crossings.iter().map(|c| c.interior).chain(hit.as_ref().and_then(|hit| hit.interior));
+    let unknown = media.filter_map(|interior| interior.medium).find(|m| m.0 as usize >= scene.media().len());
+    require(unknown.is_none(), "the medium of a body exists", (ray, unknown))?;
+    let emitter = hit.as_ref().and_then(|hit| hit.emitter);
+    let exists = emitter.is_none_or(|emitter| (emitter.0 as usize) < scene.emitters().len());
+    require(exists, "the light of a surface exists", (ray, emitter))?;
     let end = hit.as_ref().map_or(ray.t_max, |hit| hit.t);
     require(
         is_ordered(&crossings, ray, end),
