@@ -131,11 +131,15 @@ fn read_image(bytes: &[u8]) {
     let _ = std::fs::remove_file(&path);
 }
 
-fn image() -> Vec<u8> {
-    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("seed.exr");
-    exr::prelude::write_rgb_file(&path, 8, 4, |x, y| (x as f32, y as f32, 1.0_f32))
-        .expect("a writable folder");
-    std::fs::read(&path).expect("the file")
+/// A good image.
+fn image() -> &'static [u8] {
+    static IMAGE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+    IMAGE.get_or_init(|| {
+        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("seed.exr");
+        exr::prelude::write_rgb_file(&path, 8, 4, |x, y| (x as f32, y as f32, 1.0_f32))
+            .expect("a writable folder");
+        std::fs::read(&path).expect("the file")
+    })
 }
 
 /// Files per test; `PROPTEST_CASES` asks for another number.

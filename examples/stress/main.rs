@@ -11,13 +11,12 @@ mod support;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use stress::execute::in_parallel;
 use stress::grid::{Case, all};
 
 /// Renders scenes at the ends of what a description can say.
@@ -57,7 +56,9 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     let chosen = |case: &Case| options.filter.iter().all(|word| line(case).contains(word.as_str()));
     let cases: Vec<Case> = all().into_iter().filter(chosen).step_by(options.every as usize).collect();
     if options.list {
-        cases.iter().for_each(|case| println!("{}", line(case)));
+        for case in &cases {
+            println!("{}", line(case));
+        }
         return Ok(true);
     }
     let workers = match options.threads {
@@ -67,34 +68,20 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     let start = Instant::now();
     let bar = ProgressBar::new(cases.len() as u64)
         .with_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {eta} {msg}")?);
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(BTreeMap::new());
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                while let Some((index, case)) = {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    cases.get(index).map(|case| (index, case))
-                } {
-                    let result = case.judge();
-                    if let Err(wrong) = &result {
-                        bar.suspend(|| println!("FAILED {}: {wrong}", line(case)));
-                    }
-                    if let Ok(mut results) = results.lock() {
-                        results.insert(index, result);
-                    }
-                    bar.inc(1);
-                }
-            });
+    let results = in_parallel(cases.len(), workers, |index| {
+        let result = cases[index].judge();
+        if let Err(wrong) = &result {
+            bar.suspend(|| println!("FAILED {}: {wrong}", line(&cases[index])));
         }
+        bar.inc(1);
+        result
     });
     bar.finish_and_clear();
-    let results = results.into_inner().map_err(|error| error.to_string())?;
     Ok(report(&cases, &results, start.elapsed().as_secs_f64()))
 }
 
 /// The table; whether all cases hold.
-fn report(cases: &[Case], results: &BTreeMap<usize, Result<f64, String>>, seconds: f64) -> bool {
+fn report(cases: &[Case], results: &[Result<f64, String>], seconds: f64) -> bool {
     #[derive(Default)]
     struct Row {
         run: u32,
@@ -103,8 +90,8 @@ fn report(cases: &[Case], results: &BTreeMap<usize, Result<f64, String>>, second
         longest: f64,
     }
     let mut groups: BTreeMap<&str, Row> = BTreeMap::new();
-    for (index, result) in results {
-        let row = groups.entry(cases[*index].group).or_default();
+    for (case, result) in cases.iter().zip(results) {
+        let row = groups.entry(case.group).or_default();
         row.run += 1;
         match result {
             Ok(seconds) => {

@@ -7,7 +7,7 @@ use upbp_core::{LightPaths, Radii, Radius, Settings};
 /// How the channels' extinctions differ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Chromatic {
-    /// All the same, described as three numbers all the same or as one.
+    /// All the same.
     Grey,
     /// From channel to channel by the root of this ratio.
     Ratio(f64),
@@ -88,6 +88,10 @@ pub(crate) enum View {
     Inside,
     /// On the boundary of the medium.
     Boundary,
+    /// A little outside of it.
+    BeforeBoundary,
+    /// A little inside of it.
+    BehindBoundary,
     /// In the origin.
     Centre,
     /// Where [`Light::Point`] is.
@@ -111,7 +115,6 @@ pub(crate) struct Axes {
     pub layout: Layout,
     pub light: Light,
     pub view: View,
-    /// The same for all channels, but written as if it was not.
     pub technique: &'static str,
     pub max_length: u32,
     /// Of all kernels, relative to the scene's bounding sphere.
@@ -231,6 +234,8 @@ impl Axes {
             View::Lens => ([0.0, 0.0, EYE], FIELD_OF_VIEW, 0.25),
             View::Inside => ([0.0, 0.0, 0.5], FIELD_OF_VIEW, 0.0),
             View::Boundary => ([0.0, 0.0, 1.0], FIELD_OF_VIEW, 0.0),
+            View::BeforeBoundary => ([0.0, 0.0, 1.0 + 1e-3], FIELD_OF_VIEW, 0.0),
+            View::BehindBoundary => ([0.0, 0.0, 1.0 - 1e-3], FIELD_OF_VIEW, 0.0),
             View::Centre => ([0.0; 3], FIELD_OF_VIEW, 0.0),
             View::OnPoint => ([2.0; 3], FIELD_OF_VIEW, 0.0),
             View::OnWall => ([0.0, -1.0, 3.0], FIELD_OF_VIEW, 0.0),
@@ -251,8 +256,7 @@ impl Axes {
 
     fn shapes(&self) -> String {
         let ball = |centre: [f64; 3], radius: f64, material: &str, interior: &str| {
-            let geometry =
-                format!("Sphere(centre: {}, radius: {})", self.point(centre), self.length(radius));
+            let geometry = format!("Sphere(centre: {}, radius: {})", self.point(centre), self.length(radius));
             format!("(geometry: {geometry}, material: \"{material}\", {interior}),")
         };
         let cube = |min: [f64; 3], max: [f64; 3], medium: &str| {
@@ -277,7 +281,9 @@ impl Axes {
             }
             Layout::Overlap => whole() + &ball([1.0, 0.0, 0.0], 0.5, "null", "interior: \"thin\""),
             Layout::GlassOverlap => whole() + &ball([1.0, 0.0, 0.0], 0.5, "glass", ""),
-            Layout::Floor => whole() + &self.quad([-4.0, -1.0, -4.0], [0.0, 0.0, 8.0], [8.0, 0.0, 0.0], "grey"),
+            Layout::Floor => {
+                whole() + &self.quad([-4.0, -1.0, -4.0], [0.0, 0.0, 8.0], [8.0, 0.0, 0.0], "grey")
+            }
             Layout::Room => whole() + &self.room(),
             Layout::Everywhere => ball([0.0, 0.0, -1.0], 0.25, "black", ""),
         }
@@ -344,9 +350,8 @@ impl Axes {
                 intensity(1e6)
             )
         };
-        let sun = |direction: [f64; 3]| {
-            format!("Directional(direction: {}, irradiance: 1.0),", vector(direction))
-        };
+        let sun =
+            |direction: [f64; 3]| format!("Directional(direction: {}, irradiance: 1.0),", vector(direction));
         match self.light {
             Light::Environment => "Constant(1.0),".into(),
             Light::Point => point([2.0; 3], 10.0),

@@ -1,5 +1,6 @@
 //! Renders a case under guard and says what is wrong with the result.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
@@ -133,3 +134,18 @@ pub(crate) fn differs(a: &Estimate, b: &Estimate, slack: f64) -> Option<String> 
 
 /// Standard errors that two means may differ by.
 const SIGMAS: f64 = 5.0;
+
+/// The results of jobs `0..count`, of which `workers` run at a time.
+pub(crate) fn in_parallel<T: Send>(count: usize, workers: usize, job: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let take = || Some(next.fetch_add(1, Ordering::Relaxed)).filter(|index| *index < count);
+        std::iter::from_fn(take).map(|index| (index, job(index))).collect::<Vec<_>>()
+    };
+    let mut results: Vec<(usize, T)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().flat_map(|thread| thread.join().expect("jobs do not panic")).collect()
+    });
+    results.sort_by_key(|(index, _)| *index);
+    results.into_iter().map(|(_, result)| result).collect()
+}

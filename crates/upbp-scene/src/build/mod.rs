@@ -121,8 +121,12 @@ impl Builder<'_> {
         let far = bounds(drafts.iter().map(|draft| &draft.shape), &lights, camera.as_ref()?.origin());
         let origin = origin_near(&far);
         if origin != Vec3::ZERO {
-            drafts.iter_mut().for_each(|draft| draft.shape = draft.shape.clone().translated(-origin));
-            lights.iter_mut().for_each(|light| light.translate(-origin));
+            for draft in &mut drafts {
+                draft.shape = draft.shape.clone().translated(-origin);
+            }
+            for light in &mut lights {
+                light.translate(-origin);
+            }
             camera = camera.map(|camera| camera.translated(-origin));
         }
         let bounds = bounds(drafts.iter().map(|draft| &draft.shape), &lights, camera.as_ref()?.origin());
