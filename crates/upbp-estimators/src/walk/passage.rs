@@ -130,8 +130,8 @@ impl<B: Copy> Passage<B> {
         }
     }
 
-    /// Follows a ray from `origin`, which lies in the bodies of `stack` but for rounding (what the ray meets counts more,
-    /// see [`correction`]), and draws from `stream` where the walk stops.
+    /// Follows a ray from `origin`, which lies in the bodies of `stack` but for rounding (a boundary that contradicts
+    /// them corrects them), and draws from `stream` where the walk stops.
     pub fn trace<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
