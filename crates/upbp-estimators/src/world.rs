@@ -17,6 +17,7 @@ pub struct World<'a, S: Scene> {
     environments: Vec<EmitterId>,
     camera_stack: Option<MediumStack>,
     emitting_media: bool,
+    dense_media: bool,
 }
 
 impl<'a, S: Scene> World<'a, S> {
@@ -77,9 +78,21 @@ impl<'a, S: Scene> World<'a, S> {
             })
             .flatten();
         let emitting_media = scene.media().iter().any(Medium::emits);
+        let dense = |medium: &S::Medium| !(medium.mean_free_path() > DENSE * bounds.radius);
+        let dense_media = scene.media().iter().any(|medium| medium.scatters() && dense(medium));
         let power = Selection::new(&powers);
         let (emission, next_event) = (power.clone(), power.clone());
-        Ok(Self { scene, bounds, power, emission, next_event, environments, camera_stack, emitting_media })
+        Ok(Self {
+            scene,
+            bounds,
+            power,
+            emission,
+            next_event,
+            environments,
+            camera_stack,
+            emitting_media,
+            dense_media,
+        })
     }
 
     /// Chooses emitters by what they bring instead of by power: `emission` where light sub-paths start, `next_event` where
@@ -133,12 +146,23 @@ impl<'a, S: Scene> World<'a, S> {
         self.emitting_media
     }
 
+    /// Whether any medium is so dense that rounding often puts a vertex in it on the other side of its boundary. A ray that is
+    /// followed to the next surface or to infinity finds out; one that is followed to the next collision does not.
+    #[must_use]
+    pub const fn has_dense_media(&self) -> bool {
+        self.dense_media
+    }
+
     /// The bodies around a point of the lens.
     #[must_use]
     pub fn stack_at_camera(&self, lens: glam::Vec3) -> MediumStack {
         self.camera_stack.unwrap_or_else(|| self.scene.stack_at(lens))
     }
 }
+
+/// Media whose mean free path is a smaller part of the scene's radius are dense: of their vertices next to a boundary, one in
+/// ten thousand is within rounding of it.
+const DENSE: f32 = 1e-3;
 
 /// What each emitter was seen to bring, as [`World::choose_emitters_by`] takes it.
 #[derive(Clone, Debug, Default, PartialEq)]

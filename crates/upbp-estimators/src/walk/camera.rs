@@ -90,7 +90,8 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
     let Some(ray) = scene.camera().ray(film, stream.pair()) else { return walk };
     observer.camera_end(ray.origin, ray.direction, ray.pdf);
     let mut out = Output { layers: &mut walk.layers, counters, observer };
-    let extent = if plan.has_long_query_beams() || (plan.mis.hit > 0.0 && world.has_emitting_media()) {
+    let emission = plan.mis.hit > 0.0 && world.has_emitting_media();
+    let extent = if plan.has_long_query_beams() || emission || world.has_dense_media() {
         Extent::ToSurface
     } else {
         Extent::ToStop

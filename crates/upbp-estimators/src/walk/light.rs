@@ -42,11 +42,8 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
     let scene = world.scene;
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
-    let extent = if leaves_beams && plan.mis.photon_beams == BeamExtent::Long {
-        Extent::ToSurface
-    } else {
-        Extent::ToStop
-    };
+    let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
+    let extent = if long_beams || world.has_dense_media() { Extent::ToSurface } else { Extent::ToStop };
 
     // The shortest completion adds one edge, by light tracing or a merge on the camera's first edge.
     for depth in 1..plan.lengths.max {

@@ -176,8 +176,7 @@ impl<B: Copy> Passage<B> {
                 return None;
             }
         }
-        let mut ray =
-            Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.reach };
+        let mut ray = Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.reach };
         loop {
             self.found.clear();
             // A hit that is not ahead breaks the contract, and a loop would not end.
