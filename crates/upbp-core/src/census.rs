@@ -5,14 +5,14 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use upbp_estimators::scene::{Emitter, Scene};
 use upbp_estimators::{Technique, TechniqueSet, World};
 
 use crate::media::Medium;
 
 /// The techniques that remain, and why others do not.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Census {
     /// The techniques that run.
     pub techniques: TechniqueSet,

@@ -40,10 +40,71 @@ pub enum RenderError {
     },
 }
 
+/// A state that cannot be read, resumed or merged.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StateError {
+    /// The source cannot be read.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    /// Something else, or nothing.
+    #[error("not a state of a render: it does not begin as one")]
+    NotAState,
+    /// A state of another version of the format.
+    #[error("format of version {found}: expected {expected}")]
+    Version {
+        /// The version that is known.
+        expected: u32,
+        /// The version found.
+        found: u32,
+    },
+    /// Cut off, or changed since it was written.
+    #[error("damaged at its {place}: {reason}")]
+    Damaged {
+        /// The part of the file.
+        place: String,
+        /// What is wrong there.
+        reason: String,
+    },
+    /// Two states, or a state and a render, are not of the same scene and settings.
+    #[error("of another render: {}", list(differences))]
+    Different {
+        /// What differs, with both values.
+        differences: Vec<String>,
+    },
+    /// Iterations would count twice.
+    #[error("iterations {start}..{end} are in both")]
+    Overlap {
+        /// The first common iteration.
+        start: u64,
+        /// The first one that is not common any more.
+        end: u64,
+    },
+}
+
+/// The first few, since one cause has many effects.
+fn list(differences: &[String]) -> String {
+    /// How many are shown.
+    const SHOWN: usize = 4;
+    let text = differences.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("; ");
+    match differences.len().saturating_sub(SHOWN) {
+        0 => text,
+        more => format!("{text}; and {more} differences more"),
+    }
+}
+
 /// A file that cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
+    /// A state cannot be used.
+    #[error("cannot use the state {}", path.display())]
+    State {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: StateError,
+    },
     /// The file system refuses.
     #[error("cannot write {}", path.display())]
     Write {

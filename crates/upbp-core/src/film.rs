@@ -4,20 +4,24 @@ use rayon::prelude::*;
 use upbp_estimators::scene::PixelRect;
 use upbp_estimators::{Layer, Spectrum, TechniqueSet};
 
+use crate::iterations::{IterationSet, MAX_ITERATIONS};
+use crate::sum::Sum3;
+
 /// A pixel of one iteration: radiance by layer.
 pub type Pixel = [Spectrum; Layer::COUNT];
 
-/// Sums over iterations in double precision: single precision stalls after some 10⁵ of them.
-#[derive(Clone, Debug)]
+/// Sums over a set of iterations, to the last bit the same in whatever order they were added. A mean is too small by less than
+/// 2⁻³⁶ of the largest iteration of that pixel.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Film {
     rect: PixelRect,
     /// The layers that are kept, in order.
     layers: Vec<Layer>,
-    /// Sum of radiance, `layers.len()` spectra per pixel.
-    sums: Vec<[f64; 3]>,
-    /// Sum of the squares of each iteration's whole radiance, a spectrum per pixel.
-    squares: Vec<[f64; 3]>,
-    iterations: u64,
+    /// Sums of radiance, `layers.len()` per pixel.
+    sums: Vec<Sum3>,
+    /// Sums of the squares of each iteration's whole radiance, one per pixel.
+    squares: Vec<Sum3>,
+    iterations: IterationSet,
 }
 
 /// A picture: three values per pixel, row by row from the top.
@@ -35,24 +39,28 @@ impl Film {
     /// A black film for the layers of `techniques`.
     #[must_use]
     pub fn new(rect: PixelRect, techniques: TechniqueSet) -> Self {
-        let mut layers: Vec<_> = techniques.iter().map(upbp_estimators::Technique::layer).collect();
-        layers.dedup();
+        let layers = Self::layers_of(techniques);
         let pixels = rect.width as usize * rect.height as usize;
         Self {
             rect,
-            sums: vec![[0.0; 3]; pixels * layers.len()],
-            squares: vec![[0.0; 3]; pixels],
+            sums: vec![Sum3::ZERO; pixels * layers.len()],
+            squares: vec![Sum3::ZERO; pixels],
             layers,
-            iterations: 0,
+            iterations: IterationSet::default(),
         }
+    }
+
+    /// The layers that `techniques` contribute to, in order.
+    pub(crate) fn layers_of(techniques: TechniqueSet) -> Vec<Layer> {
+        let mut layers: Vec<_> = techniques.iter().map(upbp_estimators::Technique::layer).collect();
+        layers.dedup();
+        layers
     }
 
     /// Bytes that a film takes, with the buffer of one iteration.
     #[must_use]
     pub fn memory_bytes(rect: PixelRect, techniques: TechniqueSet) -> u64 {
-        let mut layers: Vec<_> = techniques.iter().map(upbp_estimators::Technique::layer).collect();
-        layers.dedup();
-        let pixel = (layers.len() + 1) * size_of::<[f64; 3]>() + size_of::<Pixel>();
+        let pixel = (Self::layers_of(techniques).len() + 1) * size_of::<Sum3>() + size_of::<Pixel>();
         u64::from(rect.width) * u64::from(rect.height) * pixel as u64
     }
 
@@ -70,43 +78,73 @@ impl Film {
 
     /// Number of iterations.
     #[must_use]
-    pub const fn iterations(&self) -> u64 {
-        self.iterations
+    pub fn iterations(&self) -> u64 {
+        self.iterations.len()
     }
 
-    /// Adds an iteration, one value per pixel.
+    /// Which iterations they are.
+    #[must_use]
+    pub const fn iteration_set(&self) -> &IterationSet {
+        &self.iterations
+    }
+
+    /// Adds an iteration, one value per pixel. Returns how many of the values were not finite or negative; they count as zero.
     ///
     /// # Panics
-    /// If `pixels` has another size than the film.
-    pub fn add(&mut self, pixels: &[Pixel]) {
+    /// If `pixels` has another size than the film, or the film holds the iteration already, or its index is not below
+    /// [`MAX_ITERATIONS`].
+    pub fn add(&mut self, iteration: u64, pixels: &[Pixel]) -> u64 {
         assert_eq!(pixels.len(), self.squares.len(), "an iteration has the film's size");
-        let layers = &self.layers;
-        if !layers.is_empty() {
-            self.sums
-                .par_chunks_mut(layers.len())
-                .zip(self.squares.par_iter_mut())
-                .zip(pixels.par_iter())
-                .for_each(|((sums, square), pixel)| {
-                    let mut total = [0.0_f64; 3];
-                    for (sum, layer) in sums.iter_mut().zip(layers) {
-                        for c in 0..3 {
-                            let value = f64::from(pixel[*layer as usize][c]);
-                            sum[c] += value;
-                            total[c] += value;
-                        }
-                    }
-                    for c in 0..3 {
-                        square[c] += total[c] * total[c];
-                    }
-                });
-        }
-        self.iterations += 1;
+        assert!(iteration < MAX_ITERATIONS, "iteration {iteration}");
+        let range = iteration..iteration + 1;
+        assert_eq!(self.iterations.count_in(&range), 0, "iteration {iteration} is added once");
+        let Self { layers, sums, squares, .. } = self;
+        let dropped = if layers.is_empty() {
+            0
+        } else {
+            sums.par_chunks_mut(layers.len())
+                .zip(squares)
+                .zip(pixels)
+                .with_min_len(256)
+                .map(|((sums, square), pixel)| add_pixel(layers, sums, square, pixel))
+                .sum()
+        };
+        self.iterations.insert(iteration);
+        dropped
+    }
+
+    /// Adds another film of the same size and layers that holds other iterations.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        debug_assert_eq!((self.rect, &self.layers), (other.rect, &other.layers));
+        debug_assert_eq!(self.iterations.overlap(&other.iterations), None);
+        self.sums.par_iter_mut().zip(&other.sums).for_each(|(own, sum)| own.merge(sum));
+        self.squares.par_iter_mut().zip(&other.squares).for_each(|(own, sum)| own.merge(sum));
+        self.iterations.union(&other.iterations);
+    }
+
+    /// The sums of a row of pixels: those of radiance, then those of squares.
+    pub(crate) fn row(&self, row: usize) -> (&[Sum3], &[Sum3]) {
+        let width = self.rect.width as usize;
+        let pixels = row * width..(row + 1) * width;
+        let n = self.layers.len();
+        (&self.sums[pixels.start * n..pixels.end * n], &self.squares[pixels])
+    }
+
+    /// A film from its parts; sums as many as belong to the size.
+    pub(crate) fn from_parts(
+        rect: PixelRect,
+        techniques: TechniqueSet,
+        iterations: IterationSet,
+        sums: Vec<Sum3>,
+        squares: Vec<Sum3>,
+    ) -> Self {
+        Self { rect, layers: Self::layers_of(techniques), sums, squares, iterations }
     }
 
     /// The mean of all iterations, all layers together.
     #[must_use]
     pub fn image(&self) -> Image {
-        let scale = 1.0 / self.iterations.max(1) as f64;
+        let scale = 1.0 / self.iterations().max(1) as f64;
         self.collect(|i| self.total(i).map(|v| (v * scale) as f32))
     }
 
@@ -114,8 +152,8 @@ impl Film {
     #[must_use]
     pub fn layer(&self, layer: Layer) -> Option<Image> {
         let at = self.layers.iter().position(|l| *l == layer)?;
-        let scale = 1.0 / self.iterations.max(1) as f64;
-        Some(self.collect(|i| self.sums[i * self.layers.len() + at].map(|v| (v * scale) as f32)))
+        let scale = 1.0 / self.iterations().max(1) as f64;
+        Some(self.collect(|i| self.sums[i * self.layers.len() + at].values().map(|v| (v * scale) as f32)))
     }
 
     /// The variance of the mean, from the spread of the iterations; infinite with fewer than two.
@@ -129,17 +167,23 @@ impl Film {
     /// leave of the variance. Infinite with fewer than two iterations.
     #[must_use]
     pub fn estimated_error(&self) -> f64 {
-        if self.iterations < 2 || self.squares.is_empty() {
+        if self.iterations() < 2 || self.squares.is_empty() {
             return f64::INFINITY;
         }
-        let scale = 1.0 / self.iterations as f64;
-        let sum: f64 = (0..self.squares.len())
-            .map(|i| {
-                let (total, variance) = (self.total(i), self.variance_of_mean(i));
-                (0..3).map(|c| variance[c] / ((total[c] * scale).powi(2) + 0.01)).sum::<f64>()
+        let scale = 1.0 / self.iterations() as f64;
+        // Pieces of fixed size, added in their order.
+        let pieces: Vec<f64> = (0..self.squares.len())
+            .into_par_iter()
+            .chunks(1024)
+            .map(|pixels| {
+                let error = |i| {
+                    let (total, variance) = (self.total(i), self.variance_of_mean(i));
+                    (0..3).map(|c| variance[c] / ((total[c] * scale).powi(2) + 0.01)).sum::<f64>()
+                };
+                pixels.into_iter().map(error).sum()
             })
-            .sum();
-        sum / (3 * self.squares.len()) as f64
+            .collect();
+        pieces.into_iter().sum::<f64>() / (3 * self.squares.len()) as f64
     }
 
     /// Mean over the image of each kept layer, relative to the whole, by luminance.
@@ -147,7 +191,7 @@ impl Film {
     pub fn shares(&self) -> Vec<(Layer, f64)> {
         let mut sums = vec![0.0; self.layers.len()];
         for pixel in self.sums.chunks(self.layers.len().max(1)) {
-            for (sum, value) in sums.iter_mut().zip(pixel) {
+            for (sum, value) in sums.iter_mut().zip(pixel.iter().map(Sum3::values)) {
                 *sum += 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2];
             }
         }
@@ -160,22 +204,22 @@ impl Film {
         let n = self.layers.len();
         let mut total = [0.0; 3];
         for sum in &self.sums[pixel * n..(pixel + 1) * n] {
-            for c in 0..3 {
-                total[c] += sum[c];
+            for (total, value) in total.iter_mut().zip(sum.values()) {
+                *total += value;
             }
         }
         total
     }
 
     fn variance_of_mean(&self, pixel: usize) -> [f64; 3] {
-        if self.iterations < 2 {
+        if self.iterations() < 2 {
             return [f64::INFINITY; 3];
         }
-        let n = self.iterations as f64;
-        let total = self.total(pixel);
+        let n = self.iterations() as f64;
+        let (total, squares) = (self.total(pixel), self.squares[pixel].values());
         std::array::from_fn(|c| {
             let mean = total[c] / n;
-            ((self.squares[pixel][c] / n - mean * mean) / (n - 1.0)).max(0.0)
+            ((squares[c] / n - mean * mean) / (n - 1.0)).max(0.0)
         })
     }
 
@@ -183,6 +227,25 @@ impl Film {
         let pixels = (0..self.squares.len()).map(value).collect();
         Image { width: self.rect.width, height: self.rect.height, pixels }
     }
+}
+
+/// Adds a pixel of an iteration; returns the number of values that had to be left out.
+fn add_pixel(layers: &[Layer], sums: &mut [Sum3], square: &mut Sum3, pixel: &Pixel) -> u64 {
+    let mut dropped = 0;
+    let mut total = [0.0_f64; 3];
+    for (sum, layer) in sums.iter_mut().zip(layers) {
+        let values = pixel[*layer as usize].to_array().map(|value| {
+            let usable = value >= 0.0 && value.is_finite();
+            dropped += u64::from(!usable);
+            if usable { f64::from(value) } else { 0.0 }
+        });
+        sum.add(values);
+        for (total, value) in total.iter_mut().zip(values) {
+            *total += value;
+        }
+    }
+    square.add(total.map(|value| value * value));
+    dropped
 }
 
 impl Image {
@@ -229,9 +292,10 @@ mod tests {
     fn means_and_variances_are_those_of_the_iterations() {
         let mut film = Film::new(RECT, TechniqueSet::default());
         assert!(film.estimated_error().is_infinite());
-        for value in [1.0, 2.0, 6.0] {
-            film.add(&[pixel(value, 1.0), pixel(0.0, 0.0)]);
+        for (i, value) in [(0, 1.0), (7, 2.0), (3, 6.0)] {
+            assert_eq!(film.add(i, &[pixel(value, 1.0), pixel(0.0, 0.0)]), 0);
         }
+        assert_eq!(film.iteration_set().to_string(), "0..1, 3..4, 7..8");
         assert_eq!(film.image().pixels[0], [4.0; 3]);
         assert_eq!(film.layer(Layer::Bpt).unwrap().pixels[0], [3.0; 3]);
         assert_eq!(film.layer(Layer::Bp2d), None);
@@ -246,10 +310,17 @@ mod tests {
     #[test]
     fn small_additions_do_not_stall() {
         let mut film = Film::new(PixelRect { x: 0, y: 0, width: 1, height: 1 }, TechniqueSet::BPT);
-        for _ in 0..200_000 {
-            film.add(&[pixel(0.1, 0.0)]);
+        for i in 0..200_000 {
+            film.add(i, &[pixel(0.1, 0.0)]);
         }
         assert_eq!(film.image().pixels[0][0], 0.1);
+    }
+
+    #[test]
+    fn what_is_no_radiance_is_left_out_and_counted() {
+        let mut film = Film::new(RECT, TechniqueSet::default());
+        assert_eq!(film.add(0, &[pixel(f32::INFINITY, 1.0), pixel(f32::NAN, -1.0)]), 9);
+        assert_eq!(film.image().pixels, [[1.0; 3], [0.0; 3]]);
     }
 
     #[test]

@@ -1,9 +1,12 @@
 #![doc = include_str!("../README.md")]
 
 mod census;
+mod choices;
 mod emitters;
 mod error;
 mod film;
+mod iterations;
+mod memory;
 mod output;
 mod passes;
 mod pilot;
@@ -11,19 +14,25 @@ mod radius;
 mod render;
 mod report;
 mod settings;
+mod state;
+mod stop;
+mod sum;
 
 pub use glam;
 /// Participating media, phase functions, spectra.
 pub use upbp_media as media;
 
 pub use census::Census;
-pub use error::{OutputError, RenderError, SettingsError};
+pub use error::{OutputError, RenderError, SettingsError, StateError};
 pub use film::{Film, Image, Pixel};
-pub use output::{Metadata, check_writable, read_exr, write_exr, write_png};
+pub use iterations::{IterationSet, MAX_ITERATIONS};
+pub use output::{Metadata, check_writable, read_exr, remove_leftovers, write_exr, write_png, write_text};
 pub use radius::{Radii, Radius, RadiusSchedule};
-pub use render::{Canceller, Outcome, Progress, Renderer, Stop, StopReason};
-pub use report::{ErrorPoint, PassSeconds, Report};
+pub use render::Renderer;
+pub use report::{ErrorPoint, ErrorSeries, PassSeconds, Report};
 pub use settings::{CheckedSettings, LightPaths, Settings};
+pub use state::{Identity, State};
+pub use stop::{Canceller, Outcome, Progress, Stop, StopReason};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic};
 pub use upbp_estimators::{
     BodyId, Counters, Interior, Layer, MediumId, MediumStack, Ray, Spectrum, Technique, TechniqueSet, check,

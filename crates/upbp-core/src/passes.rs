@@ -12,55 +12,67 @@ use upbp_estimators::walk::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, Layer, LightMap, Spectrum, StreamKind};
 
 use crate::film::Pixel;
+use crate::memory::LightCounts;
 
 /// Light sub-paths per piece of work.
-const LIGHT_CHUNK: u32 = 1024;
+const LIGHT_CHUNK: u32 = 64;
 
 /// What the light pass leaves.
 pub(crate) struct LightPass<B> {
     pub(crate) vertices: Vec<LightVertex<B>>,
     pub(crate) beams: Vec<PhotonBeam>,
-    pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) counters: Counters,
 }
 
-/// Traces all light sub-paths of the plan.
+/// Traces all light sub-paths of the plan, and hands their splats over in the order of the sub-paths. `expected` is how many
+/// vertices and beams there will be, as far as anyone knows.
+///
+/// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never more than a
+/// fraction of all in two places.
 pub(crate) fn light_pass<S: Scene>(
     context: &Context<'_, S>,
     kind: StreamKind,
+    expected: &LightCounts,
     cancelled: &AtomicBool,
+    mut take_splats: impl FnMut(&[Splat]),
 ) -> LightPass<S::Bsdf> {
     let paths = if context.plan.needs_light_paths() { context.plan.light_paths } else { 0 };
-    let chunks: Vec<LightChunk<S::Bsdf>> = (0..paths.div_ceil(LIGHT_CHUNK))
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, chunk| {
-            let mut out = LightChunk::default();
-            let first = chunk * LIGHT_CHUNK;
-            for index in first..(first + LIGHT_CHUNK).min(paths) {
-                if index % 64 == 0 && cancelled.load(Ordering::Relaxed) {
-                    break;
-                }
-                trace_light_path(context, kind, index, scratch, &mut out, &mut ());
-            }
-            out
-        })
-        .collect();
+    let chunks = paths.div_ceil(LIGHT_CHUNK);
+    // Enough for each thread that none waits long for the last one.
+    let threads = rayon::current_num_threads() as u32;
+    let wave = (chunks / 32).clamp(16 * threads, 256 * threads);
+    let mut buffers: Vec<LightChunk<S::Bsdf>> = Vec::new();
+    buffers.resize_with(wave.min(chunks) as usize, LightChunk::default);
     let mut pass = LightPass {
-        vertices: Vec::with_capacity(chunks.iter().map(|c| c.vertices.len()).sum()),
-        beams: Vec::with_capacity(chunks.iter().map(|c| c.beams.len()).sum()),
-        splats: Vec::with_capacity(chunks.len()),
+        vertices: Vec::with_capacity(expected.vertices as usize),
+        beams: Vec::with_capacity(expected.beams as usize),
         counters: Counters::default(),
     };
-    for chunk in chunks {
-        pass.vertices.extend(chunk.vertices);
-        pass.beams.extend(chunk.beams);
-        pass.splats.push(chunk.splats);
-        pass.counters.add(&chunk.counters);
+    for start in (0..chunks).step_by(wave as usize) {
+        let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
+        buffers.par_iter_mut().enumerate().for_each_init(Scratch::default, |scratch, (i, out)| {
+            if cancelled.load(Ordering::Relaxed) {
+                return;
+            }
+            let first = (start + i as u32) * LIGHT_CHUNK;
+            for index in first..(first + LIGHT_CHUNK).min(paths) {
+                trace_light_path(context, kind, index, scratch, out, &mut ());
+            }
+        });
+        for out in buffers {
+            pass.vertices.append(&mut out.vertices);
+            pass.beams.append(&mut out.beams);
+            pass.counters.add(&std::mem::take(&mut out.counters));
+            take_splats(&out.splats);
+            out.splats.clear();
+        }
     }
+    pass.vertices.shrink_to_fit();
+    pass.beams.shrink_to_fit();
     pass
 }
 
-/// Traces one camera sub-path per pixel of `rect` into `pixels`.
+/// Traces one camera sub-path per pixel of `rect` and adds it to `pixels`.
 pub(crate) fn camera_pass<S: Scene>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf>,
@@ -90,7 +102,9 @@ pub(crate) fn camera_pass<S: Scene>(
                     &mut counters,
                     &mut (),
                 );
-                *pixel = walk.layers;
+                for (sum, value) in pixel.iter_mut().zip(walk.layers) {
+                    *sum += value;
+                }
             }
             counters
         })
@@ -102,16 +116,14 @@ pub(crate) fn camera_pass<S: Scene>(
     counters
 }
 
-/// Adds the splats of light tracing, in the order of the light sub-paths.
-pub(crate) fn add_splats(rect: PixelRect, splats: &[Vec<Splat>], pixels: &mut [Pixel]) {
-    for splat in splats.iter().flatten() {
+/// Adds splats of light tracing, in their order.
+pub(crate) fn add_splats(rect: PixelRect, splats: &[Splat], pixels: &mut [Pixel]) {
+    for splat in splats {
         let [x, y] = [splat.pixel[0] - rect.x, splat.pixel[1] - rect.y];
         let pixel = &mut pixels[y as usize * rect.width as usize + x as usize];
         pixel[Layer::Bpt as usize] += splat.value;
     }
 }
 
-/// A black buffer for one iteration.
-pub(crate) fn black(rect: PixelRect) -> Vec<Pixel> {
-    vec![[Spectrum::ZERO; Layer::COUNT]; rect.width as usize * rect.height as usize]
-}
+/// A black pixel.
+pub(crate) const BLACK: Pixel = [Spectrum::ZERO; Layer::COUNT];

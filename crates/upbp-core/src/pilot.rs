@@ -6,6 +6,7 @@
 use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
+use upbp_accel::{SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{ObservedVertex, Observer};
 use upbp_estimators::scene::Scene;
@@ -15,6 +16,7 @@ use upbp_estimators::{
 };
 
 use crate::emitters::pixel;
+use crate::memory::LightCounts;
 use crate::passes::light_pass;
 use crate::settings::CheckedSettings;
 
@@ -32,8 +34,14 @@ const QUERIES: usize = 256;
 pub(crate) struct Pilot {
     /// Connectible vertices per light sub-path.
     pub(crate) vertices_per_path: f64,
+    /// Of them those on surfaces that are looked up,
+    pub(crate) surface_per_path: f64,
+    /// and those in media.
+    pub(crate) medium_per_path: f64,
     /// Photon beams per light sub-path that leaves beams.
     pub(crate) beams_per_path: f64,
+    /// Pieces that these are cut into for look-ups.
+    pub(crate) pieces_per_path: f64,
     /// Typical distances to the nearest neighbours; `None` where there is nothing.
     pub(crate) surf: Option<Neighbours>,
     /// PP3D.
@@ -102,7 +110,13 @@ pub(crate) fn run<S: Scene>(
         },
     );
     let context = Context { world, plan: &plan };
-    let light = light_pass(&context, StreamKind::PilotLight, &AtomicBool::new(false));
+    let light = light_pass(
+        &context,
+        StreamKind::PilotLight,
+        &LightCounts::default(),
+        &AtomicBool::new(false),
+        |_| (),
+    );
     let queries = camera_queries(world, &plan);
     let beam_paths = f64::from(plan.beam_paths);
     let paths = f64::from(plan.light_paths);
@@ -112,8 +126,14 @@ pub(crate) fn run<S: Scene>(
     let around = |points: &[Vec3], photons: &[Vec3], paths, dimension| {
         neighbours(points, photons.len(), 8, paths, dimension, |query, i| query.distance(photons[i]))
     };
+    let segments = light.beams.iter().map(|beam| (beam.segment, ())).collect();
+    let pieces = SegmentTree::build(segments, SplitParams::default()).pieces();
+    let looked_up = |on: bool, photons: &[Vec3]| if on { photons.len() as f64 / paths } else { 0.0 };
     Pilot {
         vertices_per_path: light.vertices.len() as f64 / paths,
+        surface_per_path: looked_up(plan.mis.surf > 0.0, &surface),
+        medium_per_path: looked_up(plan.stores_medium_photons(), &medium),
+        pieces_per_path: pieces as f64 / beam_paths,
         beams_per_path: light.beams.len() as f64 / beam_paths,
         surf: around(&queries.surfaces, &surface, paths, 2.0),
         pp3d: around(&queries.media, &medium, paths, 3.0),

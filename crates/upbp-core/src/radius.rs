@@ -35,7 +35,7 @@ pub struct Radii {
 ///
 /// `γ = 1/(d + 4)` for a kernel of `d` dimensions balances variance and squared bias of what merges alone can find, and
 /// is consistent, since `0 < γ < 1/d` (section 5.1).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RadiusSchedule {
     /// Radius of each technique in iteration 0, scene units; 0 where it is off.
     pub surf: f32,

@@ -1,84 +1,27 @@
 //! The scheduler: iterations, each a plan and three passes, until a rule says stop.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use upbp_estimators::scene::{Camera, PixelRect, Scene};
-use upbp_estimators::walk::{Context, LightVertex, PhotonBeam, Splat};
-use upbp_estimators::{
-    Counters, LightMap, PathLengths, Plan, PlanChoices, StreamKind, Technique, TechniqueSet, World,
-};
+use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::walk::Context;
+use upbp_estimators::{LightMap, Plan, StreamKind, Technique, TechniqueSet, World};
 
 use crate::census::Census;
+use crate::choices::{Choices, first_radii, plan};
 use crate::emitters;
-use crate::error::RenderError;
+use crate::error::{RenderError, StateError};
 use crate::film::{Film, Pixel};
-use crate::passes::{add_splats, black, camera_pass, light_pass};
-use crate::pilot::{self, Neighbours, Pilot};
-use crate::radius::{Radius, RadiusSchedule};
-use crate::report::{ErrorPoint, PassSeconds, Report};
-use crate::settings::{CheckedSettings, LightPaths};
-
-/// The largest first radius of photon beams, relative to the scene's.
-const LARGEST_BEAM_RADIUS: f32 = 3e-3;
-
-/// When to stop: as soon as any of the rules holds. Without rules a render goes on until it is cancelled.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stop {
-    /// After this many iterations in all.
-    pub iterations: Option<u64>,
-    /// After this many seconds of rendering: at the end of the iteration that comes closest.
-    pub seconds: Option<f64>,
-    /// When [`Film::estimated_error`] is below this, after at least four iterations.
-    pub error: Option<f64>,
-}
-
-/// Why a render stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopReason {
-    /// The number of iterations.
-    Iterations,
-    /// The time.
-    Time,
-    /// The estimated error.
-    Error,
-    /// The caller.
-    Cancelled,
-}
-
-/// The end of a render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    /// Why it stopped.
-    pub reason: StopReason,
-}
-
-/// Stops a render from any thread: the iteration in hand ends as soon as possible and leaves no trace.
-#[derive(Clone, Debug)]
-pub struct Canceller(Arc<AtomicBool>);
-
-impl Canceller {
-    /// Stops the render, for good.
-    pub fn cancel(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-}
-
-/// Where a render is, after an iteration.
-pub struct Progress<'a> {
-    /// Iterations done.
-    pub iterations: u64,
-    /// Seconds of rendering.
-    pub seconds: f64,
-    /// Part of the work done, `[0, 1]`, as far as the stop rules tell.
-    pub fraction: f64,
-    /// Estimated relMSE; infinite before the second iteration.
-    pub estimated_error: f64,
-    /// The film.
-    pub film: &'a Film,
-}
+use crate::iterations::MAX_ITERATIONS;
+use crate::memory::LightCounts;
+use crate::passes::{BLACK, add_splats, camera_pass, light_pass};
+use crate::pilot::{self, Pilot};
+use crate::report::{ErrorPoint, PassTimes, Report};
+use crate::settings::CheckedSettings;
+use crate::state::{Identity, Record, State, fingerprint};
+use crate::stop::{Canceller, Outcome, Progress, Stop, StopReason};
 
 /// A render of one scene.
 ///
@@ -87,19 +30,12 @@ pub struct Progress<'a> {
 pub struct Renderer<'a, S: Scene> {
     world: World<'a, S>,
     settings: CheckedSettings,
-    census: Census,
     pilot: Pilot,
-    radii: RadiusSchedule,
-    light_paths: u32,
-    beam_paths: u32,
-    rect: PixelRect,
-    film: Film,
+    state: State,
+    /// The iterations that are rendered.
+    range: Range<u64>,
     pixels: Vec<Pixel>,
-    seconds: PassSeconds,
-    counters: Counters,
-    map_bytes: u64,
     cancelled: Arc<AtomicBool>,
-    series: Vec<ErrorPoint>,
 }
 
 impl<'a, S: Scene> Renderer<'a, S> {
@@ -135,81 +71,138 @@ impl<'a, S: Scene> Renderer<'a, S> {
         let mut pilot = look(&world);
         if scene.emitters().len() > 1 {
             let light_paths = emitters::light_paths(pilot.vertices_per_path);
-            let radii = first_radii(&world, &settings, techniques, &pilot, light_paths, light_paths / 8);
-            let plan = plan(&world, &settings, techniques, &pilot, &radii, [light_paths, light_paths / 8], 0);
+            let paths = [light_paths, light_paths / 8];
+            let radii = first_radii(&world, &settings, techniques, &pilot, paths);
+            let plan = plan(&world, &settings, techniques, pilot.vertices_per_path, &radii, paths, 0);
             let (emission, next_event) = emitters::measure(&world, &plan);
             world.choose_emitters_by(&emission, &next_event);
             // Other light sub-paths than before.
             pilot = look(&world);
         }
-        let pixel_count = rect.width.saturating_mul(rect.height);
-        let wanted = match settings.light_paths {
-            LightPaths::Auto => pixel_count,
-            LightPaths::Count(count) => count,
+        let pixels = rect.width.saturating_mul(rect.height);
+        let choices = Choices::new(&world, &settings, techniques, &pilot, pixels, budget - film_bytes);
+        let identity = Identity {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene: String::new(),
+            fingerprint: String::new(),
+            film: scene.camera().resolution(),
+            part: (rect.x, rect.y, rect.width, rect.height),
+            settings: (*settings).clone(),
+            census,
+            light_paths: choices.light_paths,
+            beam_paths: choices.beam_paths,
+            vertices_per_light_path: pilot.vertices_per_path,
+            radii: choices.radii,
         };
-        let beam_paths = settings
-            .beams
-            .unwrap_or_else(|| enough_beams(&world, &settings, &pilot).min(wanted / 10).max(1))
-            .min(wanted);
-        let (light_paths, beam_paths) =
-            affordable::<S>(&pilot, budget - film_bytes, [wanted, beam_paths], techniques);
-        let radii = first_radii(&world, &settings, techniques, &pilot, light_paths, beam_paths);
-        let mut renderer = Self {
-            film: Film::new(rect, techniques),
-            pixels: black(rect),
+        let film = Film::new(rect, techniques);
+        let pixels = vec![BLACK; rect.width as usize * rect.height as usize];
+        let mut record = Record {
+            times: PassTimes { pilot: start.elapsed(), ..PassTimes::default() },
+            ..Record::default()
+        };
+        let counts = LightCounts::expected(&pilot, choices.light_paths, choices.beam_paths);
+        record.expected_bytes = film_bytes + counts.peak_bytes::<S::Bsdf>() as u64;
+        Ok(Self {
             world,
             settings,
-            census,
             pilot,
-            radii,
-            light_paths,
-            beam_paths,
-            rect,
-            seconds: PassSeconds::default(),
-            counters: Counters::default(),
-            map_bytes: 0,
+            state: State { identity, record, film },
+            range: 0..MAX_ITERATIONS,
+            pixels,
             cancelled: Arc::default(),
-            series: Vec::new(),
-        };
-        renderer.seconds.pilot = start.elapsed().as_secs_f64();
-        Ok(renderer)
+        })
+    }
+
+    /// Says which scene this is, so that states of different scenes are told apart: a name for people, and a fingerprint of
+    /// all that the scene's content depends on.
+    pub fn identify_scene(&mut self, name: &str, content: &[u8]) {
+        name.clone_into(&mut self.state.identity.scene);
+        self.state.identity.fingerprint = fingerprint(content);
+    }
+
+    /// Renders only iterations of `range`, which may be a share of a render that many machines work on. Of the initial range,
+    /// which is `0..`[`MAX_ITERATIONS`], nothing beyond its end is ever rendered.
+    pub fn set_range(&mut self, range: Range<u64>) {
+        self.range = range.start..range.end.min(MAX_ITERATIONS);
+    }
+
+    /// Goes on where a state was left, or adds what others have rendered: what the state holds is not rendered again. For a
+    /// moment there are two films in memory.
+    ///
+    /// # Errors
+    /// As [`State::merge`]: then nothing has changed.
+    pub fn resume(&mut self, state: State) -> Result<(), StateError> {
+        let identity = self.state.identity.clone();
+        self.state.merge(state)?;
+        // The settings of this render, where they do not matter.
+        self.state.identity = identity;
+        Ok(())
+    }
+
+    /// All that was done so far, to be saved or merged.
+    #[must_use]
+    pub const fn state(&self) -> &State {
+        &self.state
     }
 
     /// The plan of an iteration.
     #[must_use]
     pub fn plan(&self, iteration: u64) -> Plan {
-        let paths = [self.light_paths, self.beam_paths];
-        plan(&self.world, &self.settings, self.census.techniques, &self.pilot, &self.radii, paths, iteration)
+        let identity = &self.state.identity;
+        plan(
+            &self.world,
+            &identity.settings,
+            identity.census.techniques,
+            identity.vertices_per_light_path,
+            &identity.radii,
+            [identity.light_paths, identity.beam_paths],
+            iteration,
+        )
     }
 
-    /// Renders one more iteration. `false` if it was cancelled: then it is as if it had not begun.
+    /// Renders the next iteration: the first of the [range](Self::set_range) that is not on the film yet. `false` if there
+    /// is none, or if it was cancelled: then it is as if it had not begun.
     pub fn iterate(&mut self) -> bool {
-        let plan = self.plan(self.film.iterations());
+        let Some(iteration) = self.next_iteration() else { return false };
+        let plan = self.plan(iteration);
         let context = Context { world: &self.world, plan: &plan };
+        let (rect, pixels) = (self.state.film.rect(), &mut self.pixels);
+        let mut times = PassTimes::default();
         let mut clock = Clock::start();
-        let mut light = light_pass(&context, StreamKind::Light, &self.cancelled);
-        let light_seconds = clock.lap();
+        pixels.fill(BLACK);
+        let expected = LightCounts::expected(&self.pilot, plan.light_paths, plan.beam_paths);
+        let light = light_pass(&context, StreamKind::Light, &expected, &self.cancelled, |splats| {
+            add_splats(rect, splats, pixels);
+        });
+        times.light = clock.lap();
         let map = if plan.stores_vertices() || plan.stores_beams() {
-            LightMap::build(&plan, std::mem::take(&mut light.vertices), std::mem::take(&mut light.beams))
+            LightMap::build(&plan, light.vertices, light.beams)
         } else {
             LightMap::empty()
         };
-        let build_seconds = clock.lap();
-        let counters = camera_pass(&context, &map, self.rect, &mut self.pixels, &self.cancelled);
-        let camera_seconds = clock.lap();
+        times.build = clock.lap();
+        let counters = camera_pass(&context, &map, rect, pixels, &self.cancelled);
+        times.camera = clock.lap();
         if self.cancelled.load(Ordering::Relaxed) {
             return false;
         }
-        add_splats(self.rect, &light.splats, &mut self.pixels);
-        self.film.add(&self.pixels);
-        self.counters.add(&light.counters);
-        self.counters.add(&counters);
-        self.map_bytes = self.map_bytes.max(map.memory_bytes() as u64);
-        self.seconds.light += light_seconds;
-        self.seconds.build += build_seconds;
-        self.seconds.camera += camera_seconds;
-        self.seconds.film += clock.lap();
+        let State { record, film, .. } = &mut self.state;
+        record.counters.dropped += film.add(iteration, pixels);
+        record.counters.add(&light.counters);
+        record.counters.add(&counters);
+        record.map_bytes = record.map_bytes.max(map.memory_bytes() as u64);
+        times.film = clock.lap();
+        record.times.add(&times);
         true
+    }
+
+    fn next_iteration(&self) -> Option<u64> {
+        self.state.film.iteration_set().first_missing(&self.range)
+    }
+
+    /// Seconds of rendering so far.
+    fn seconds(&self) -> f64 {
+        self.state.record.times.seconds().total()
     }
 
     /// Renders until a rule of `stop` holds or `progress`, which is called after every iteration, breaks. Time spent in
@@ -226,12 +219,14 @@ impl<'a, S: Scene> Renderer<'a, S> {
             if !self.iterate() {
                 return Outcome { reason: StopReason::Cancelled };
             }
+            let film = &self.state.film;
             let now = Progress {
-                iterations: self.film.iterations(),
-                seconds: self.seconds.total(),
+                iterations: film.iterations(),
+                seconds: self.seconds(),
                 fraction: self.fraction(stop),
-                estimated_error: self.film.estimated_error(),
-                film: &self.film,
+                estimated_error: film.estimated_error(),
+                state: &self.state,
+                film,
             };
             if progress(&now).is_break() {
                 return Outcome { reason: StopReason::Cancelled };
@@ -240,33 +235,36 @@ impl<'a, S: Scene> Renderer<'a, S> {
     }
 
     fn reason_to_stop(&self, stop: &Stop) -> Option<StopReason> {
-        let done = self.film.iterations();
-        if stop.iterations.is_some_and(|limit| done >= limit) {
+        let done = self.state.film.iterations();
+        if self.next_iteration().is_none() || stop.iterations.is_some_and(|limit| done >= limit) {
             return Some(StopReason::Iterations);
         }
         if let Some(limit) = stop.seconds
             && done > 0
         {
-            let elapsed = self.seconds.total();
-            let one = (elapsed - self.seconds.pilot) / done as f64;
+            let elapsed = self.seconds();
+            let one = (elapsed - self.state.record.times.pilot.as_secs_f64()) / done as f64;
             if elapsed + 0.5 * one > limit {
                 return Some(StopReason::Time);
             }
         }
         // The estimate of the error is itself noisy: a few iterations first.
-        if done >= 4 && stop.error.is_some_and(|limit| self.film.estimated_error() <= limit) {
+        if done >= 4 && stop.error.is_some_and(|limit| self.state.film.estimated_error() <= limit) {
             return Some(StopReason::Error);
         }
         None
     }
 
     fn fraction(&self, stop: &Stop) -> f64 {
-        let done = self.film.iterations() as f64;
-        let by_iterations = stop.iterations.map_or(0.0, |limit| done / limit.max(1) as f64);
-        let by_time = stop.seconds.map_or(0.0, |limit| self.seconds.total() / limit);
+        let film = &self.state.film;
+        let in_range = film.iteration_set().count_in(&self.range);
+        let by_range = in_range as f64 / (self.range.end - self.range.start).max(1) as f64;
+        let by_iterations =
+            stop.iterations.map_or(0.0, |limit| film.iterations() as f64 / limit.max(1) as f64);
+        let by_time = stop.seconds.map_or(0.0, |limit| self.seconds() / limit);
         // The relMSE falls with the number of iterations.
-        let by_error = stop.error.map_or(0.0, |limit| limit / self.film.estimated_error());
-        by_iterations.max(by_time).max(by_error).clamp(0.0, 1.0)
+        let by_error = stop.error.map_or(0.0, |limit| limit / film.estimated_error());
+        by_range.max(by_iterations).max(by_time).max(by_error).clamp(0.0, 1.0)
     }
 
     /// A handle that stops the render from any thread.
@@ -277,13 +275,13 @@ impl<'a, S: Scene> Renderer<'a, S> {
 
     /// Adds a point to the report's series of errors.
     pub fn record_error(&mut self, point: ErrorPoint) {
-        self.series.push(point);
+        self.state.record.series.push(point);
     }
 
     /// The film.
     #[must_use]
     pub const fn film(&self) -> &Film {
-        &self.film
+        &self.state.film
     }
 
     /// The scene, made ready.
@@ -295,129 +293,13 @@ impl<'a, S: Scene> Renderer<'a, S> {
     /// What the scene can use.
     #[must_use]
     pub const fn census(&self) -> &Census {
-        &self.census
+        &self.state.identity.census
     }
 
     /// What was done so far.
     #[must_use]
     pub fn report(&self) -> Report {
-        let last = self.radii.kernels(self.film.iterations().saturating_sub(1));
-        let error = self.film.estimated_error();
-        Report {
-            version: env!("CARGO_PKG_VERSION"),
-            census: self.census.clone(),
-            resolution: [self.rect.width, self.rect.height],
-            seed: self.settings.seed,
-            iterations: self.film.iterations(),
-            seconds: self.seconds,
-            light_paths: self.light_paths,
-            beam_paths: self.beam_paths,
-            first_radii: self.radii,
-            last_radii: [
-                last.surf.radius(),
-                last.pp3d.radius(),
-                last.pb2d.radius(),
-                last.bp2d.radius(),
-                last.bb1d.radius(),
-            ],
-            counters: self.counters,
-            shares: self.film.shares().into_iter().map(|(layer, share)| (layer.name(), share)).collect(),
-            map_bytes: self.map_bytes,
-            estimated_error: error.is_finite().then_some(error),
-            series: self.series.clone(),
-        }
-    }
-}
-
-/// The plan of an iteration with this many light sub-paths, and this many with beams.
-fn plan<S: Scene>(
-    world: &World<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    pilot: &Pilot,
-    radii: &RadiusSchedule,
-    [light_paths, beam_paths]: [u32; 2],
-    iteration: u64,
-) -> Plan {
-    Plan::new(
-        world.scene,
-        &PlanChoices {
-            seed: settings.seed,
-            iteration,
-            techniques,
-            light_paths,
-            beam_paths,
-            connections: settings.connections,
-            vertices_per_light_path: pilot.vertices_per_path,
-            lengths: PathLengths { min: settings.min_length, max: settings.max_length },
-            roulette: settings.roulette,
-            kernels: radii.kernels(iteration),
-            heuristic: settings.heuristic,
-            photon_beams: settings.photon_beams,
-            query_beams: settings.query_beams,
-        },
-    )
-}
-
-/// As many light sub-paths, and as many with beams, as `wanted` and as `bytes` have room for.
-fn affordable<S: Scene>(pilot: &Pilot, bytes: u64, wanted: [u32; 2], techniques: TechniqueSet) -> (u32, u32) {
-    // Positions and indices in the trees take about 40 bytes per vertex more; a beam has some four pieces in its tree.
-    let vertex = size_of::<LightVertex<S::Bsdf>>() as f64 + 40.0;
-    let beam = size_of::<PhotonBeam>() as f64 + 300.0;
-    let splat = if techniques.has(Technique::LightTracing) { size_of::<Splat>() as f64 } else { 0.0 };
-    let [paths, beam_paths] = wanted.map(f64::from);
-    let need = paths * pilot.vertices_per_path * (vertex + splat) + beam_paths * pilot.beams_per_path * beam;
-    // Passes hold their pieces and the joined list for a moment.
-    let part = (bytes as f64 / (2.0 * need.max(1.0))).min(1.0);
-    (((paths * part) as u32).max(1), ((beam_paths * part) as u32).max(1))
-}
-
-/// Light sub-paths with beams such that a query beam meets a few of them. More cost more than they tell: their look-ups
-/// soon take most of an iteration.
-fn enough_beams<S: Scene>(world: &World<'_, S>, settings: &CheckedSettings, pilot: &Pilot) -> u32 {
-    /// Photon beams within the kernel of a query beam.
-    const HITS: f64 = 1.0;
-    let largest = LARGEST_BEAM_RADIUS * world.bounds.radius;
-    let (found, radius) = match (pilot.bb1d, settings.radii.bb1d) {
-        (Some(found), Radius::Auto) => (found, largest),
-        (Some(found), Radius::Scene(fraction)) => (found, fraction * world.bounds.radius),
-        (Some(found), Radius::Absolute(radius)) => (found, radius),
-        (None, _) => return 1024,
-    };
-    found.paths(HITS, f64::from(radius)).clamp(64.0, 1e6) as u32
-}
-
-fn first_radii<S: Scene>(
-    world: &World<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    pilot: &Pilot,
-    light_paths: u32,
-    beam_paths: u32,
-) -> RadiusSchedule {
-    let scene = world.bounds.radius;
-    let radius = |technique, choice, found: Option<Neighbours>, count: f64, paths: u32, most: f32| {
-        if !techniques.has(technique) {
-            return 0.0;
-        }
-        match choice {
-            Radius::Absolute(radius) => radius,
-            Radius::Scene(fraction) => fraction * scene,
-            Radius::Auto => found
-                .map_or(most * scene, |n| n.radius(count, f64::from(paths)))
-                .clamp(0.1 * most * scene, most * scene),
-        }
-    };
-    let radii = &settings.radii;
-    RadiusSchedule {
-        surf: radius(Technique::Surf, radii.surf, pilot.surf, 8.0, light_paths, 3e-3),
-        pp3d: radius(Technique::Pp3d, radii.pp3d, pilot.pp3d, 8.0, light_paths, 5e-3),
-        pb2d: radius(Technique::Pb2d, radii.pb2d, pilot.pb2d, 8.0, light_paths, 3e-3),
-        bp2d: radius(Technique::Bp2d, radii.bp2d, pilot.bp2d, 8.0, beam_paths, 3e-3),
-        bb1d: radius(Technique::Bb1d, radii.bb1d, pilot.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
-        progressive: settings.progressive,
-        // Positions have a relative precision of 6e-8.
-        floor: 1e-6 * scene,
+        self.state.report()
     }
 }
 
@@ -429,11 +311,11 @@ impl Clock {
         Self(Instant::now())
     }
 
-    /// Seconds since the last call.
-    fn lap(&mut self) -> f64 {
+    /// Time since the last call.
+    fn lap(&mut self) -> Duration {
         let now = Instant::now();
-        let seconds = now.duration_since(self.0).as_secs_f64();
+        let time = now.duration_since(self.0);
         self.0 = now;
-        seconds
+        time
     }
 }

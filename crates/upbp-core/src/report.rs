@@ -1,12 +1,15 @@
 //! What a render did, for people and for scripts.
 
 use std::fmt;
+use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use upbp_estimators::{Counters, Technique};
 
 use crate::census::Census;
+use crate::iterations::IterationSet;
 use crate::radius::RadiusSchedule;
+use crate::state::State;
 
 /// Wall seconds of the passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -31,8 +34,39 @@ impl PassSeconds {
     }
 }
 
+/// Wall time of the passes, in whole nanoseconds: sums do not depend on the order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct PassTimes {
+    pub(crate) pilot: Duration,
+    pub(crate) light: Duration,
+    pub(crate) build: Duration,
+    pub(crate) camera: Duration,
+    pub(crate) film: Duration,
+}
+
+impl PassTimes {
+    pub(crate) fn add(&mut self, other: &Self) {
+        let sum = |a: &mut Duration, b| *a = a.saturating_add(b);
+        sum(&mut self.pilot, other.pilot);
+        sum(&mut self.light, other.light);
+        sum(&mut self.build, other.build);
+        sum(&mut self.camera, other.camera);
+        sum(&mut self.film, other.film);
+    }
+
+    pub(crate) fn seconds(&self) -> PassSeconds {
+        PassSeconds {
+            pilot: self.pilot.as_secs_f64(),
+            light: self.light.as_secs_f64(),
+            build: self.build.as_secs_f64(),
+            camera: self.camera.as_secs_f64(),
+            film: self.film.as_secs_f64(),
+        }
+    }
+}
+
 /// The error at some moment of a render, against a reference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorPoint {
     /// Seconds of rendering, without evaluation of the error.
     pub seconds: f64,
@@ -44,11 +78,39 @@ pub struct ErrorPoint {
     pub rmse: f64,
 }
 
+/// Errors over time, of any length of a render in bounded space: every iteration up to the hundredth, then one per hundredth
+/// of the number of iterations, and the latest.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ErrorSeries(Vec<ErrorPoint>);
+
+impl ErrorSeries {
+    /// Least ratio of the numbers of iterations of two points that are kept.
+    const SPACING: f64 = 1.01;
+
+    /// Adds a point with more iterations than those before.
+    pub fn push(&mut self, point: ErrorPoint) {
+        if let [.., before, last] = self.0.as_mut_slice()
+            && (last.iterations as f64) < Self::SPACING * before.iterations as f64
+        {
+            *last = point;
+        } else {
+            self.0.push(point);
+        }
+    }
+
+    /// The points that were kept.
+    #[must_use]
+    pub fn points(&self) -> &[ErrorPoint] {
+        &self.0
+    }
+}
+
 /// What a render did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Version of the renderer.
-    pub version: &'static str,
+    pub version: String,
     /// What the scene can use.
     pub census: Census,
     /// Width and height of the picture.
@@ -57,6 +119,10 @@ pub struct Report {
     pub seed: u64,
     /// Iterations done.
     pub iterations: u64,
+    /// Which ones: ranges with their ends excluded.
+    pub iteration_set: IterationSet,
+    /// A number of the film's bits: equal for equal films, however they came about.
+    pub film_fingerprint: String,
     /// Seconds of rendering by pass.
     pub seconds: PassSeconds,
     /// Light sub-paths per iteration.
@@ -65,7 +131,7 @@ pub struct Report {
     pub beam_paths: u32,
     /// Radii of the first iteration.
     pub first_radii: RadiusSchedule,
-    /// Radii of the last iteration: `surf`, `pp3d`, `pb2d`, `bp2d`, `bb1d`.
+    /// Radii of the iteration with the largest index: `surf`, `pp3d`, `pb2d`, `bp2d`, `bb1d`.
     pub last_radii: [f32; 5],
     /// Counts over all iterations.
     pub counters: Counters,
@@ -73,10 +139,46 @@ pub struct Report {
     pub shares: Vec<(&'static str, f64)>,
     /// Largest number of bytes that light vertices, beams and look-up structures took.
     pub map_bytes: u64,
+    /// Largest number of bytes that an iteration was expected to need, film included.
+    pub expected_bytes: u64,
     /// Estimated relMSE of the image; `None` with fewer than two iterations.
     pub estimated_error: Option<f64>,
     /// Error against a reference over time, if there is one.
-    pub series: Vec<ErrorPoint>,
+    pub series: ErrorSeries,
+}
+
+impl Report {
+    pub(crate) fn new(state: &State) -> Self {
+        let State { identity, record, film } = state;
+        let last = identity.radii.kernels(film.iteration_set().last().unwrap_or(0));
+        let error = film.estimated_error();
+        Self {
+            version: identity.version.clone(),
+            census: identity.census.clone(),
+            resolution: [film.rect().width, film.rect().height],
+            seed: identity.settings.seed,
+            iterations: film.iterations(),
+            iteration_set: film.iteration_set().clone(),
+            film_fingerprint: film.fingerprint(),
+            seconds: record.times.seconds(),
+            light_paths: identity.light_paths,
+            beam_paths: identity.beam_paths,
+            first_radii: identity.radii,
+            last_radii: [
+                last.surf.radius(),
+                last.pp3d.radius(),
+                last.pb2d.radius(),
+                last.bp2d.radius(),
+                last.bb1d.radius(),
+            ],
+            counters: record.counters,
+            shares: film.shares().into_iter().map(|(layer, share)| (layer.name(), share)).collect(),
+            map_bytes: record.map_bytes,
+            expected_bytes: record.expected_bytes,
+            estimated_error: error.is_finite().then_some(error),
+            series: record.series.clone(),
+        }
+    }
 }
 
 impl fmt::Display for Report {
@@ -136,7 +238,7 @@ impl fmt::Display for Report {
                 c.dropped, c.lost_walks, c.boundary_conflicts
             )?;
         }
-        if let Some(last) = self.series.last() {
+        if let Some(last) = self.series.points().last() {
             writeln!(f, "against the reference: relMSE {:.3e}, RMSE {:.3e}", last.relative_mse, last.rmse)?;
         }
         Ok(())

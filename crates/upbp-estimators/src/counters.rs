@@ -1,11 +1,11 @@
 //! Counts of what the walks did and of what they had to drop.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::technique::Technique;
 
 /// Counters of one pass or of a whole render; they add up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
     /// Edges of light sub-paths.
     pub light_edges: u64,

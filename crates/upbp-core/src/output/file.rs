@@ -1,0 +1,188 @@
+//! Files that are there as a whole or not at all.
+
+use std::fs::{self, File, OpenOptions};
+use std::hash::{BuildHasher, RandomState};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use crate::error::OutputError;
+
+/// What the names of unfinished files end with.
+const UNFINISHED: &str = ".part";
+
+/// The age at which an unfinished file is no longer being written.
+const LEFTOVER: Duration = Duration::from_secs(3600);
+
+/// Checks that a file can be written, before hours are spent on its content.
+///
+/// # Errors
+/// What the file system says.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    let check = || {
+        if path.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        if is_special(path) {
+            // Opening a pipe would wait for its reader.
+            return Ok(());
+        }
+        let (temporary, _) = create_beside(&target(path))?;
+        fs::remove_file(temporary)
+    };
+    check().map_err(|source| OutputError::Write { path: path.to_owned(), source })
+}
+
+/// Writes a file beside its place, forces it to the disk and moves it there: whoever looks, whenever the process or the machine
+/// stops, finds the old file or the new one. What is no regular file, such as a pipe, is written to directly.
+pub(crate) fn write_whole(
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> Result<(), OutputError>,
+) -> Result<(), OutputError> {
+    let fail = |source| OutputError::Write { path: path.to_owned(), source };
+    if is_special(path) {
+        let mut writer = BufWriter::new(OpenOptions::new().write(true).open(path).map_err(fail)?);
+        content(&mut writer)?;
+        return writer.flush().map_err(fail);
+    }
+    let target = target(path);
+    let (temporary, file) = create_beside(&target).map_err(fail)?;
+    let written = (|| {
+        let mut writer = BufWriter::new(file);
+        content(&mut writer)?;
+        let file = writer.into_inner().map_err(|error| fail(error.into_error()))?;
+        file.sync_all().map_err(fail)?;
+        fs::rename(&temporary, &target).map_err(fail)?;
+        sync_folder(&target).map_err(fail)
+    })();
+    if written.is_err() {
+        // Best effort: the first error is the one to report. After the move there is nothing to remove.
+        let _ = fs::remove_file(&temporary);
+    }
+    written
+}
+
+/// Writes a text as a whole or not at all.
+///
+/// # Errors
+/// What the file system says.
+pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+    write_whole(path, |writer| {
+        let fail = |source| OutputError::Write { path: path.to_owned(), source };
+        writer.write_all(text.as_bytes()).map_err(fail)
+    })
+}
+
+/// Removes what processes that were killed while they wrote `path` have left beside it, once it is an hour old. Failures
+/// do not matter: there is nothing to remove then, or nothing to be done.
+pub fn remove_leftovers(path: &Path) {
+    let target = target(path);
+    let (Some(name), Ok(entries)) = (target.file_name(), fs::read_dir(folder(&target))) else { return };
+    let prefix = format!("{}.", name.to_string_lossy());
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let unfinished =
+            name.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(UNFINISHED)).is_some_and(is_mark);
+        let age = entry.metadata().and_then(|metadata| metadata.modified()).map(|at| at.elapsed());
+        if unfinished && matches!(age, Ok(Ok(age)) if age > LEFTOVER) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Whether there is something that is neither a file nor a folder.
+fn is_special(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
+}
+
+/// The file itself, where `path` is a link to it.
+fn target(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+}
+
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// A new file in the same folder, so that moving is a rename. Its name is one that no other process chooses, on this machine or
+/// on another that shares the folder.
+fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
+    let mut name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?.to_owned();
+    name.push(format!(".{:016x}{UNFINISHED}", RandomState::new().hash_one(std::process::id())));
+    let temporary = path.with_file_name(name);
+    let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+    Ok((temporary, file))
+}
+
+/// Whether a part of a name is one of [`create_beside`].
+fn is_mark(text: &str) -> bool {
+    text.len() == 16 && text.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+/// Forces a rename to the disk. Only Unix opens folders.
+fn sync_folder(path: &Path) -> io::Result<()> {
+    if cfg!(unix) { File::open(folder(path))?.sync_all() } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_failure_leaves_the_old_file_and_nothing_else() {
+        let folder = std::env::temp_dir().join(format!("upbp-whole-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("a.txt");
+        write_text(&path, "old").unwrap();
+        let reason = || OutputError::Encode { path: path.clone(), reason: "no".into() };
+        write_whole(&path, |writer| {
+            writer.write_all(b"new").unwrap();
+            Err(reason())
+        })
+        .unwrap_err();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(files(&folder), ["a.txt"]);
+        check_writable(&path).unwrap();
+        check_writable(&folder).unwrap_err();
+        check_writable(&folder.join("none/a.txt")).unwrap_err();
+        assert_eq!(files(&folder), ["a.txt"]);
+
+        // Of others' files and of young ones nothing is removed.
+        let (young, _) = create_beside(&path).unwrap();
+        let (old, file) = create_beside(&path).unwrap();
+        file.set_modified(std::time::SystemTime::now() - 2 * LEFTOVER).unwrap();
+        let other = folder.join("a.txt.mine.part");
+        File::create(&other).unwrap().set_modified(std::time::UNIX_EPOCH).unwrap();
+        remove_leftovers(&path);
+        assert!(young.exists() && other.exists() && path.exists() && !old.exists());
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_devices_stay_what_they_are() {
+        let folder = std::env::temp_dir().join(format!("upbp-link-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let (file, link) = (folder.join("file"), folder.join("link"));
+        write_text(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_text(&link, "new").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        write_text(Path::new("/dev/null"), "text").unwrap();
+        assert!(is_special(Path::new("/dev/null")));
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,208 @@
+//! State files.
+//!
+//! ```text
+//! "UPBPSTAT"   8 bytes
+//! version      u32, little-endian as all numbers
+//! block        the header: RON text
+//! block ...    one per row of the film: the sums of all layers pixel by pixel, then those of squares
+//! ```
+//!
+//! A block is its length (u32), its bytes, and the checksum (u64) of all blocks so far: each block is
+//! known to be good, and in its place, before anything in it is believed. Memory for the film grows as blocks arrive, so a
+//! file cannot ask for more than some fifty times its own length.
+
+use std::io::{self, Read, Write};
+
+use serde::{Deserialize, Serialize};
+
+use super::checksum::Checksum;
+use super::{Identity, Record, State};
+use crate::error::StateError;
+use crate::film::Film;
+use crate::iterations::IterationSet;
+use crate::sum::{MAX_ENCODED, Sum3};
+
+/// How every state file begins.
+const MAGIC: [u8; 8] = *b"UPBPSTAT";
+
+/// Version of the format.
+const VERSION: u32 = 1;
+
+/// The longest header, bytes: room for a million ranges of iterations.
+const MAX_HEADER: u64 = 1 << 24;
+
+/// All but the film's sums.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    identity: Identity,
+    iterations: IterationSet,
+    record: Record,
+}
+
+/// A short name for some bytes.
+pub(crate) fn fingerprint(bytes: &[u8]) -> String {
+    let mut checksum = Checksum::new();
+    checksum.add(bytes);
+    format!("{:016x}", checksum.value())
+}
+
+impl Film {
+    /// A number of the film's bits, as text: equal for the same sums of the same iterations, however they came about.
+    #[must_use]
+    pub fn fingerprint(&self) -> String {
+        let mut checksum = Checksum::new();
+        checksum.add(format!("{:?}{:?}", self.iteration_set().ranges(), self.layers()).as_bytes());
+        let mut bytes = Vec::new();
+        for row in 0..self.rect().height as usize {
+            self.encode_row(row, &mut bytes);
+            checksum.add(&bytes);
+        }
+        format!("{:016x}", checksum.value())
+    }
+
+    fn encode_row(&self, row: usize, bytes: &mut Vec<u8>) {
+        bytes.clear();
+        let (sums, squares) = self.row(row);
+        sums.iter().chain(squares).for_each(|sum| sum.encode(bytes));
+    }
+}
+
+impl State {
+    /// Writes the state, in blocks of one row of the film.
+    ///
+    /// # Errors
+    /// What `to` says; a set of iterations with millions of gaps.
+    pub fn write(&self, mut to: impl Write) -> io::Result<()> {
+        let header = Header {
+            identity: self.identity.clone(),
+            iterations: self.film.iteration_set().clone(),
+            record: self.record.clone(),
+        };
+        let text = ron::to_string(&header).map_err(io::Error::other)?;
+        if text.len() as u64 > MAX_HEADER {
+            return Err(io::Error::other("too many gaps in the set of iterations"));
+        }
+        to.write_all(&MAGIC)?;
+        to.write_all(&VERSION.to_le_bytes())?;
+        let mut checksum = Checksum::new();
+        write_block(&mut to, &mut checksum, text.as_bytes())?;
+        let mut bytes = Vec::new();
+        for row in 0..self.identity.rect().height as usize {
+            self.film.encode_row(row, &mut bytes);
+            write_block(&mut to, &mut checksum, &bytes)?;
+        }
+        to.flush()
+    }
+
+    /// Reads a state to the end of `from`. It need not be buffered.
+    ///
+    /// # Errors
+    /// What `from` says; bytes that are not a state, or not a whole one, or not what was written.
+    pub fn read(from: impl Read) -> Result<Self, StateError> {
+        let mut from = io::BufReader::with_capacity(1 << 16, from);
+        let mut mark = [0; 12];
+        if !fills(&mut from, &mut mark)? || mark[..8] != MAGIC {
+            return Err(StateError::NotAState);
+        }
+        let version = u32::from_le_bytes([mark[8], mark[9], mark[10], mark[11]]);
+        if version != VERSION {
+            return Err(StateError::Version { expected: VERSION, found: version });
+        }
+        let mut checksum = Checksum::new();
+        let header = read_block(&mut from, &mut checksum, MAX_HEADER, "header")?;
+        let text = str::from_utf8(&header).map_err(|error| damaged("header", &error))?;
+        let Header { identity, iterations, record } =
+            ron::from_str(text).map_err(|error| damaged("header", &error))?;
+
+        let rect = identity.rect();
+        let inside = |start: u32, size: u32, whole: u32| {
+            size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
+        };
+        if !inside(rect.x, rect.width, identity.film.0) || !inside(rect.y, rect.height, identity.film.1) {
+            return Err(damaged("header", &"the crop is not inside of the film"));
+        }
+        let techniques = identity.census.techniques;
+        let layers = Film::layers_of(techniques).len();
+        let longest = u64::from(rect.width) * ((layers + 1) * MAX_ENCODED) as u64;
+        let (mut sums, mut squares) = (Vec::new(), Vec::new());
+        for row in 0..rect.height {
+            let what = || format!("row {row} of {}", rect.height);
+            let block = read_block(&mut from, &mut checksum, longest, &what())?;
+            let mut bytes = block.as_slice();
+            let width = rect.width as usize;
+            decode(&mut bytes, width * layers, iterations.len(), &mut sums)
+                .ok_or_else(|| damaged(&what(), &"no sums"))?;
+            decode(&mut bytes, width, iterations.len(), &mut squares)
+                .ok_or_else(|| damaged(&what(), &"no sums"))?;
+            if !bytes.is_empty() {
+                return Err(damaged(&what(), &"too long"));
+            }
+        }
+        if fills(&mut from, &mut [0])? {
+            return Err(damaged("end", &"bytes follow"));
+        }
+        let film = Film::from_parts(rect, techniques, iterations, sums, squares);
+        Ok(Self { identity, record, film })
+    }
+}
+
+/// Takes `count` sums of `numbers` numbers from the front of `bytes`. `None` if they are not there.
+fn decode(bytes: &mut &[u8], count: usize, numbers: u64, sums: &mut Vec<Sum3>) -> Option<()> {
+    // An empty sum takes three bytes: no more memory than for what can be there.
+    sums.try_reserve(count.min(bytes.len() / 3)).ok()?;
+    for _ in 0..count {
+        sums.push(Sum3::decode(bytes, numbers)?);
+    }
+    Some(())
+}
+
+fn write_block(to: &mut impl Write, checksum: &mut Checksum, bytes: &[u8]) -> io::Result<()> {
+    let length = u32::try_from(bytes.len()).map_err(io::Error::other)?;
+    checksum.add(bytes);
+    to.write_all(&length.to_le_bytes())?;
+    to.write_all(bytes)?;
+    to.write_all(&checksum.value().to_le_bytes())
+}
+
+fn read_block(
+    from: &mut impl Read,
+    checksum: &mut Checksum,
+    longest: u64,
+    what: &str,
+) -> Result<Vec<u8>, StateError> {
+    let cut = || damaged(what, &"the file ends here");
+    let mut length = [0; 4];
+    if !fills(from, &mut length)? {
+        return Err(cut());
+    }
+    let length = u64::from(u32::from_le_bytes(length));
+    if length > longest {
+        return Err(damaged(what, &"too long"));
+    }
+    // Grows as bytes arrive, whatever the length says.
+    let mut bytes = Vec::new();
+    from.take(length).read_to_end(&mut bytes)?;
+    let mut expected = [0; 8];
+    if bytes.len() as u64 != length || !fills(from, &mut expected)? {
+        return Err(cut());
+    }
+    checksum.add(&bytes);
+    if checksum.value() != u64::from_le_bytes(expected) {
+        return Err(damaged(what, &"its checksum is wrong"));
+    }
+    Ok(bytes)
+}
+
+/// Fills the buffer; `false` if there is not enough.
+fn fills(from: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
+    match from.read_exact(buffer) {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+fn damaged(place: &str, reason: &dyn std::fmt::Display) -> StateError {
+    StateError::Damaged { place: place.to_owned(), reason: reason.to_string() }
+}

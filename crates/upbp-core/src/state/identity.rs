@@ -1,0 +1,95 @@
+//! What a render is: all that its iterations depend on, besides their index.
+
+use serde::{Deserialize, Serialize};
+use upbp_estimators::scene::PixelRect;
+
+use crate::census::Census;
+use crate::error::StateError;
+use crate::radius::RadiusSchedule;
+use crate::settings::Settings;
+
+/// All that the iterations of a render depend on, besides their index.
+///
+/// What the pilot chose is part of it: so slices from machines whose mathematical functions differ in the last bit, and
+/// whose pilots therefore chose otherwise, are refused and not mixed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Version of the renderer.
+    pub version: String,
+    /// Name of the scene, for people: it may differ.
+    pub scene: String,
+    /// Fingerprint of the scene's content; empty if the host gave none.
+    pub fingerprint: String,
+    /// Width and height of the whole film in pixels.
+    pub film: (u32, u32),
+    /// Column, row, width and height of the part that is rendered.
+    pub part: (u32, u32, u32, u32),
+    /// Settings as they were given.
+    pub settings: Settings,
+    /// What the scene can use of them.
+    pub census: Census,
+    /// Light sub-paths per iteration.
+    pub light_paths: u32,
+    /// Of them with photon beams.
+    pub beam_paths: u32,
+    /// Connectible vertices per light sub-path, as the pilot found.
+    pub vertices_per_light_path: f64,
+    /// First radii and how they shrink.
+    pub radii: RadiusSchedule,
+}
+
+impl Identity {
+    /// The part of the film.
+    pub(crate) const fn rect(&self) -> PixelRect {
+        let (x, y, width, height) = self.part;
+        PixelRect { x, y, width, height }
+    }
+
+    /// Compares with another render's. Settings count by what became of them: how much memory is allowed does not matter where
+    /// the number of light sub-paths is the same.
+    ///
+    /// # Errors
+    /// [`StateError::Different`] with the names of what differs and both values.
+    pub fn check_same(&self, other: &Self) -> Result<(), StateError> {
+        let differences: Vec<_> = self
+            .fields()
+            .into_iter()
+            .zip(other.fields())
+            .filter(|(own, other)| own != other)
+            .map(|((name, own), (_, other))| format!("{name} is {own} in one and {other} in the other"))
+            .collect();
+        if differences.is_empty() { Ok(()) } else { Err(StateError::Different { differences }) }
+    }
+
+    /// All that counts, as text: the shortest decimals of two different numbers differ.
+    fn fields(&self) -> [(&'static str, String); 23] {
+        let Self { settings: s, radii: r, .. } = self;
+        let (width, height) = self.film;
+        let (x, y, columns, rows) = self.part;
+        [
+            ("version", self.version.clone()),
+            ("scene", if self.fingerprint.is_empty() { "unnamed".into() } else { self.fingerprint.clone() }),
+            ("film", format!("{width} x {height}")),
+            ("crop", format!("{columns} x {rows} at ({x}, {y})")),
+            ("techniques", self.census.techniques.to_string()),
+            ("seed", s.seed.to_string()),
+            ("connections", s.connections.to_string()),
+            ("min_length", s.min_length.to_string()),
+            ("max_length", s.max_length.to_string()),
+            ("roulette", s.roulette.to_string()),
+            ("heuristic", format!("{:?}", s.heuristic)),
+            ("photon_beams", format!("{:?}", s.photon_beams)),
+            ("query_beams", format!("{:?}", s.query_beams)),
+            ("progressive", r.progressive.to_string()),
+            ("light_paths", self.light_paths.to_string()),
+            ("beams", self.beam_paths.to_string()),
+            ("vertices per light sub-path", self.vertices_per_light_path.to_string()),
+            ("radii.surf", r.surf.to_string()),
+            ("radii.pp3d", r.pp3d.to_string()),
+            ("radii.pb2d", r.pb2d.to_string()),
+            ("radii.bp2d", r.bp2d.to_string()),
+            ("radii.bb1d", r.bb1d.to_string()),
+            ("least radius", r.floor.to_string()),
+        ]
+    }
+}

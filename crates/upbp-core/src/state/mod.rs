@@ -1,0 +1,115 @@
+//! The state of a render: enough to go on, and to put the work of several runs together.
+//!
+//! Iterations are independent given their index, and the sums of a film do not depend on the order of additions. So there is one
+//! operation, [`State::merge`]: resuming is merging into a fresh render.
+
+mod checksum;
+mod format;
+mod identity;
+
+use std::fs::File;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use upbp_estimators::Counters;
+
+pub use identity::Identity;
+
+use crate::error::{OutputError, StateError};
+use crate::film::Film;
+use crate::iterations::{IterationSet, MAX_ITERATIONS};
+use crate::output::write_whole;
+use crate::report::{ErrorSeries, PassTimes, Report};
+
+pub(crate) use format::fingerprint;
+
+/// A render at some moment: what it is, what it has done, its film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    pub(crate) identity: Identity,
+    pub(crate) record: Record,
+    pub(crate) film: Film,
+}
+
+/// What was done, besides the film. All of it adds up.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Record {
+    pub(crate) times: PassTimes,
+    pub(crate) counters: Counters,
+    /// Largest number of bytes that light vertices, beams and look-up structures took.
+    pub(crate) map_bytes: u64,
+    /// Bytes that an iteration is expected to need.
+    pub(crate) expected_bytes: u64,
+    pub(crate) series: ErrorSeries,
+}
+
+impl State {
+    /// What the render is.
+    #[must_use]
+    pub const fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// The film.
+    #[must_use]
+    pub const fn film(&self) -> &Film {
+        &self.film
+    }
+
+    /// What was done so far.
+    #[must_use]
+    pub fn report(&self) -> Report {
+        Report::new(self)
+    }
+
+    /// Adds what another run of the same render has done. The result has the same bits in whatever order states are merged. A
+    /// series of errors belongs to one run: it is lost unless one of the two has no iterations.
+    ///
+    /// # Errors
+    /// If the other state is of another render, or has iterations that this one has too. Then nothing has changed.
+    pub fn merge(&mut self, other: Self) -> Result<(), StateError> {
+        self.identity.check_same(&other.identity)?;
+        let (own, others) = (self.film.iteration_set(), other.film.iteration_set());
+        if let Some(common) = own.overlap(others) {
+            return Err(StateError::Overlap { start: common.start, end: common.end });
+        }
+        let (none, others_none) = (own.is_empty(), others.is_empty());
+        // What may differ is that of the state with the first iteration, so that the order does not matter.
+        let first = |set: &IterationSet| set.ranges().first().map_or(MAX_ITERATIONS, |range| range.start);
+        if first(others) < first(own) {
+            self.identity = other.identity;
+        }
+        let record = &mut self.record;
+        record.times.add(&other.record.times);
+        record.counters.add(&other.record.counters);
+        record.map_bytes = record.map_bytes.max(other.record.map_bytes);
+        record.expected_bytes = record.expected_bytes.max(other.record.expected_bytes);
+        if none {
+            record.series = other.record.series;
+            self.film = other.film;
+        } else if !others_none {
+            record.series = ErrorSeries::default();
+            self.film.merge(&other.film);
+        }
+        Ok(())
+    }
+
+    /// Writes a file as a whole or not at all: a crash at any moment leaves the file that was there or the new one.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn save(&self, path: &Path) -> Result<(), OutputError> {
+        write_whole(path, |writer| {
+            self.write(writer).map_err(|source| OutputError::Write { path: path.to_owned(), source })
+        })
+    }
+
+    /// Reads a file that [`save`](Self::save) wrote.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), with the file's name.
+    pub fn load(path: &Path) -> Result<Self, OutputError> {
+        let read = || Self::read(File::open(path)?);
+        read().map_err(|source| OutputError::State { path: path.to_owned(), source })
+    }
+}
