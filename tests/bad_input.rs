@@ -1,37 +1,16 @@
 //! Bad input to the program: a clear error that names the place, exit code 2, and no output file.
 
+#[path = "support/program.rs"]
+mod program;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use std::sync::OnceLock;
+use std::process::Output;
 
-/// The example program. A run of this test alone does not build it; if it is up to date this takes a moment.
-fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let built = Command::new(env!("CARGO"))
-            .args(["build", "--quiet", "--example", "cornell_media"])
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .status()
-            .expect("cargo runs");
-        assert!(built.success());
-        let mut path = std::env::current_exe().expect("the path of this test");
-        path.pop();
-        path.pop();
-        path.join("examples").join(format!("cornell_media{}", std::env::consts::EXE_SUFFIX))
-    })
-}
-
-/// A folder of its own for each test.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a writable target folder");
-    folder
-}
+use program::{SMALL, folder};
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(program()).args(arguments).current_dir(folder).output().expect("the program runs")
+    program::command("cornell_media", folder, arguments).output().expect("the program runs")
 }
 
 /// Runs, and checks that it was refused with all of `words` and left nothing behind.
@@ -53,19 +32,6 @@ fn list(folder: &Path) -> Vec<PathBuf> {
     files.sort();
     files
 }
-
-const SMALL: &str = r#"(
-  version: 1,
-  camera: Perspective(origin: (0, 1, 3), target: (0, 1, 0), fov_degrees: 40),
-  film: (width: 8, height: 8),
-  media: { "m": Homogeneous(sigma_a: 0.1, sigma_s: 0.5) },
-  materials: { "white": Lambert(0.7), "null": Null },
-  shapes: [
-    (name: "floor", material: "white", geometry: Quad(origin: (-2, 0, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0))),
-    (name: "ball", material: "null", interior: "m", geometry: Sphere(centre: (0, 1, 0), radius: 0.5)),
-  ],
-  lights: [ Point(position: (0, 3, 0), intensity: (5, 5, 5)) ],
-)"#;
 
 #[test]
 fn a_good_scene_renders_and_writes_its_files() {
@@ -173,6 +139,12 @@ fn settings_and_options_that_make_no_sense_are_refused() {
         (&["--time=-1"], &["--time"]),
         (&["--time", "NaN"], &["--time"]),
         (&["--iterations", "0"], &["--iterations"]),
+        (&["--iterations", "5..5"], &["--iterations"]),
+        (&["--iterations", "0..300000000"], &["--iterations", "268435456"]),
+        (&["--save-every", "5"], &["--state"]),
+        (&["--state", "image.exr"], &["image.exr", "not a state"]),
+        (&["--state", "no/such/folder/a.state"], &["no/such/folder/a.state"]),
+        (&["--size", "4000x4000", "--memory", "100"], &["4000 x 4000", "100 MiB"]),
         (&["--target-error", "0"], &["--target-error"]),
         (&["--threads", "0"], &["--threads"]),
         (&["--reference", "image.exr"], &["image.exr"]),

@@ -1,6 +1,11 @@
-//! The same scene, settings and seed give the same bits, whatever the number of threads.
+//! The same scene, settings and seed give the same bits, whatever the number of threads, and however the iterations are shared
+//! out among runs.
 
-use upbp_core::{LightPaths, Renderer, Settings};
+#[path = "../examples/host_renderer/scene.rs"]
+mod host;
+
+use proptest::prelude::*;
+use upbp_core::{LightPaths, Renderer, Settings, State, StateError};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
 
@@ -77,4 +82,114 @@ fn a_crop_shows_the_same_camera_samples_as_the_whole() {
         let (x, y) = (8 + i % 16, 4 + i / 16);
         assert_eq!(*pixel, whole.pixels[y * 32 + x]);
     }
+}
+
+/// A render of a small room with everything, by one run or a part of one.
+fn room_renderer(room: &host::Room) -> Renderer<'_, host::Room> {
+    let settings = Settings {
+        techniques: "all".parse().expect("technique names"),
+        light_paths: LightPaths::Count(200),
+        beams: Some(20),
+        ..Settings::default()
+    };
+    let mut renderer = Renderer::new(room, settings.validate().expect("valid settings")).expect("a renderer");
+    renderer.identify_scene("room", b"room");
+    renderer
+}
+
+/// Iterations of the shared render.
+const SHARED: u64 = 8;
+
+/// By way of the bytes of a file, as between machines.
+fn through_a_file(state: &State) -> State {
+    let mut bytes = Vec::new();
+    state.write(&mut bytes).expect("a vector takes all");
+    let read = State::read(bytes.as_slice()).expect("what was written");
+    assert_eq!(&read, state);
+    read
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// Every iteration goes to one of four runs; the runs' states are merged in some order; the last run goes on from what the
+    /// others have done.
+    #[test]
+    fn any_split_over_runs_gives_the_bits_of_one_run(
+        run_of in proptest::collection::vec(0..4_usize, SHARED as usize),
+        order in Just(vec![0, 1, 2]).prop_shuffle(),
+        threads in 1..4_usize,
+    ) {
+        let room = host::Room::new(6).expect("valid coefficients");
+        let mut whole = room_renderer(&room);
+        whole.set_range(0..SHARED);
+        while whole.iterate() {}
+
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
+        let last = pool.install(|| {
+            let mut states = Vec::new();
+            for run in 0..3 {
+                let mut renderer = room_renderer(&room);
+                for index in (0..SHARED).filter(|index| run_of[*index as usize] == run) {
+                    renderer.set_range(index..index + 1);
+                    assert!(renderer.iterate());
+                }
+                states.push(through_a_file(renderer.state()));
+            }
+            let mut merged = room_renderer(&room).state().clone();
+            for run in order {
+                merged.merge(states[run].clone()).expect("disjoint slices");
+            }
+            let mut last = room_renderer(&room);
+            last.resume(merged).expect("the same render");
+            last.set_range(0..SHARED);
+            while last.iterate() {}
+            last.state().clone()
+        });
+        prop_assert!(last.film() == whole.film());
+        prop_assert_eq!(last.film().fingerprint(), whole.film().fingerprint());
+        prop_assert_eq!(last.report().counters, whole.report().counters);
+        prop_assert_eq!(last.film().iterations(), SHARED);
+    }
+}
+
+#[test]
+fn what_does_not_belong_together_is_refused_by_name() {
+    let room = host::Room::new(6).expect("valid coefficients");
+    let render = |change: fn(&mut Settings), scene: &[u8], first: u64| {
+        let mut settings = Settings { light_paths: LightPaths::Count(100), ..Settings::default() };
+        change(&mut settings);
+        let mut renderer =
+            Renderer::new(&room, settings.validate().expect("valid settings")).expect("a renderer");
+        renderer.identify_scene("room", scene);
+        renderer.set_range(first..first + 2);
+        while renderer.iterate() {}
+        renderer.state().clone()
+    };
+    let base = render(|_| (), b"room", 0);
+    for (change, scene, word) in [
+        ((|_| ()) as fn(&mut Settings), &b"hall"[..], "scene is"),
+        (|s| s.seed = 1, b"room", "seed is 0 in one and 1 in the other"),
+        (|s| s.techniques = "bpt".parse().expect("a technique"), b"room", "techniques is"),
+        (
+            |s| s.light_paths = LightPaths::Count(101),
+            b"room",
+            "light_paths is 100 in one and 101 in the other",
+        ),
+        (|s| s.max_length = 9, b"room", "max_length is 1000 in one and 9 in the other"),
+        (|s| s.progressive = false, b"room", "progressive is true"),
+        (|s| s.radii.surf = upbp_core::Radius::Absolute(0.5), b"room", "radii.surf is"),
+    ] {
+        let mut merged = base.clone();
+        let error = merged.merge(render(change, scene, 2)).expect_err(word);
+        assert!(matches!(error, StateError::Different { .. }) && error.to_string().contains(word), "{error}");
+        assert_eq!(merged, base, "nothing has changed");
+    }
+    // What has no influence may differ.
+    let mut merged = base.clone();
+    merged.merge(render(|s| s.memory = 3000, b"room", 2)).expect("the same render");
+    assert_eq!(merged.film().iteration_set().to_string(), "0..4");
+
+    let error = merged.merge(render(|_| (), b"room", 3)).expect_err("an overlap");
+    assert_eq!(error.to_string(), "iterations 3..4 are in both");
 }

@@ -2,148 +2,158 @@
 //!
 //! `cargo run --release --example cornell_media` renders the shipped scene; `-- --help` lists the options.
 
+#[path = "../support/exit.rs"]
+mod exit;
+#[path = "../support/files.rs"]
+mod files;
+mod interrupt;
 mod options;
+mod render;
 
 use std::error::Error;
-use std::io::IsTerminal;
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
 use upbp_core::{
-    ErrorPoint, Image, Metadata, Progress, Renderer, Settings, Stop, check_writable, read_exr, write_exr,
-    write_png,
+    OutputError, Renderer, Settings, State, StateError, StopReason, check_writable, read_exr,
+    remove_leftovers,
 };
 use upbp_scene::ReadyScene;
 
+use exit::{Failure, finish, say};
+use interrupt::Interrupt;
 use options::Options;
-
-/// Exit code for input that cannot be rendered and output that cannot be written.
-const BAD_INPUT: u8 = 2;
+use render::{Beside, render};
 
 fn main() -> ExitCode {
     let options = Options::parse();
     // A pool of its own: reading the scene works in parallel too.
     let threads = options.threads.map_or(0, NonZeroUsize::get);
-    let result = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| run(&options).map_err(|error| describe(&*error))),
-        Err(error) => Err(error.to_string()),
+    finish(match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(|| run(&options)),
+        Err(error) => Err(Failure::input(error)),
+    })
+}
+
+fn run(options: &Options) -> Result<(), Failure> {
+    let interrupt = Interrupt::install().map_err(Failure::input)?;
+    let path = options.scene.clone().unwrap_or_else(shipped_scene);
+    let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
+    let scene = load(&path, options).map_err(Failure::input)?;
+    let reference = options.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
+    let mut renderer = Renderer::new(&scene, settings).map_err(Failure::input)?;
+    renderer
+        .identify_scene(&format!("{} ({:016x})", path.display(), scene.hash()), &scene.hash().to_le_bytes());
+    let rect = renderer.film().rect();
+    if let (Some(reference), Some(name)) = (&reference, &options.reference)
+        && (reference.width, reference.height) != (rect.width, rect.height)
+    {
+        return Err(Failure::Input(format!(
+            "{}: expected a reference of {} x {} pixels, found {} x {}",
+            name.display(),
+            rect.width,
+            rect.height,
+            reference.width,
+            reference.height
+        )));
+    }
+    if let Some(state) = &options.state {
+        resume(&mut renderer, state).map_err(Failure::input)?;
+    }
+    if let Some(range) = options.range() {
+        renderer.set_range(range);
+    }
+    if options.check {
+        return say(&format!("{}: no problems; {}", path.display(), renderer.census()));
+    }
+    // Before the work, not after it.
+    let picture = files::picture(&options.output);
+    let outputs = [
+        Some(options.output.as_path()),
+        Some(picture.as_path()),
+        options.report.as_deref(),
+        options.state.as_deref(),
+    ];
+    for output in outputs.into_iter().flatten() {
+        check_writable(output).map_err(Failure::input)?;
+        remove_leftovers(output);
+    }
+
+    interrupt.stops(renderer.canceller());
+    let beside = Beside {
+        reference: reference.as_ref(),
+        state: options.state.as_deref().map(|path| (path, Duration::from_secs_f64(options.save_every))),
+        quiet: options.quiet,
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(message) => {
-            eprintln!("error: {message}");
-            ExitCode::from(BAD_INPUT)
+    let reason = render(&mut renderer, &options.stop(), &beside);
+    write(renderer.state(), reason, options)
+}
+
+/// Goes on from a state file, if there is one.
+fn resume(renderer: &mut Renderer<'_, ReadyScene>, path: &Path) -> Result<(), OutputError> {
+    match State::load(path) {
+        Err(OutputError::State { source: StateError::Io(error), .. })
+            if error.kind() == std::io::ErrorKind::NotFound =>
+        {
+            Ok(())
+        }
+        Err(error) => Err(error),
+        Ok(state) => {
+            renderer.resume(state).map_err(|source| OutputError::State { path: path.to_owned(), source })
         }
     }
 }
 
-/// An error with all its causes.
-fn describe(error: &dyn Error) -> String {
-    match error.source() {
-        Some(cause) => format!("{error}\n  because: {}", describe(cause)),
-        None => error.to_string(),
+/// Writes everything that was asked for, the state first. What fails does not keep the rest from being written.
+fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Failure> {
+    let mut failures = Vec::new();
+    let mut attempt = |written: Result<(), OutputError>| failures.extend(written.err());
+    if let Some(path) = &options.state {
+        attempt(state.save(path));
     }
+    let report = state.report();
+    // Before the first iteration there is no picture.
+    let rendered = report.iterations > 0;
+    if rendered {
+        attempt(files::write_images(state, &report, &options.output));
+    }
+    if let Some(path) = &options.report {
+        attempt(files::write_report(&report, path));
+    }
+    Failure::all(&failures)?;
+    if !options.quiet {
+        let picture = files::picture(&options.output);
+        let wrote = if rendered {
+            format!("wrote {} and {}", options.output.display(), picture.display())
+        } else {
+            "nothing was rendered".to_owned()
+        };
+        say(&format!("{report}{wrote}"))?;
+    }
+    if reason == StopReason::Cancelled {
+        let kept = match &options.state {
+            Some(path) => format!("the state is in {}", path.display()),
+            None => "without --state there is nothing to go on from".to_owned(),
+        };
+        return Err(Failure::Interrupted(format!(
+            "interrupted after {} iterations; {kept}",
+            report.iterations
+        )));
+    }
+    Ok(())
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    let path = options.scene.clone().unwrap_or_else(shipped_scene);
-    let settings = options.settings()?;
-    let scene = ReadyScene::load_with(&path, |description| {
+fn load(path: &Path, options: &Options) -> Result<ReadyScene, upbp_scene::SceneError> {
+    ReadyScene::load_with(path, |description| {
         if let Some([width, height]) = options.size {
             description.film.width = width;
             description.film.height = height;
             description.film.crop = None;
         }
-    })?;
-    let reference = options.reference.as_deref().map(read_exr).transpose()?;
-    let mut renderer = Renderer::new(&scene, settings.clone().validate()?)?;
-    if let Some(reference) = &reference {
-        let rect = renderer.film().rect();
-        if (reference.width, reference.height) != (rect.width, rect.height) {
-            return Err(format!(
-                "{}: expected a reference of {} x {} pixels, found {} x {}",
-                options.reference.as_deref().unwrap_or(Path::new("")).display(),
-                rect.width,
-                rect.height,
-                reference.width,
-                reference.height
-            )
-            .into());
-        }
-    }
-    if options.check {
-        println!("{}: no problems; {}", path.display(), renderer.census());
-        return Ok(());
-    }
-    // Before the work, not after it.
-    let picture = options.output.with_extension("png");
-    let outputs = [Some(options.output.as_path()), Some(picture.as_path()), options.report.as_deref()];
-    outputs.into_iter().flatten().try_for_each(check_writable)?;
-
-    render(&mut renderer, &options.stop(), reference.as_ref(), options.quiet);
-
-    let report = renderer.report();
-    let name = format!("{} ({:016x})", path.display(), scene.hash());
-    let metadata = Metadata { scene: &name, settings: &settings, report: &report };
-    write_exr(&options.output, renderer.film(), &metadata)?;
-    write_png(&picture, &renderer.film().image(), 1.0)?;
-    if let Some(path) = &options.report {
-        let text = serde_json::to_string_pretty(&report)? + "\n";
-        std::fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-    }
-    if !options.quiet {
-        println!("{report}wrote {} and {}", options.output.display(), picture.display());
-    }
-    Ok(())
-}
-
-fn render(renderer: &mut Renderer<'_, ReadyScene>, stop: &Stop, reference: Option<&Image>, quiet: bool) {
-    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(1000) };
-    if let Ok(style) = ProgressStyle::with_template("[{elapsed_precise}] {bar:40} {percent:>3} %  {msg}") {
-        bar.set_style(style);
-    }
-    // Iterations take seconds: the clock moves meanwhile.
-    bar.enable_steady_tick(std::time::Duration::from_millis(200));
-    let terminal = std::io::stderr().is_terminal();
-    let mut points = Vec::new();
-    renderer.render(stop, |now: &Progress<'_>| {
-        if let Some(reference) = reference {
-            let image = now.film.image();
-            points.push(ErrorPoint {
-                seconds: now.seconds,
-                iterations: now.iterations,
-                relative_mse: image.relative_mse(reference),
-                rmse: image.rmse(reference),
-            });
-        }
-        let message = status(now);
-        bar.set_position((1000.0 * now.fraction) as u64);
-        bar.set_message(message.clone());
-        // Without a terminal a bar is invisible: a line now and then instead.
-        if !terminal && !quiet && now.iterations.is_power_of_two() {
-            eprintln!("{:3.0} %  {message}", 100.0 * now.fraction);
-        }
-        ControlFlow::Continue(())
-    });
-    bar.finish();
-    for point in points {
-        renderer.record_error(point);
-    }
-}
-
-/// Iterations, time left, and the error so far.
-fn status(now: &Progress<'_>) -> String {
-    let left = if now.fraction > 0.0 { now.seconds * (1.0 / now.fraction - 1.0) } else { f64::INFINITY };
-    let error = if now.estimated_error.is_finite() {
-        format!("estimated relMSE {:.2e}", now.estimated_error)
-    } else {
-        "error not known yet".to_owned()
-    };
-    format!("iteration {}, {left:.0} s left, {error}", now.iterations)
+    })
 }
 
 /// The scene that comes with the project, from wherever the program is started.

@@ -1,10 +1,11 @@
 //! The command line.
 
 use std::num::NonZeroUsize;
+use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Parser;
-use upbp_core::{LightPaths, Settings, Stop, TechniqueSet};
+use upbp_core::{LightPaths, MAX_ITERATIONS, Settings, Stop, TechniqueSet};
 use upbp_scene::description::Count;
 
 /// Seconds of rendering if nothing else says when to stop.
@@ -22,10 +23,10 @@ pub(crate) struct Options {
     /// Size of the film in pixels instead of the scene's, such as 640x360
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<[Count; 2]>,
-    /// Stop after this many iterations
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    iterations: Option<u64>,
-    /// Stop after this many seconds of rendering [default: 60 if no other limit is given]
+    /// Render iterations 0..N, or A..B as a share of a render that others work on too
+    #[arg(long, value_name = "N|A..B", value_parser = iterations)]
+    iterations: Option<Range<u64>>,
+    /// Stop after this many seconds of rendering, resumed ones included [default: 60 if no other limit is given]
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     time: Option<f64>,
     /// Stop when the estimated relMSE is below this
@@ -61,6 +62,15 @@ pub(crate) struct Options {
     /// Write the report as JSON
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
+    /// File to go on from if it is there, and to save to: now and then, at the end, and when interrupted
+    #[arg(long, value_name = "FILE")]
+    pub(crate) state: Option<PathBuf>,
+    /// Time between two savings of the state; what is lost in a crash is no more than this and an iteration
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, requires = "state")]
+    pub(crate) save_every: f64,
+    /// Memory for film, light vertices, photon beams and their look-ups, MiB [default: 2048]
+    #[arg(long, value_name = "MIB")]
+    memory: Option<u32>,
     /// Check scene and settings, render nothing
     #[arg(long)]
     pub(crate) check: bool,
@@ -74,10 +84,15 @@ impl Options {
     pub(crate) fn stop(&self) -> Stop {
         let unlimited = self.iterations.is_none() && self.target_error.is_none();
         Stop {
-            iterations: self.iterations,
+            iterations: None,
             seconds: self.time.or(unlimited.then_some(DEFAULT_SECONDS)),
             error: self.target_error,
         }
+    }
+
+    /// The iterations to render, if not all.
+    pub(crate) fn range(&self) -> Option<Range<u64>> {
+        self.iterations.clone()
     }
 
     /// Overrides settings by what was given on the command line.
@@ -97,6 +112,9 @@ impl Options {
         if self.beams.is_some() {
             settings.beams = self.beams;
         }
+        if let Some(memory) = self.memory {
+            settings.memory = memory;
+        }
         if self.fixed_radius {
             settings.progressive = false;
         }
@@ -108,6 +126,16 @@ fn size(text: &str) -> Result<[Count; 2], String> {
     match sides.as_deref() {
         Some(&[width, height]) => Ok([width, height]),
         _ => Err("expected width x height in pixels, such as 640x360".to_owned()),
+    }
+}
+
+fn iterations(text: &str) -> Result<Range<u64>, String> {
+    let (start, end) = text.split_once("..").unwrap_or(("0", text));
+    match (start.parse::<u64>(), end.parse::<u64>()) {
+        (Ok(start), Ok(end)) if start < end && end <= MAX_ITERATIONS => Ok(start..end),
+        _ => Err(format!(
+            "expected a number of iterations such as 100, or a range such as 100..200 without its end, up to {MAX_ITERATIONS}"
+        )),
     }
 }
 

@@ -1,0 +1,280 @@
+//! Renders as processes that are killed, interrupted, out of disk or without a reader: what was saved stays good, and the end
+//! result is the same to the bit.
+//!
+//! `UPBP_KILLS=200` sets how often a render is killed; a few times by default.
+#![cfg(unix)]
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant, SystemTime};
+
+use program::{SMALL, command, folder};
+use upbp_core::State;
+
+/// As [`program::command`], silent, one thread.
+fn render(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = command("cornell_media", folder, &["scene.ron", "--quiet", "--threads", "1"]);
+    command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn prepared(name: &str) -> std::path::PathBuf {
+    let folder = folder(name);
+    fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
+    folder
+}
+
+/// The exit code and what was said.
+fn end(output: &Output) -> (Option<i32>, String) {
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+fn succeeds(mut command: impl std::borrow::BorrowMut<Command>) {
+    let (code, text) = end(&command.borrow_mut().output().expect("the program runs"));
+    assert_eq!(code, Some(0), "{text}");
+}
+
+/// Sends a signal by name.
+fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status();
+    assert!(status.expect("kill runs").success());
+}
+
+fn wait_for(path: &Path) {
+    let start = Instant::now();
+    while !path.exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{} does not appear", path.display());
+        sleep(Duration::from_millis(5));
+    }
+}
+
+/// The film of a state file: its iterations and its fingerprint.
+fn film(path: &Path) -> (u64, String) {
+    let state = State::load(path).expect("a good state");
+    (state.film().iterations(), state.film().fingerprint())
+}
+
+/// The names of the files in a folder.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("the folder");
+    let mut names: Vec<_> =
+        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn killed_at_random_moments_it_loses_no_more_than_since_the_last_saving() {
+    /// Seconds between savings, and what an iteration and a saving may take on a busy machine.
+    const EVERY: f64 = 0.02;
+    const SLACK: f64 = 1.0;
+    /// Enough that no run ends by itself.
+    const MANY: &str = "200000000";
+    let kills: u32 = std::env::var("UPBP_KILLS").map_or(10, |text| text.parse().expect("a number"));
+    let folder = prepared("kills");
+    let state = folder.join("a.state");
+    let arguments = |state| ["--state", state, "--save-every", "0.02", "--light-paths", "64"];
+    let (mut before, mut oldest, mut unsaved) = (0, 0.0_f64, 0);
+    for kill in 0..kills {
+        let mut child = render(&folder, &arguments("a.state"))
+            .args(["--iterations", MANY])
+            .spawn()
+            .expect("the program runs");
+        // A low-discrepancy sequence: moments from the start of the process to some savings later.
+        let wait = 0.5 * (f64::from(kill) * 0.618_034).fract();
+        let started = SystemTime::now();
+        sleep(Duration::from_secs_f64(wait));
+        child.kill().expect("it runs still");
+        let killed = SystemTime::now();
+        child.wait().expect("it has ended");
+        if !state.exists() {
+            unsaved += 1;
+            continue;
+        }
+        let (iterations, _) = film(&state);
+        assert!(iterations >= before, "kill {kill}: {iterations} iterations after {before}");
+        before = iterations;
+        let saved = fs::metadata(&state).and_then(|m| m.modified()).expect("a time");
+        if saved > started {
+            let age = killed.duration_since(saved).map_or(0.0, |age| age.as_secs_f64());
+            assert!(age < EVERY + SLACK, "kill {kill}: the last saving was {age} s ago");
+            oldest = oldest.max(age);
+        }
+    }
+    // To the end of what is there and a little more, in one go and by what survived.
+    let target = (before + 5).to_string();
+    succeeds(render(&folder, &arguments("a.state")).args(["--iterations", &target, "-o", "a.exr"]));
+    succeeds(render(&folder, &arguments("b.state")).args(["--iterations", &target, "-o", "b.exr"]));
+    assert_eq!(film(&state), film(&folder.join("b.state")));
+    let leftovers = names(&folder).iter().filter(|name| name.ends_with(".part")).count();
+    println!(
+        "{kills} kills, {unsaved} of them before the first saving, {before} iterations survived; \
+         oldest saving at a kill {oldest:.3} s; {leftovers} unfinished files"
+    );
+}
+
+#[test]
+fn a_signal_saves_and_says_try_again() {
+    let folder = prepared("signals");
+    let arguments =
+        ["--state", "a.state", "--save-every", "0.01", "--light-paths", "64", "--report", "a.json"];
+    for name in ["TERM", "INT", "HUP"] {
+        let child = render(&folder, &arguments).args(["-o", "a.exr", "--iterations", "200000000"]).spawn();
+        let child = child.expect("the program runs");
+        let _ = fs::remove_file(folder.join("a.exr"));
+        wait_for(&folder.join("a.state"));
+        sleep(Duration::from_millis(300));
+        signal(&child, name);
+        let (code, text) = end(&child.wait_with_output().expect("it ends"));
+        assert_eq!(code, Some(75), "{name}: {text}");
+        assert!(text.contains("interrupted") && text.contains("a.state"), "{text}");
+        assert!(folder.join("a.exr").exists() && folder.join("a.png").exists(), "{name}: there is a picture");
+    }
+    let (done, _) = film(&folder.join("a.state"));
+    let target = (done + 3).to_string();
+    succeeds(render(&folder, &arguments).args(["-o", "a.exr", "--iterations", &target]));
+    succeeds(render(
+        &folder,
+        &["--light-paths", "64", "--state", "b.state", "-o", "b.exr", "--iterations", &target],
+    ));
+    assert_eq!(film(&folder.join("a.state")), film(&folder.join("b.state")));
+    assert!(names(&folder).iter().all(|name| !name.ends_with(".part")), "{:?}", names(&folder));
+}
+
+#[test]
+fn a_second_signal_ends_at_once() {
+    let folder = prepared("second");
+    // Iterations that take long, and a cancellation that has to wait for a row of pixels.
+    let scene = SMALL.replace("width: 8", "width: 4000").replace("sigma_s: 0.5", "sigma_s: (500, 500, 500)");
+    fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
+    let child = render(&folder, &["--techniques", "pt", "-o", "a.exr"]).spawn().expect("the program runs");
+    sleep(Duration::from_millis(700));
+    signal(&child, "TERM");
+    signal(&child, "INT");
+    let start = Instant::now();
+    let (code, text) = end(&child.wait_with_output().expect("it ends"));
+    // Both may arrive as one, or the first may have been enough.
+    assert!(matches!(code, Some(130 | 75)), "{code:?}: {text}");
+    assert!(start.elapsed() < Duration::from_secs(20));
+    assert!(names(&folder).iter().all(|name| !name.ends_with(".part")), "{:?}", names(&folder));
+}
+
+#[test]
+fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
+    let folder = prepared("disk");
+    let arguments = ["--iterations", "2", "--light-paths", "64"];
+    succeeds(render(&folder, &arguments).args(["--state", "a.state", "-o", "a.exr"]));
+    let kept = film(&folder.join("a.state"));
+    let failing = |extra: &[&str], word: &str| {
+        let output = render(&folder, &arguments).args(extra).output().expect("the program runs");
+        let (code, text) = end(&output);
+        assert_eq!(code, Some(74), "{extra:?}: {text}");
+        assert!(text.contains(word) && !text.contains("panicked"), "{extra:?}: {text}");
+        assert_eq!(film(&folder.join("a.state")), kept);
+    };
+    if Path::new("/dev/full").exists() {
+        // All that could not be written is named; what could be is there.
+        failing(&["--state", "a.state", "-o", "b.exr", "--report", "/dev/full"], "/dev/full");
+        assert!(folder.join("b.exr").exists());
+        std::os::unix::fs::symlink("/dev/full", folder.join("full.exr")).expect("a link");
+        failing(&["--state", "a.state", "-o", "full.exr"], "full.exr");
+    }
+    // A folder that vanishes while it renders.
+    let gone = folder.join("gone");
+    fs::create_dir(&gone).expect("a folder");
+    let child = render(&folder, &["--state", "gone/a.state", "--save-every", "0.01", "-o", "d.exr"])
+        .args(["--iterations", "200000000", "--light-paths", "64"])
+        .spawn()
+        .expect("the program runs");
+    wait_for(&gone.join("a.state"));
+    while fs::remove_dir_all(&gone).is_err() {}
+    sleep(Duration::from_millis(200));
+    signal(&child, "TERM");
+    let (code, text) = end(&child.wait_with_output().expect("it ends"));
+    assert_eq!(code, Some(74), "{text}");
+    assert!(text.contains("warning") && text.contains("gone/a.state"), "{text}");
+
+    // Nobody reads what it says: the files are there all the same.
+    let mut child = command("cornell_media", &folder, &["scene.ron", "--iterations", "2", "-o", "e.exr"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    drop(child.stdout.take());
+    let (code, text) = end(&child.wait_with_output().expect("it ends"));
+    assert_eq!(code, Some(74), "{text}");
+    assert!(text.contains("standard output") && !text.contains("panicked"), "{text}");
+    assert!(folder.join("e.exr").exists());
+    let mut child = command("cornell_media", &folder, &["scene.ron", "--iterations", "2", "-o", "f.exr"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    drop(child.stderr.take());
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+}
+
+#[test]
+fn slices_by_processes_merge_to_one_run() {
+    let folder = prepared("slices");
+    let paths = ["--light-paths", "64"];
+    succeeds(render(&folder, &paths).args([
+        "--iterations",
+        "9",
+        "--state",
+        "whole.state",
+        "-o",
+        "whole.exr",
+    ]));
+    for (name, range) in [("a", "0..4"), ("b", "4..7"), ("c", "7..9")] {
+        let (state, image) = (format!("{name}.state"), format!("{name}.exr"));
+        succeeds(render(&folder, &paths).args(["--iterations", range, "--state", &state, "-o", &image]));
+    }
+    let merge = |arguments: &[&str]| {
+        let output = command("merge", &folder, arguments).output().expect("the program runs");
+        (end(&output), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let order = ["c.state", "a.state", "b.state", "--state", "m.state", "-o", "m.exr", "--report", "m.json"];
+    let ((code, text), said) = merge(&order);
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(film(&folder.join("m.state")), film(&folder.join("whole.state")));
+    assert!(
+        said.contains("c.state") && said.contains("iterations 7..9") && said.contains("9 iterations"),
+        "{said}"
+    );
+    let pixels = |name: &str| upbp_core::read_exr(&folder.join(name)).expect("an image");
+    assert_eq!(pixels("m.exr"), pixels("whole.exr"));
+    assert!(folder.join("m.png").exists());
+    let first = fs::read(folder.join("m.state")).expect("the state");
+    assert_eq!(merge(&["a.state", "b.state", "c.state", "--state", "m.state", "--quiet"]).0.0, Some(0));
+    assert!(first == fs::read(folder.join("m.state")).expect("the state"), "the same file in any order");
+
+    // What was merged can be resumed.
+    succeeds(render(&folder, &paths).args(["--iterations", "11", "--state", "m.state", "-o", "m.exr"]));
+    succeeds(render(&folder, &paths).args([
+        "--iterations",
+        "11",
+        "--state",
+        "whole.state",
+        "-o",
+        "whole.exr",
+    ]));
+    assert_eq!(film(&folder.join("m.state")), film(&folder.join("whole.state")));
+
+    let ((code, text), _) = merge(&["a.state", "a.state", "--state", "n.state"]);
+    assert!(code == Some(2) && text.contains("iterations 0..4 are in both"), "{text}");
+    succeeds(render(
+        &folder,
+        &["--iterations", "20..21", "--seed", "5", "--state", "d.state", "-o", "d.exr"],
+    ));
+    let ((code, text), _) = merge(&["a.state", "d.state", "--state", "n.state"]);
+    assert!(code == Some(2) && text.contains("seed is 0 in one and 5 in the other"), "{text}");
+    assert!(text.contains("d.state") && !folder.join("n.state").exists());
+    let (code, text) = end(&render(&folder, &["--state", "d.state"]).output().expect("the program runs"));
+    assert!(code == Some(2) && text.contains("seed is"), "{text}");
+}

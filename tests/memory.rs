@@ -1,0 +1,113 @@
+//! The memory of a render is what was expected, and what was allowed, within a tenth.
+//!
+//! Each case is a process of its own, so that nothing of another is counted: this test runs itself. `UPBP_VERTICES=1e7`
+//! measures another number of light vertices than the usual ones, and only that.
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use upbp_core::{LightPaths, Renderer, Settings};
+use upbp_scene::ReadyScene;
+use upbp_scene::description::Count;
+
+const MIB: f64 = 1_048_576.0;
+
+/// A case: what is allowed in MiB, and how many light vertices are wanted.
+const CASE: &str = "UPBP_MEMORY_CASE";
+
+/// A number of bytes out of `/proc/self/status`.
+fn status(name: &str) -> f64 {
+    let text = fs::read_to_string("/proc/self/status").expect("Linux");
+    let line = text.lines().find_map(|line| line.strip_prefix(name)).expect("a known name");
+    let kib: f64 = line.trim_start_matches(':').trim().trim_end_matches(" kB").parse().expect("a number");
+    kib * 1024.0
+}
+
+fn settings(light_paths: u32, memory: u32) -> Settings {
+    Settings {
+        techniques: "all".parse().expect("technique names"),
+        light_paths: LightPaths::Count(light_paths),
+        memory,
+        ..Settings::default()
+    }
+}
+
+/// Renders an iteration; prints what was expected and what it took, bytes, and the number of light vertices.
+fn measure(memory: u32, vertices: f64) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cornell_media.ron");
+    let side = Count::new(64).expect("a positive count");
+    let scene = ReadyScene::load_with(path, |description| {
+        description.film.width = side;
+        description.film.height = side;
+    })
+    .expect("the shipped scene");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a thread pool");
+    pool.install(|| {
+        let renderer = |paths, memory| {
+            let checked = settings(paths, memory).validate().expect("valid settings");
+            Renderer::new(&scene, checked).expect("a renderer")
+        };
+        // A small iteration first, for everything that does not grow: buffers of threads, tables, the pilot.
+        let mut small = renderer(1000, 100);
+        assert!(small.iterate());
+        let paths = vertices / small.state().identity().vertices_per_light_path;
+        drop(small);
+        let before = status("VmRSS");
+        fs::write("/proc/self/clear_refs", "5").expect("the high-water mark can be reset");
+        let mut renderer = renderer(paths as u32, memory);
+        assert!(renderer.iterate());
+        let report = renderer.report();
+        println!(
+            "case {} {} {} {}",
+            report.expected_bytes,
+            status("VmHWM") - before,
+            report.counters.light_vertices,
+            report.counters.photon_beams
+        );
+    });
+}
+
+/// Runs a case in a process of its own: expected and measured bytes, vertices.
+fn run(memory: u32, vertices: f64) -> [f64; 2] {
+    let output = Command::new(std::env::current_exe().expect("this test"))
+        .args(["--nocapture", "--exact", "memory_is_what_was_expected"])
+        .env(CASE, format!("{memory} {vertices}"))
+        .output()
+        .expect("this test runs");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let line = text.lines().find_map(|line| line.split_once("case ").map(|(_, rest)| rest));
+    let Some(line) = line else { panic!("{text}{}", String::from_utf8_lossy(&output.stderr)) };
+    let numbers: Vec<f64> = line.split(' ').map(|word| word.parse().expect("a number")).collect();
+    println!(
+        "budget {memory} MiB, {} vertices, {} beams: expected {:.1} MiB, measured {:.1} MiB, ratio {:.3}",
+        numbers[2],
+        numbers[3],
+        numbers[0] / MIB,
+        numbers[1] / MIB,
+        numbers[1] / numbers[0]
+    );
+    [numbers[0], numbers[1]]
+}
+
+#[test]
+fn memory_is_what_was_expected() {
+    if let Ok(case) = std::env::var(CASE) {
+        let (memory, vertices) = case.split_once(' ').expect("two numbers");
+        return measure(memory.parse().expect("MiB"), vertices.parse().expect("vertices"));
+    }
+    let close = |[expected, measured]: [f64; 2]| {
+        assert!((measured / expected - 1.0).abs() < 0.1, "expected {expected} bytes, measured {measured}");
+    };
+    if let Ok(vertices) = std::env::var("UPBP_VERTICES") {
+        close(run(1 << 20, vertices.parse().expect("a number")));
+        return;
+    }
+    close(run(1 << 20, 1e5));
+    close(run(1 << 20, 1e6));
+    // As much as is allowed, no more and not much less.
+    let [expected, measured] = run(150, 1e7);
+    close([expected, measured]);
+    close([150.0 * MIB, measured]);
+}

@@ -1,0 +1,130 @@
+//! State files that are cut off, changed or of somebody else are refused, whatever is in them.
+
+#[path = "../examples/host_renderer/scene.rs"]
+mod host;
+
+use std::sync::OnceLock;
+
+use proptest::prelude::*;
+use upbp_core::{ErrorPoint, LightPaths, Renderer, Settings, State, StateError};
+
+/// The bytes of a good state.
+fn good() -> &'static [u8] {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| {
+        let room = host::Room::new(5).expect("valid coefficients");
+        let settings = Settings { light_paths: LightPaths::Count(100), ..Settings::default() };
+        let mut renderer =
+            Renderer::new(&room, settings.validate().expect("valid settings")).expect("a renderer");
+        renderer.identify_scene("room", b"room");
+        for range in [0..2, 7..8] {
+            renderer.set_range(range);
+            while renderer.iterate() {}
+        }
+        renderer.record_error(ErrorPoint {
+            seconds: 0.1,
+            iterations: 3,
+            relative_mse: 1e-300,
+            rmse: 1.0 / 3.0,
+        });
+        let mut bytes = Vec::new();
+        renderer.state().write(&mut bytes).expect("a vector takes all");
+        bytes
+    })
+}
+
+#[test]
+fn a_state_survives() {
+    let state = State::read(good()).expect("a good state");
+    assert_eq!(state.film().iteration_set().to_string(), "0..2, 7..8");
+    let mut again = Vec::new();
+    state.write(&mut again).expect("a vector takes all");
+    assert!(again == good(), "reading and writing gives the same bytes");
+}
+
+#[test]
+fn every_cut_is_seen() {
+    for end in 0..good().len() {
+        let error = State::read(&good()[..end]).expect_err("a cut file");
+        let expected = if end < 12 {
+            matches!(error, StateError::NotAState)
+        } else {
+            matches!(error, StateError::Damaged { .. })
+        };
+        assert!(expected, "{end}: {error}");
+    }
+    let longer = [good(), b"x"].concat();
+    assert!(matches!(State::read(longer.as_slice()), Err(StateError::Damaged { .. })));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn every_changed_bit_is_seen(place in any::<prop::sample::Index>(), bit in 0..8_u8) {
+        let mut bytes = good().to_vec();
+        bytes[place.index(good().len())] ^= 1 << bit;
+        prop_assert!(State::read(bytes.as_slice()).is_err());
+    }
+
+    #[test]
+    fn anything_else_is_refused(
+        bytes in proptest::collection::vec(any::<u8>(), 0..200),
+        keep in 0..64_usize,
+    ) {
+        prop_assert!(State::read(bytes.as_slice()).is_err());
+        // The same behind a good beginning.
+        let mixed = [&good()[..keep], &bytes].concat();
+        prop_assert!(State::read(mixed.as_slice()).is_err());
+    }
+}
+
+/// A file with a header of our own, its checksum right: what a program with bad intentions would write.
+fn forged(header: &str) -> Vec<u8> {
+    let mut bytes = b"UPBPSTAT\x01\0\0\0".to_vec();
+    bytes.extend((header.len() as u32).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    let mut checksum = 0xcbf2_9ce4_8422_2325_u64;
+    let padded = [header.as_bytes(), &[0; 8][header.len() % 8..]].concat();
+    let words = padded.chunks(8).map(|word| u64::from_le_bytes(word.try_into().expect("eight bytes")));
+    for word in words.chain([header.len() as u64]) {
+        checksum = (checksum ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        checksum ^= checksum >> 32;
+    }
+    bytes.extend(checksum.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn sizes_in_a_header_cost_no_memory() {
+    let length = u32::from_le_bytes(good()[12..16].try_into().expect("four bytes")) as usize;
+    let header = str::from_utf8(&good()[16..16 + length]).expect("text");
+    assert_eq!(forged(header), good()[..16 + length + 8], "the forger knows the format");
+
+    let huge = header
+        .replace("film:(5,5)", "film:(4294967295,4294967295)")
+        .replace("part:(0,0,5,5)", "part:(0,0,4294967295,4294967295)");
+    assert_ne!(huge, header);
+    let error = State::read(forged(&huge).as_slice()).expect_err("no sums follow");
+    assert!(error.to_string().contains("row 0 of 4294967295"), "{error}");
+    // A block that says that it has four gigabytes, and does not.
+    let mut bytes = forged(&huge);
+    bytes.extend([0xff; 4]);
+    bytes.extend([0; 1000]);
+    assert!(State::read(bytes.as_slice()).expect_err("a cut file").to_string().contains("ends here"));
+
+    for (from, to) in [
+        ("part:(0,0,5,5)", "part:(1,0,5,5)"),
+        ("part:(0,0,5,5)", "part:(4294967295,0,5,5)"),
+        ("part:(0,0,5,5)", "part:(0,0,0,5)"),
+        ("[(0,2),(7,8)]", "[(7,8),(0,2)]"),
+        ("[(0,2),(7,8)]", "[(0,99999999999)]"),
+        ("seed:0", "seed:-1"),
+        ("seed:0", "seeds:0"),
+    ] {
+        let changed = header.replace(from, to);
+        assert_ne!(changed, header, "{from}");
+        let error = State::read(forged(&changed).as_slice()).expect_err(to);
+        assert!(error.to_string().contains("header"), "{to}: {error}");
+    }
+}
