@@ -175,6 +175,9 @@ impl<'a, S: Scene> Renderer<'a, S> {
             add_splats(rect, splats, pixels);
         });
         times.light = clock.lap();
+        if self.cancelled.load(Ordering::Relaxed) {
+            return false;
+        }
         let map = if plan.stores_vertices() || plan.stores_beams() {
             LightMap::build(&plan, light.vertices, light.beams)
         } else {
