@@ -26,7 +26,7 @@ pub enum RenderError {
     /// The scene.
     #[error("scene: {0}")]
     World(#[from] WorldError),
-    /// The film does not fit.
+    /// The film, with what writing it takes, does not fit.
     #[error("film of {width} x {height} pixels: its {needed} MiB exceed the memory budget of {budget} MiB")]
     Memory {
         /// Width in pixels.

@@ -64,6 +64,13 @@ impl Film {
         u64::from(rect.width) * u64::from(rect.height) * pixel as u64
     }
 
+    /// Bytes that writing a film as an image takes besides: the picture, the layers and the variance in single precision, and one
+    /// more while it is copied or compressed.
+    pub(crate) fn output_bytes(rect: PixelRect, techniques: TechniqueSet) -> u64 {
+        let pixel = (Self::layers_of(techniques).len() + 3) * size_of::<[f32; 3]>();
+        u64::from(rect.width) * u64::from(rect.height) * pixel as u64
+    }
+
     /// The part of the camera's film that this is.
     #[must_use]
     pub const fn rect(&self) -> PixelRect {

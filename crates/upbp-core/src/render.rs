@@ -51,11 +51,13 @@ impl<'a, S: Scene> Renderer<'a, S> {
         let rect = scene.camera().crop();
         let budget = u64::from(settings.memory) << 20;
         let film_bytes = Film::memory_bytes(rect, techniques);
-        if film_bytes > budget {
+        // Light vertices have gone when an image is written.
+        let output_bytes = Film::output_bytes(rect, techniques);
+        if film_bytes + output_bytes > budget {
             return Err(RenderError::Memory {
                 width: rect.width,
                 height: rect.height,
-                needed: film_bytes.div_ceil(1 << 20),
+                needed: (film_bytes + output_bytes).div_ceil(1 << 20),
                 budget: u64::from(settings.memory),
             });
         }
@@ -101,7 +103,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
             ..Record::default()
         };
         let counts = LightCounts::expected(&pilot, choices.light_paths, choices.beam_paths);
-        record.expected_bytes = film_bytes + counts.peak_bytes::<S::Bsdf>() as u64;
+        record.expected_bytes = film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>() as u64);
         Ok(Self {
             world,
             settings,

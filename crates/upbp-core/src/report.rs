@@ -139,7 +139,7 @@ pub struct Report {
     pub shares: Vec<(&'static str, f64)>,
     /// Largest number of bytes that light vertices, beams and look-up structures took.
     pub map_bytes: u64,
-    /// Largest number of bytes that an iteration was expected to need, film included.
+    /// Bytes that the render was expected to need: the film, and an iteration or the writing of an image.
     pub expected_bytes: u64,
     /// Estimated relMSE of the image; `None` with fewer than two iterations.
     pub estimated_error: Option<f64>,

@@ -31,9 +31,8 @@ pub struct Metadata<'a> {
 /// What the file system or the encoder says.
 pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::result::Result<(), OutputError> {
     let fail = |reason: String| OutputError::Encode { path: path.to_owned(), reason };
-    let image = film.image();
     let mut channels = SmallVec::<[AnyChannel<FlatSamples>; 4]>::new();
-    push(&mut channels, "", &image);
+    push(&mut channels, "", &film.image());
     for layer in film.layers() {
         if let Some(image) = film.layer(*layer) {
             push(&mut channels, &format!("{}.", layer.name()), &image);
@@ -41,7 +40,7 @@ pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::resu
     }
     push(&mut channels, "variance.", &film.variance());
 
-    let size = (image.width as usize, image.height as usize);
+    let size = (film.rect().width as usize, film.rect().height as usize);
     let mut attributes = LayerAttributes::default();
     let text = ron::to_string(metadata).map_err(|error| fail(error.to_string()))?;
     attributes.other.insert(Text::from("upbp"), AttributeValue::Text(Text::from(text.as_str())));

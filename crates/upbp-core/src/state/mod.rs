@@ -38,7 +38,7 @@ pub(crate) struct Record {
     pub(crate) counters: Counters,
     /// Largest number of bytes that light vertices, beams and look-up structures took.
     pub(crate) map_bytes: u64,
-    /// Bytes that an iteration is expected to need.
+    /// Bytes that the render is expected to need.
     pub(crate) expected_bytes: u64,
     pub(crate) series: ErrorSeries,
 }
