@@ -110,7 +110,7 @@ fn through_a_file(state: &State) -> State {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
+    #![proptest_config(ProptestConfig::with_cases(8))]
 
     /// Every iteration goes to one of four runs; the runs' states are merged in some order; the last run goes on from what the
     /// others have done.

@@ -276,3 +276,19 @@ fn slices_by_processes_merge_to_one_run() {
     let (code, text) = end(&render(&folder, &["--state", "d.state"]).output().expect("the program runs"));
     assert!(code == Some(2) && text.contains("seed is"), "{text}");
 }
+
+#[test]
+fn a_changed_mesh_is_another_scene() {
+    let folder = prepared("mesh");
+    let quad = "Quad(origin: (-2, 0, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0))";
+    let scene = SMALL.replace(quad, "Mesh(file: \"floor.obj\")");
+    assert_ne!(scene, SMALL);
+    fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
+    let mesh = "v -2 0 -2\nv -2 0 2\nv 2 0 2\nf 1 2 3\n";
+    fs::write(folder.join("floor.obj"), mesh).expect("a writable folder");
+    let arguments = ["--light-paths", "64", "--iterations", "2", "--state", "a.state", "-o", "a.exr"];
+    succeeds(render(&folder, &arguments));
+    fs::write(folder.join("floor.obj"), mesh.replace("v 2 0 2", "v 2 0 1.9")).expect("a writable folder");
+    let (code, text) = end(&render(&folder, &arguments).output().expect("the program runs"));
+    assert!(code == Some(2) && text.contains("a.state") && text.contains("scene is"), "{text}");
+}

@@ -43,11 +43,10 @@ pub(crate) fn light_pass<S: Scene>(
     let wave = (chunks / 32).clamp(16 * threads, 256 * threads);
     let mut buffers: Vec<LightChunk<S::Bsdf>> = Vec::new();
     buffers.resize_with(wave.min(chunks) as usize, LightChunk::default);
-    let mut pass = LightPass {
-        vertices: Vec::with_capacity(expected.vertices as usize),
-        beams: Vec::with_capacity(expected.beams as usize),
-        counters: Counters::default(),
-    };
+    let mut pass = LightPass { vertices: Vec::new(), beams: Vec::new(), counters: Counters::default() };
+    // What cannot be had at once may still turn out not to be needed.
+    let _ = pass.vertices.try_reserve_exact(expected.vertices as usize);
+    let _ = pass.beams.try_reserve_exact(expected.beams as usize);
     for start in (0..chunks).step_by(wave as usize) {
         let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
         buffers.par_iter_mut().enumerate().for_each_init(Scratch::default, |scratch, (i, out)| {
@@ -55,7 +54,7 @@ pub(crate) fn light_pass<S: Scene>(
                 return;
             }
             let first = (start + i as u32) * LIGHT_CHUNK;
-            for index in first..(first + LIGHT_CHUNK).min(paths) {
+            for index in first..first.saturating_add(LIGHT_CHUNK).min(paths) {
                 trace_light_path(context, kind, index, scratch, out, &mut ());
             }
         });

@@ -29,7 +29,6 @@ use crate::stop::{Canceller, Outcome, Progress, Stop, StopReason};
 /// methods are called does the work.
 pub struct Renderer<'a, S: Scene> {
     world: World<'a, S>,
-    settings: CheckedSettings,
     pilot: Pilot,
     state: State,
     /// The iterations that are rendered.
@@ -89,7 +88,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
             fingerprint: String::new(),
             film: scene.camera().resolution(),
             part: (rect.x, rect.y, rect.width, rect.height),
-            settings: (*settings).clone(),
+            settings: settings.into_inner(),
             census,
             light_paths: choices.light_paths,
             beam_paths: choices.beam_paths,
@@ -106,7 +105,6 @@ impl<'a, S: Scene> Renderer<'a, S> {
         record.expected_bytes = film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>() as u64);
         Ok(Self {
             world,
-            settings,
             pilot,
             state: State { identity, record, film },
             range: 0..MAX_ITERATIONS,
@@ -122,8 +120,8 @@ impl<'a, S: Scene> Renderer<'a, S> {
         self.state.identity.fingerprint = fingerprint(content);
     }
 
-    /// Renders only iterations of `range`, which may be a share of a render that many machines work on. Of the initial range,
-    /// which is `0..`[`MAX_ITERATIONS`], nothing beyond its end is ever rendered.
+    /// Renders only iterations of `range`, which may be a share of a render that many machines work on. Indices from
+    /// [`MAX_ITERATIONS`] on are never rendered.
     pub fn set_range(&mut self, range: Range<u64>) {
         self.range = range.start..range.end.min(MAX_ITERATIONS);
     }
@@ -263,7 +261,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
     fn fraction(&self, stop: &Stop) -> f64 {
         let film = &self.state.film;
         let in_range = film.iteration_set().count_in(&self.range);
-        let by_range = in_range as f64 / (self.range.end - self.range.start).max(1) as f64;
+        let by_range = in_range as f64 / self.range.end.saturating_sub(self.range.start).max(1) as f64;
         let by_iterations =
             stop.iterations.map_or(0.0, |limit| film.iterations() as f64 / limit.max(1) as f64);
         let by_time = stop.seconds.map_or(0.0, |limit| self.seconds() / limit);

@@ -77,6 +77,12 @@ impl Default for Settings {
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckedSettings(Settings);
 
+impl CheckedSettings {
+    pub(crate) fn into_inner(self) -> Settings {
+        self.0
+    }
+}
+
 impl std::ops::Deref for CheckedSettings {
     type Target = Settings;
 
