@@ -14,7 +14,6 @@ use std::error::Error;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
 use clap::Parser;
 use upbp_core::{
@@ -85,7 +84,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     interrupt.stops(renderer.canceller());
     let beside = Beside {
         reference: reference.as_ref(),
-        state: options.state.as_deref().map(|path| (path, Duration::from_secs_f64(options.save_every))),
+        state: options.state.as_deref().map(|path| (path, options.save_every())),
         quiet: options.quiet,
     };
     let reason = render(&mut renderer, &options.stop(), &beside);

@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Parser;
 use upbp_core::{LightPaths, MAX_ITERATIONS, Settings, Stop, TechniqueSet};
@@ -67,7 +68,7 @@ pub(crate) struct Options {
     pub(crate) state: Option<PathBuf>,
     /// Time between two savings of the state; what is lost in a crash is no more than this and an iteration
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, requires = "state")]
-    pub(crate) save_every: f64,
+    save_every: f64,
     /// Memory for film, light vertices, photon beams and their look-ups, MiB [default: 2048]
     #[arg(long, value_name = "MIB")]
     memory: Option<u32>,
@@ -88,6 +89,11 @@ impl Options {
             seconds: self.time.or(unlimited.then_some(DEFAULT_SECONDS)),
             error: self.target_error,
         }
+    }
+
+    /// Time between two savings.
+    pub(crate) fn save_every(&self) -> Duration {
+        Duration::try_from_secs_f64(self.save_every).unwrap_or(Duration::MAX)
     }
 
     /// The iterations to render, if not all.
