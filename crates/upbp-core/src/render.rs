@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::scene::{Camera, EmitterId, Scene};
 use upbp_estimators::walk::Context;
 use upbp_estimators::{LightMap, Plan, StreamKind, Technique, TechniqueSet, World};
 
@@ -82,6 +82,11 @@ impl<'a, S: Scene> Renderer<'a, S> {
         }
         let pixels = rect.width.saturating_mul(rect.height);
         let choices = Choices::new(&world, &settings, techniques, &pilot, pixels, budget - film_bytes);
+        let probabilities: Vec<u8> = (0..scene.emitters().len() as u32)
+            .map(EmitterId)
+            .flat_map(|emitter| [world.emission_probability(emitter), world.next_event_probability(emitter)])
+            .flat_map(f32::to_le_bytes)
+            .collect();
         let identity = Identity {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             scene: String::new(),
@@ -93,6 +98,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
             light_paths: choices.light_paths,
             beam_paths: choices.beam_paths,
             vertices_per_light_path: pilot.vertices_per_path,
+            emitters: fingerprint(&probabilities),
             radii: choices.radii,
         };
         let film = Film::new(rect, techniques);

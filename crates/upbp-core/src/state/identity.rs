@@ -34,6 +34,8 @@ pub struct Identity {
     pub beam_paths: u32,
     /// Connectible vertices per light sub-path, as the pilot found.
     pub vertices_per_light_path: f64,
+    /// Fingerprint of the probabilities with which emitters are chosen.
+    pub emitters: String,
     /// First radii and how they shrink.
     pub radii: RadiusSchedule,
 }
@@ -62,7 +64,7 @@ impl Identity {
     }
 
     /// All that counts, as text: the shortest decimals of two different numbers differ.
-    fn fields(&self) -> [(&'static str, String); 23] {
+    fn fields(&self) -> [(&'static str, String); 24] {
         let Self { settings: s, radii: r, .. } = self;
         let (width, height) = self.film;
         let (x, y, columns, rows) = self.part;
@@ -84,6 +86,7 @@ impl Identity {
             ("light_paths", self.light_paths.to_string()),
             ("beams", self.beam_paths.to_string()),
             ("vertices per light sub-path", self.vertices_per_light_path.to_string()),
+            ("choice of emitters", self.emitters.clone()),
             ("radii.surf", r.surf.to_string()),
             ("radii.pp3d", r.pp3d.to_string()),
             ("radii.pb2d", r.pb2d.to_string()),
