@@ -17,14 +17,19 @@ use crate::memory::LightCounts;
 /// Light sub-paths per piece of work.
 const LIGHT_CHUNK: u32 = 64;
 
-/// What the light pass leaves.
-pub(crate) struct LightPass<B> {
+/// Lists that are used again in the next iteration: the allocator need not find a use for what was given back to it.
+pub(crate) struct Lists<B> {
     pub(crate) vertices: Vec<LightVertex<B>>,
     pub(crate) beams: Vec<PhotonBeam>,
-    pub(crate) counters: Counters,
 }
 
-/// Traces all light sub-paths of the plan, and hands their splats over in the order of the sub-paths. `expected` is how many
+impl<B> Default for Lists<B> {
+    fn default() -> Self {
+        Self { vertices: Vec::new(), beams: Vec::new() }
+    }
+}
+
+/// Traces all light sub-paths of the plan into `lists`, and hands their splats over in the order of the sub-paths. `expected` is how many
 /// vertices and beams there will be, as far as anyone knows.
 ///
 /// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never more than a
@@ -33,9 +38,10 @@ pub(crate) fn light_pass<S: Scene>(
     context: &Context<'_, S>,
     kind: StreamKind,
     expected: &LightCounts,
+    lists: &mut Lists<S::Bsdf>,
     cancelled: &AtomicBool,
     mut take_splats: impl FnMut(&[Splat]),
-) -> LightPass<S::Bsdf> {
+) -> Counters {
     let paths = if context.plan.needs_light_paths() { context.plan.light_paths } else { 0 };
     let chunks = paths.div_ceil(LIGHT_CHUNK);
     // Enough for each thread that none waits long for the last one.
@@ -43,10 +49,12 @@ pub(crate) fn light_pass<S: Scene>(
     let wave = (chunks / 32).clamp(16 * threads, 256 * threads);
     let mut buffers: Vec<LightChunk<S::Bsdf>> = Vec::new();
     buffers.resize_with(wave.min(chunks) as usize, LightChunk::default);
-    let mut pass = LightPass { vertices: Vec::new(), beams: Vec::new(), counters: Counters::default() };
-    // What cannot be had at once may still turn out not to be needed.
-    let _ = pass.vertices.try_reserve_exact(expected.vertices as usize);
-    let _ = pass.beams.try_reserve_exact(expected.beams as usize);
+    let mut counters = Counters::default();
+    lists.vertices.clear();
+    lists.beams.clear();
+    // A little more than expected. What cannot be had at once may still turn out not to be needed.
+    let _ = lists.vertices.try_reserve_exact((1.05 * expected.vertices) as usize);
+    let _ = lists.beams.try_reserve_exact((1.05 * expected.beams) as usize);
     for start in (0..chunks).step_by(wave as usize) {
         let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
         buffers.par_iter_mut().enumerate().for_each_init(Scratch::default, |scratch, (i, out)| {
@@ -59,16 +67,14 @@ pub(crate) fn light_pass<S: Scene>(
             }
         });
         for out in buffers {
-            pass.vertices.append(&mut out.vertices);
-            pass.beams.append(&mut out.beams);
-            pass.counters.add(&std::mem::take(&mut out.counters));
+            lists.vertices.append(&mut out.vertices);
+            lists.beams.append(&mut out.beams);
+            counters.add(&std::mem::take(&mut out.counters));
             take_splats(&out.splats);
             out.splats.clear();
         }
     }
-    pass.vertices.shrink_to_fit();
-    pass.beams.shrink_to_fit();
-    pass
+    counters
 }
 
 /// Traces one camera sub-path per pixel of `rect` and adds it to `pixels`.

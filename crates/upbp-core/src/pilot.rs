@@ -17,7 +17,7 @@ use upbp_estimators::{
 
 use crate::emitters::pixel;
 use crate::memory::LightCounts;
-use crate::passes::light_pass;
+use crate::passes::{Lists, light_pass};
 use crate::settings::CheckedSettings;
 
 /// Light sub-paths of the pilot.
@@ -110,10 +110,12 @@ pub(crate) fn run<S: Scene>(
         },
     );
     let context = Context { world, plan: &plan };
-    let light = light_pass(
+    let mut light = Lists::default();
+    light_pass(
         &context,
         StreamKind::PilotLight,
         &LightCounts::default(),
+        &mut light,
         &AtomicBool::new(false),
         |_| (),
     );

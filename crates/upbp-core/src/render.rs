@@ -16,7 +16,7 @@ use crate::error::{RenderError, StateError};
 use crate::film::{Film, Pixel};
 use crate::iterations::MAX_ITERATIONS;
 use crate::memory::LightCounts;
-use crate::passes::{BLACK, add_splats, camera_pass, light_pass};
+use crate::passes::{BLACK, Lists, add_splats, camera_pass, light_pass};
 use crate::pilot::{self, Pilot};
 use crate::report::{ErrorPoint, PassTimes, Report};
 use crate::settings::CheckedSettings;
@@ -34,6 +34,7 @@ pub struct Renderer<'a, S: Scene> {
     /// The iterations that are rendered.
     range: Range<u64>,
     pixels: Vec<Pixel>,
+    lists: Lists<S::Bsdf>,
     cancelled: Arc<AtomicBool>,
 }
 
@@ -115,6 +116,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
             state: State { identity, record, film },
             range: 0..MAX_ITERATIONS,
             pixels,
+            lists: Lists::default(),
             cancelled: Arc::default(),
         })
     }
@@ -177,7 +179,8 @@ impl<'a, S: Scene> Renderer<'a, S> {
         let mut clock = Clock::start();
         pixels.fill(BLACK);
         let expected = LightCounts::expected(&self.pilot, plan.light_paths, plan.beam_paths);
-        let light = light_pass(&context, StreamKind::Light, &expected, &self.cancelled, |splats| {
+        let lists = &mut self.lists;
+        let light = light_pass(&context, StreamKind::Light, &expected, lists, &self.cancelled, |splats| {
             add_splats(rect, splats, pixels);
         });
         times.light = clock.lap();
@@ -185,7 +188,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
             return false;
         }
         let map = if plan.stores_vertices() || plan.stores_beams() {
-            LightMap::build(&plan, light.vertices, light.beams)
+            LightMap::build(&plan, std::mem::take(&mut lists.vertices), std::mem::take(&mut lists.beams))
         } else {
             LightMap::empty()
         };
@@ -197,9 +200,10 @@ impl<'a, S: Scene> Renderer<'a, S> {
         }
         let State { record, film, .. } = &mut self.state;
         record.counters.dropped += film.add(iteration, pixels);
-        record.counters.add(&light.counters);
+        record.counters.add(&light);
         record.counters.add(&counters);
         record.map_bytes = record.map_bytes.max(map.memory_bytes() as u64);
+        *lists = Lists { vertices: map.vertices, beams: map.beams };
         times.film = clock.lap();
         record.times.add(&times);
         true
@@ -216,7 +220,14 @@ impl<'a, S: Scene> Renderer<'a, S> {
 
     /// Renders until a rule of `stop` holds or `progress`, which is called after every iteration, breaks. Time spent in
     /// `progress` does not count.
-    pub fn render(
+    pub fn render(&mut self, stop: &Stop, progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>) -> Outcome {
+        let outcome = self.render_until(stop, progress);
+        // Room for what is done with the picture.
+        self.lists = Lists::default();
+        outcome
+    }
+
+    fn render_until(
         &mut self,
         stop: &Stop,
         mut progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
