@@ -193,3 +193,49 @@ impl<B> Observer<B> for Seen {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples of two emitters that were chosen equally often.
+    fn shares(samples: &[(u32, f64, f64)]) -> Vec<f64> {
+        let mut tally = Tally::new(2, |_| 0.5);
+        for &(emitter, value, weight) in samples {
+            tally.add(emitter, Contribution { value, weight }, 1.0);
+        }
+        let light = tally.shares().light;
+        let sum: f64 = light.iter().sum();
+        light.iter().map(|l| l / sum).collect()
+    }
+
+    #[test]
+    fn emitters_that_nothing_else_finds_are_chosen_in_proportion_to_their_light() {
+        let [one, other] = shares(&[(0, 1.0, 1.0), (0, 2.0, 1.0), (1, 9.0, 1.0)])[..] else { unreachable!() };
+        assert!((one - 0.25).abs() < 1e-12 && (other - 0.75).abs() < 1e-12, "{one}, {other}");
+    }
+
+    #[test]
+    fn an_emitter_that_others_find_anyway_fades() {
+        // Equal light; the first is found by another technique four times out of five.
+        let [one, other] = shares(&[(0, 1.0, 0.2), (1, 1.0, 1.0)])[..] else { unreachable!() };
+        assert!(one < 0.01, "{one}, {other}");
+        // Found elsewhere once in a while it keeps most of its share.
+        let [one, other] = shares(&[(0, 1.0, 0.95), (1, 1.0, 1.0)])[..] else { unreachable!() };
+        assert!((0.4..0.5).contains(&one), "{one}, {other}");
+    }
+
+    #[test]
+    fn without_samples_nothing_is_said() {
+        let tally = Tally::new(2, |_| 0.5);
+        assert_eq!(tally.shares(), EmitterShares { light: vec![0.0; 2], samples: 0.0 });
+    }
+
+    #[test]
+    fn pixels_lie_on_the_film_and_are_spread() {
+        let film = PixelRect { x: 3, y: 5, width: 40, height: 30 };
+        let pixels: std::collections::BTreeSet<_> = (0..1200).map(|index| pixel(film, index)).collect();
+        assert_eq!(pixels.len(), 1200);
+        assert!(pixels.iter().all(|[x, y]| (3..43).contains(x) && (5..35).contains(y)));
+    }
+}
