@@ -3,7 +3,8 @@
 //! By power, a sky takes most of the light sub-paths and next events of a room with a window, and most of them are lost:
 //! the light goes past the scene, or emission hits find it anyway. So a small run counts the weighted contributions that
 //! come from each emitter, by next events and by light sub-paths, as far as no other technique would find them, and emitters
-//! are then chosen in proportion. Weights are exact for any choice, and the choice is fixed before any sample of the image.
+//! are then chosen in proportion (`docs/theory.md`, section 6(h)). Weights are exact for any choice, and the choice is
+//! fixed before any sample of the image.
 
 use rayon::prelude::*;
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, Observer};

@@ -15,7 +15,7 @@ use crate::scene::{Crossing, Hit, Scene};
 /// How much of a ray's way is needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// All of it, to the next surface: long beams, emission along the ray.
+    /// All of it, to the next surface: long beams, emission along the ray, media in which rounding matters.
     ToSurface,
     /// Until the walk stops: what lies behind is unknown.
     ToStop,
