@@ -7,7 +7,7 @@ use upbp_scene::{ReadyScene, SceneDescription};
 
 fn shipped() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/scenes");
-    let mut files: Vec<PathBuf> = [root.clone(), root.join("reference")]
+    let mut files: Vec<PathBuf> = [root.clone(), root.join("reference"), root.join("suite")]
         .iter()
         .flat_map(|folder| std::fs::read_dir(folder).unwrap())
         .map(|entry| entry.unwrap().path())
@@ -19,7 +19,7 @@ fn shipped() -> Vec<PathBuf> {
 
 #[test]
 fn all_load_and_satisfy_the_contract() {
-    assert!(shipped().len() >= 12);
+    assert!(shipped().len() >= 20);
     for path in shipped() {
         let scene = ReadyScene::load(&path).unwrap_or_else(|error| panic!("{error}"));
         check_scene(&scene).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
