@@ -10,11 +10,13 @@
 //! of it is a loss that falls like r.
 
 mod compare;
+#[path = "../support/scenes.rs"]
+mod scenes;
 
 use std::error::Error;
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -22,19 +24,7 @@ use upbp_core::{Radii, Radius, Renderer, Settings, Stop, Technique, TechniqueSet
 use upbp_scene::ReadyScene;
 
 use compare::{Comparison, Estimate, Reference, Spread};
-
-const SCENES: [&str; 10] = [
-    "absorb_only",
-    "chromatic_sphere",
-    "emission_grey",
-    "fog_cornell",
-    "fog_two_spheres",
-    "forward_hg_box",
-    "glass_env",
-    "high_albedo_cube",
-    "mirror_fog",
-    "point_bubble_fog",
-];
+use scenes::{Group, Shipped, names};
 
 const SETS: [&str; 8] = [
     "pt",
@@ -75,7 +65,7 @@ struct Options {
     /// Seconds of rendering per scene and set
     #[arg(long, default_value_t = 60.0)]
     time: f64,
-    /// Scenes [default: all]
+    /// Scenes [default: those whose reference another renderer made]
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
     /// Sets of techniques [default: a selection]
@@ -105,7 +95,7 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     let scenes: Vec<&str> = if options.scenes.is_empty() {
-        SCENES.to_vec()
+        names(Group::Reference).collect()
     } else {
         options.scenes.iter().map(String::as_str).collect()
     };
@@ -172,11 +162,11 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
 }
 
 fn open(name: &str) -> Result<(ReadyScene, Reference), Box<dyn Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let scene = ReadyScene::load(root.join(format!("examples/scenes/reference/{name}.ron")))?;
-    let path = root.join(format!("tests/data/references/{name}.exr"));
+    let shipped =
+        Shipped::find(name).ok_or_else(|| format!("no scene with a reference is called `{name}`"))?;
+    let path = shipped.reference();
     let reference = Reference::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
-    Ok((scene, reference))
+    Ok((ReadyScene::load(shipped.scene())?, reference))
 }
 
 fn render<'s>(
