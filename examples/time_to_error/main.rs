@@ -1,15 +1,21 @@
 //! Error over time, of any scenes with a reference and any sets of techniques.
 //!
 //! `cargo run --release --example time_to_error -- --scenes fog_cornell,glass_env --sets "pt;bpt;default" --time 30 --out
-//! target/errors` writes `errors.csv` with all that was measured, and a plot per scene as SVG and as PNG, and prints a
-//! table. In the table and the plots the noise of the reference is taken away.
+//! target/errors` writes `errors.csv` with all that was measured, and a plot per scene as SVG and as PNG, and prints
+//! tables, which are in `summary.md` too. In tables and plots the noise of the reference is taken away.
+//!
+//! Without `--scenes` and `--sets` it renders the whole suite in half an hour on two cores, with `--quick` in less than five
+//! minutes, and judges the choice of techniques by the program (`verdict`).
 
 mod analysis;
 mod measure;
 mod options;
 mod plot;
+#[path = "../support/scenes.rs"]
+mod scenes;
 mod subject;
 mod table;
+mod verdict;
 
 use std::error::Error;
 use std::num::NonZeroUsize;
@@ -17,11 +23,12 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
-use upbp_core::{Settings, check_writable, write_png};
+use upbp_core::{ErrorPoint, Settings, TechniqueSet, check_writable, write_png};
 
 use analysis::Curve;
-use options::Options;
+use options::{NamedSet, Options};
 use subject::Subject;
+use verdict::Verdict;
 
 /// Exit code for input that cannot be rendered and output that cannot be written.
 const BAD_INPUT: u8 = 2;
@@ -61,27 +68,68 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         .map_err(|error| format!("cannot make the folder {}: {error}", options.out.display()))?;
     let table_path = options.out.join("errors.csv");
     check_writable(&table_path)?;
+    let summary_path = options.out.join("summary.md");
+    check_writable(&summary_path)?;
 
+    let (sets, seeds, seconds) = (options.sets()?, options.seeds(), options.seconds());
     let mut csv = table::CSV_HEADER.to_owned();
-    println!("{}", table::head(&options.errors));
+    let mut summary = String::new();
+    let mut say = |line: &str| {
+        println!("{line}");
+        summary += line;
+        summary.push('\n');
+    };
+    say(&table::head(&options.errors));
+    let mut verdicts = Vec::new();
     for subject in &subjects {
         let mut curves = Vec::new();
-        for set in &options.sets {
-            let mut series = Vec::new();
-            for &seed in &options.seeds {
-                let settings = Settings { techniques: set.techniques, seed, ..settings.clone() };
-                series.push((seed, measure::measure(subject, settings, options.time)?));
-            }
+        let mut rendered = Vec::new();
+        for set in &sets {
+            let series = series(subject, set, &settings, &seeds, seconds, &mut rendered)?;
             let curve = Curve::new(set.name.clone(), series, subject.floor);
-            println!("{}", table::row(&subject.name, &curve, &options.errors));
+            say(&table::row(&subject.name, &curve, &options.errors));
             csv += &table::csv(&subject.name, &curve);
             curves.push(curve);
         }
         // What was measured stays, should a later scene fail.
         write(&table_path, &csv)?;
         plot(subject, &curves, &options.out)?;
+        verdicts.extend(Verdict::new(&subject.name, &curves, seconds));
     }
+    say(&format!("\n{}", verdict::markdown(&mut verdicts)));
+    write(&summary_path, &summary)?;
     Ok(())
+}
+
+/// Errors over time, by seed.
+type Series = Vec<(u64, Vec<ErrorPoint>)>;
+
+/// Renders a scene with one set and all seeds. A scene may not have what a set needs, so that two sets are the same in it:
+/// those are rendered once. The choice of the program costs time of its own and is always rendered.
+fn series(
+    subject: &Subject,
+    set: &NamedSet,
+    settings: &Settings,
+    seeds: &[u64],
+    seconds: f64,
+    rendered: &mut Vec<(TechniqueSet, Series)>,
+) -> Result<Series, Box<dyn Error>> {
+    let mut series = Series::new();
+    let mut techniques = TechniqueSet::default();
+    for &seed in seeds {
+        let settings = Settings { techniques: set.techniques, seed, ..settings.clone() };
+        let renderer = measure::prepare(subject, settings)?;
+        techniques = renderer.census().techniques;
+        let same = rendered.iter().find(|(other, _)| *other == techniques);
+        if let (Some((_, same)), false) = (same, set.is_auto()) {
+            return Ok(same.clone());
+        }
+        series.push((seed, measure::measure(subject, renderer, seconds)));
+    }
+    if !set.is_auto() {
+        rendered.push((techniques, series.clone()));
+    }
+    Ok(series)
 }
 
 fn plot(subject: &Subject, curves: &[Curve], folder: &Path) -> Result<(), Box<dyn Error>> {

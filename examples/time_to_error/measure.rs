@@ -4,20 +4,19 @@ use std::error::Error;
 use std::ops::ControlFlow;
 
 use upbp_core::{ErrorPoint, Film, Renderer, Settings, Stop};
+use upbp_scene::ReadyScene;
 
 use crate::subject::Subject;
 
 /// Ratio of the numbers of iterations at which errors are taken.
 const SPACING: f64 = 1.1;
 
-/// Renders for some time and takes the error after iterations at geometric distances, and after the last one.
-/// Seconds are those of rendering, the pilot included; taking errors does not count.
-pub(crate) fn measure(
+/// A render that has not begun: the census is taken, the pilot has run.
+pub(crate) fn prepare(
     subject: &Subject,
     settings: Settings,
-    seconds: f64,
-) -> Result<Vec<ErrorPoint>, Box<dyn Error>> {
-    let mut renderer = Renderer::new(&subject.scene, settings.validate()?)?;
+) -> Result<Renderer<'_, ReadyScene>, Box<dyn Error>> {
+    let renderer = Renderer::new(&subject.scene, settings.validate()?)?;
     let (rect, reference) = (renderer.film().rect(), &subject.reference);
     if (reference.width, reference.height) != (rect.width, rect.height) {
         return Err(format!(
@@ -26,6 +25,17 @@ pub(crate) fn measure(
         )
         .into());
     }
+    Ok(renderer)
+}
+
+/// Renders for some time and takes the error after iterations at geometric distances, and after the last one.
+/// Seconds are those of rendering, the pilot included; taking errors does not count.
+pub(crate) fn measure(
+    subject: &Subject,
+    mut renderer: Renderer<'_, ReadyScene>,
+    seconds: f64,
+) -> Vec<ErrorPoint> {
+    let reference = &subject.reference;
     let point = |film: &Film, seconds| {
         let image = film.image();
         ErrorPoint {
@@ -48,5 +58,5 @@ pub(crate) fn measure(
     if points.last().is_none_or(|last| last.iterations < film.iterations()) {
         points.push(point(film, renderer.report().seconds.total()));
     }
-    Ok(points)
+    points
 }

@@ -8,19 +8,7 @@ use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
 use upbp_core::{Image, read_exr};
 use upbp_scene::ReadyScene;
 
-/// Names of the scenes with a reference of their own.
-const SCENES: [&str; 10] = [
-    "absorb_only",
-    "chromatic_sphere",
-    "emission_grey",
-    "fog_cornell",
-    "fog_two_spheres",
-    "forward_hg_box",
-    "glass_env",
-    "high_albedo_cube",
-    "mirror_fog",
-    "point_bubble_fog",
-];
+use crate::scenes::{Group, SCENES, Shipped};
 
 /// Mean errors of a perfect render, due to the noise of the reference; 0 where it is not known.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,9 +40,15 @@ impl Subject {
         let mut all = Vec::new();
         for item in wanted {
             match item.as_str() {
-                "all" => all.extend(SCENES.into_iter().map(Files::shipped)),
-                name if SCENES.contains(&name) => all.push(Files::shipped(name)),
-                pair => all.push(Files::pair(pair)?),
+                "suite" => all.extend(SCENES.iter().map(Files::shipped)),
+                "all" => {
+                    let reference = SCENES.iter().filter(|scene| scene.group == Group::Reference);
+                    all.extend(reference.map(Files::shipped));
+                }
+                other => match Shipped::find(other) {
+                    Some(scene) => all.push(Files::shipped(&scene)),
+                    None => all.push(Files::pair(other)?),
+                },
             }
         }
         let mut names = HashSet::new();
@@ -75,18 +69,14 @@ impl Subject {
 }
 
 impl Files {
-    fn shipped(name: &str) -> Self {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        Self {
-            name: name.to_owned(),
-            scene: root.join(format!("examples/scenes/reference/{name}.ron")),
-            reference: root.join(format!("tests/data/references/{name}.exr")),
-        }
+    fn shipped(scene: &Shipped) -> Self {
+        Self { name: scene.name.to_owned(), scene: scene.scene(), reference: scene.reference() }
     }
 
     fn pair(text: &str) -> Result<Self, String> {
         let (scene, reference) = text.split_once('=').ok_or_else(|| {
-            format!("scene `{text}`: expected all, SCENE.ron=REF.exr, or one of {}", SCENES.join(", "))
+            let names = SCENES.map(|scene| scene.name).join(", ");
+            format!("scene `{text}`: expected suite, all, SCENE.ron=REF.exr, or one of {names}")
         })?;
         let name = Path::new(scene).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         if name.is_empty() || reference.is_empty() {
