@@ -32,7 +32,12 @@ impl Verdict {
     pub(crate) fn new(scene: &str, curves: &[Curve], seconds: f64) -> Option<Self> {
         let fixed = curves.iter().filter(|curve| curve.name != AUTO);
         let errors = fixed.filter_map(|curve| Some((curve, curve.error_at(TARGET_PART * seconds)?)));
-        let (best, target) = errors.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        // Where everything is the same as a smaller set, that one deserves the name.
+        let order = |(curve, error): &(&Curve, f64)| (*error, curve.name == EVERYTHING);
+        let (best, target) = errors.min_by(|a, b| {
+            let (a, b) = (order(a), order(b));
+            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+        })?;
         let times = curves.iter().filter_map(|curve| Some((curve.name.clone(), curve.time_below(target)?)));
         Some(Self { scene: scene.to_owned(), target, best: best.name.clone(), times: times.collect() })
     }
@@ -151,6 +156,12 @@ mod tests {
         assert_eq!(verdict.best, "bpt");
         assert!((verdict.loss().unwrap() - 0.5).abs() < 1e-9);
         assert!(Verdict::new("x", &curves[1..], 10.0).is_none());
+    }
+
+    #[test]
+    fn the_smaller_of_two_equal_sets_is_the_best() {
+        let curves = [converging(EVERYTHING, 1.0), converging("bpt", 1.0)];
+        assert_eq!(Verdict::new("x", &curves, 10.0).unwrap().best, "bpt");
     }
 
     #[test]
