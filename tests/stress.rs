@@ -65,3 +65,13 @@ fn lengths() {
 fn boundaries() {
     part("boundary", 7);
 }
+
+#[test]
+fn slabs() {
+    part("slab", 13);
+}
+
+#[test]
+fn cameras_on_photons() {
+    part("photon", 31);
+}

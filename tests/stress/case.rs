@@ -46,6 +46,8 @@ pub(crate) enum Layout {
     Room,
     /// Everything is the medium; a small black ball stands in it.
     Everywhere,
+    /// A slab of thickness 2 across the z axis, a thousand times as wide.
+    Slab,
 }
 
 /// What shines.
@@ -73,10 +75,13 @@ pub(crate) enum Light {
     Globe,
     /// A point beside the bodies, and one with this many times its power far behind the camera.
     Uneven(f64),
+    /// A red plane right above a slab, a green one right below: what a camera ray sees of them is its part that is
+    /// reflected and its part that gets through.
+    Sides,
 }
 
 /// Where the camera stands; it looks along -z.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum View {
     /// Before the bodies.
     Outside,
@@ -96,8 +101,14 @@ pub(crate) enum View {
     Centre,
     /// Where [`Light::Point`] is.
     OnPoint,
+    /// Exactly on the light, whichever it is.
+    OnLight,
     /// On the floor, looking along it.
     OnWall,
+    /// Between a slab and the plane above it; rays fall on the slab with this cosine.
+    OnSlab(f64),
+    /// Here: where a photon is.
+    OnPhoton([f64; 3]),
 }
 
 /// One point of the matrix.
@@ -161,6 +172,10 @@ pub(crate) const SIDE: u32 = 12;
 pub(crate) const FIELD_OF_VIEW: f64 = 40.0;
 /// Distance of [`View::Outside`] from the origin.
 pub(crate) const EYE: f64 = 3.0;
+/// Half the width of a slab. What leaves at its sides is far below what a few thousand walks resolve.
+const SLAB: f64 = 1e3;
+/// Between a slab and the planes beside it.
+const GAP: f64 = 1.0 / 64.0;
 
 impl Axes {
     /// Optical thickness of each channel.
@@ -238,12 +253,20 @@ impl Axes {
             View::BehindBoundary => ([0.0, 0.0, 1.0 - 1e-3], FIELD_OF_VIEW, 0.0),
             View::Centre => ([0.0; 3], FIELD_OF_VIEW, 0.0),
             View::OnPoint => ([2.0; 3], FIELD_OF_VIEW, 0.0),
+            View::OnLight => (self.light_place(), FIELD_OF_VIEW, 0.0),
             View::OnWall => ([0.0, -1.0, 3.0], FIELD_OF_VIEW, 0.0),
+            View::OnSlab(cosine) => {
+                let tangent = (1.0 - cosine * cosine).sqrt() / cosine;
+                ([0.5 * GAP * tangent, 0.0, 1.0 + 0.5 * GAP], 0.02, 0.0)
+            }
+            View::OnPhoton(place) => (place, FIELD_OF_VIEW, 0.0),
         };
         let target = match self.view {
             View::OnPoint => [0.0; 3],
             View::Centre => [0.0, 0.0, -1.0],
             View::OnWall => [0.0, -1.0, 0.0],
+            View::OnSlab(_) => [0.0, 0.0, 1.0],
+            View::OnPhoton([x, y, z]) => [x, y, z - 3.0],
             _ => [0.0, 0.0, origin[2] - 3.0],
         };
         format!(
@@ -286,6 +309,7 @@ impl Axes {
             }
             Layout::Room => whole() + &self.room(),
             Layout::Everywhere => ball([0.0, 0.0, -1.0], 0.25, "black", ""),
+            Layout::Slab => cube([-SLAB, -SLAB, -1.0], [SLAB, SLAB, 1.0], "m"),
         }
     }
 
@@ -332,7 +356,33 @@ impl Axes {
                 self.point([0.0; 3]),
                 self.length(0.125)
             ),
+            Light::Sides => {
+                let plane = |z: f64, u: [f64; 3], v: [f64; 3], colour: [f64; 3]| {
+                    format!(
+                        "(geometry: Quad(origin: {}, edge_u: {}, edge_v: {}), material: \"black\", emission: {}),",
+                        self.point([-SLAB, -SLAB, z]),
+                        self.edge(u),
+                        self.edge(v),
+                        vector(colour)
+                    )
+                };
+                let (x, y) = ([2.0 * SLAB, 0.0, 0.0], [0.0, 2.0 * SLAB, 0.0]);
+                plane(1.0 + GAP, y, x, [1.0, 0.0, 0.0]) + &plane(-1.0 - GAP, x, y, [0.0, 1.0, 0.0])
+            }
             _ => String::new(),
+        }
+    }
+
+    /// A point of the light that is nowhere else.
+    fn light_place(&self) -> [f64; 3] {
+        match self.light {
+            Light::Point | Light::Uneven(_) => [2.0; 3],
+            Light::PointOnAxis | Light::Laser => [0.0, 0.0, 2.0],
+            Light::LaserAcross => [2.0, 0.0, 0.0],
+            Light::Area => [0.0, if self.layout == Layout::Room { 1.0 } else { 2.0 }, 0.0],
+            Light::Globe => [0.0, 0.0, 0.125],
+            Light::Sides => [0.0, 0.0, 1.0 + GAP],
+            Light::PointInside | Light::Environment | Light::Sun | Light::SunAcross => [0.0; 3],
         }
     }
 
@@ -361,7 +411,7 @@ impl Axes {
             Light::LaserAcross => laser([2.0, 0.0, 0.0], [-1.0, 0.0, 0.0]),
             Light::Sun => sun([0.0, 0.0, -1.0]),
             Light::SunAcross => sun([-1.0, 0.0, 0.0]),
-            Light::Area | Light::Globe => String::new(),
+            Light::Area | Light::Globe | Light::Sides => String::new(),
             Light::Uneven(ratio) => point([2.0; 3], 10.0) + &point([0.0, 0.0, 4.0 * ratio.sqrt()], ratio),
         }
     }

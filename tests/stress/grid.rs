@@ -5,7 +5,8 @@ use std::sync::Mutex;
 
 use super::case::{Axes, Chromatic, Layout, Light, View};
 use super::execute::{Render, differs, render};
-use super::walk;
+use super::photon::photons;
+use super::{exact, walk};
 use crate::support::Estimate;
 
 /// What must hold besides what always does.
@@ -19,6 +20,10 @@ pub(crate) enum Check {
     Oracle,
     /// The mean of another case.
     Like(Axes),
+    /// Red is the first of these, green the second.
+    Exactly([f64; 2]),
+    /// What holds always, with the camera on a photon of the first iteration: this one, modulo their number.
+    OnPhoton(usize),
 }
 
 /// A case of the matrix.
@@ -46,6 +51,9 @@ impl Case {
 
     /// Renders and judges; the seconds that it took, or what is wrong.
     pub(crate) fn judge(&self) -> Result<f64, String> {
+        if let Check::OnPhoton(index) = self.check {
+            return self.on_photon(index);
+        }
         let mut seconds = 0.0;
         let mut wrong = String::new();
         for attempt in 0..ATTEMPTS {
@@ -53,7 +61,8 @@ impl Case {
             let render = render_axes(&self.axes, iterations, 2 * attempt + 1)?;
             seconds += render.seconds;
             let found = match &self.check {
-                Check::Sane => None,
+                Check::Sane | Check::OnPhoton(_) => None,
+                Check::Exactly(expected) => self.exactly(&render, expected),
                 Check::Furnace => self.furnace(&render),
                 Check::Oracle => self.oracle(&render, attempt),
                 Check::Like(other) => {
@@ -78,6 +87,32 @@ impl Case {
         (0..3).find_map(|c| differs(&render.means[c], &expected, self.slack))
     }
 
+    fn exactly(&self, render: &Render, expected: &[f64; 2]) -> Option<String> {
+        // Of a part this small a few thousand walks may see nothing.
+        const SEEN: f64 = 1e-3;
+        expected.iter().zip(&render.means).find_map(|(&mean, found)| {
+            if mean > SEEN {
+                differs(found, &Estimate { mean, error: 0.0 }, self.slack)
+            } else {
+                (found.mean > 10.0 * SEEN).then(|| format!("{:e} against {mean:e}", found.mean))
+            }
+        })
+    }
+
+    /// Looks up where the photons are, puts the camera on one, and sees that it is there.
+    fn on_photon(&self, index: usize) -> Result<f64, String> {
+        let seed = 1;
+        let watch = |axes: &Axes| photons(&axes.scene(), &with_seed(axes, seed));
+        let places = watch(&self.axes)?;
+        let place = *places.get(index % places.len().max(1)).ok_or("no photons")?;
+        let view = View::OnPhoton(place.to_array().map(f64::from));
+        let axes = Axes { view, ..self.axes.clone() };
+        if !watch(&axes)?.contains(&place) {
+            return Err(format!("no photon at {place} any more"));
+        }
+        render_axes(&axes, ITERATIONS, seed).map(|render| render.seconds)
+    }
+
     fn oracle(&self, render: &Render, attempt: u32) -> Option<String> {
         let Axes { albedo, g, max_length, .. } = self.axes;
         (0..3).find_map(|c| {
@@ -88,8 +123,11 @@ impl Case {
 }
 
 fn render_axes(axes: &Axes, iterations: u64, seed: u32) -> Result<Render, String> {
-    let settings = upbp_core::Settings { seed: seed.into(), ..axes.settings() };
-    render(&axes.scene(), &settings, iterations)
+    render(&axes.scene(), &with_seed(axes, seed), iterations)
+}
+
+fn with_seed(axes: &Axes, seed: u32) -> upbp_core::Settings {
+    upbp_core::Settings { seed: seed.into(), ..axes.settings() }
 }
 
 fn oracle(tau: f64, albedo: f64, g: f64, max_length: u32, walks: u32) -> Estimate {
@@ -166,6 +204,8 @@ pub(crate) fn all() -> Vec<Case> {
     kernels(&mut cases);
     lengths(&mut cases);
     boundaries(&mut cases);
+    slabs(&mut cases);
+    on_photons(&mut cases);
     cases
 }
 
@@ -291,17 +331,23 @@ fn can_shine(layout: Layout, light: Light) -> bool {
 fn views(cases: &mut Vec<Case>) {
     for view in VIEWS {
         for light in LIGHTS {
-            for layout in [Layout::Ball, Layout::Cube, Layout::Floor] {
-                // A camera in something opaque is refused.
-                if view == View::Centre && light == Light::Globe {
-                    continue;
-                }
-                for (tau, g) in [(1.0, 0.0), (1.0, 0.99999), (1e2, 0.0), (1e2, -0.9)] {
-                    for technique in ["bpt", "all"] {
-                        let axes = Axes { tau, g, layout, light, view, technique, ..Axes::default() };
-                        cases.push(Case::new("view", axes, Check::Sane));
-                    }
-                }
+            // A camera in something opaque is refused.
+            if view != View::Centre || light != Light::Globe {
+                view_cases(cases, view, light);
+            }
+        }
+    }
+    for light in [Light::PointOnAxis, Light::Laser, Light::LaserAcross, Light::Area, Light::Globe] {
+        view_cases(cases, View::OnLight, light);
+    }
+}
+
+fn view_cases(cases: &mut Vec<Case>, view: View, light: Light) {
+    for layout in [Layout::Ball, Layout::Cube, Layout::Floor] {
+        for (tau, g) in [(1.0, 0.0), (1.0, 0.99999), (1e2, 0.0), (1e2, -0.9)] {
+            for technique in ["bpt", "all"] {
+                let axes = Axes { tau, g, layout, light, view, technique, ..Axes::default() };
+                cases.push(Case::new("view", axes, Check::Sane));
             }
         }
     }
@@ -358,6 +404,56 @@ fn lengths(cases: &mut Vec<Case>) {
                 cases.push(Case::new("length", axes.clone(), Check::Oracle));
                 let axes = Axes { layout: Layout::Floor, light: Light::Area, ..axes };
                 cases.push(Case::new("length", axes, Check::Sane));
+            }
+        }
+    }
+}
+
+/// Reflectance and transmittance of slabs, of any size, against exact values.
+fn slabs(cases: &mut Vec<Case>) {
+    for (index, slab) in exact::cases("slab_RT").iter().enumerate() {
+        for cosine in slab.inputs("mu0") {
+            let expected = |name| slab.expected(&[&format!("mu0_{cosine}"), name]);
+            let check = Check::Exactly([expected("R_total"), expected("T_total")]);
+            for technique in ["hit", "bpt"] {
+                // A thousand vertices with a thousand others.
+                if technique == "bpt" && slab.input("tau") > 10.0 {
+                    continue;
+                }
+                let axes = Axes {
+                    tau: slab.input("tau"),
+                    albedo: slab.input("albedo"),
+                    g: slab.input("g"),
+                    scale: SCALES[index % SCALES.len()],
+                    layout: Layout::Slab,
+                    light: Light::Sides,
+                    view: View::OnSlab(cosine),
+                    technique,
+                    // Thick slabs that hardly absorb have long paths.
+                    max_length: 1_000_000,
+                    ..Axes::default()
+                };
+                cases.push(Case::new("slab", axes, check.clone()));
+            }
+        }
+    }
+}
+
+/// A camera exactly on a photon of its first iteration, with kernels from nothing to everything.
+fn on_photons(cases: &mut Vec<Case>) {
+    for light in LIGHTS {
+        // Which of two lights a photon comes from depends on what the camera sees.
+        if matches!(light, Light::Uneven(_)) {
+            continue;
+        }
+        for layout in [Layout::Ball, Layout::Floor, Layout::Room] {
+            for (tau, radius) in
+                [(1.0, None), (1.0, Some(1e-7)), (1.0, Some(1.0)), (1e2, None), (1e2, Some(1e-7))]
+            {
+                for (index, technique) in [(0, "bpt"), (0, "all"), (101, "all")] {
+                    let axes = Axes { tau, light, layout, radius, technique, ..Axes::default() };
+                    cases.push(Case::new("photon", axes, Check::OnPhoton(index)));
+                }
             }
         }
     }
