@@ -1,32 +1,25 @@
 //! What is read from files, with files that are nearly right and with noise: an error or a result, never a panic.
 
+#[path = "support/readers.rs"]
+mod readers;
+
+use std::path::Path;
+use std::sync::OnceLock;
+
 use proptest::prelude::*;
+use readers::{little, read_mesh, read_scene, read_settings, read_state, sealed};
 use upbp_core::{Renderer, Settings};
-use upbp_scene::obj::ObjMesh;
 use upbp_scene::{ReadyScene, SceneDescription};
 
 const SCENES: [&str; 3] = [
     include_str!("../examples/scenes/cornell_media.ron"),
     include_str!("../examples/scenes/glass_and_null.ron"),
-    r#"(version: 1, camera: Perspective(origin: (0, 1, 3), target: (0, 1, 0), fov_degrees: 40, lens_radius: 0.1),
-    film: (width: 8, height: 8, crop: (x: 1, y: 1, width: 4, height: 4)), outside: "haze",
-    media: { "m": Homogeneous(sigma_a: 0.1, sigma_s: (0.5, 1, 2), phase: Blend([(1, Rayleigh), (2, HenyeyGreenstein(0.9))])),
-        "haze": Homogeneous(sigma_s: 0.01, emission: 0.1) },
-    materials: { "white": Lambert(0.7), "null": Null, "metal": Metal(alpha: 0.1, reflectance: 0.9), "glass": Dielectric(ior: 1.5) },
-    shapes: [
-        (name: "floor", material: "white", geometry: Quad(origin: (-2, 0, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0))),
-        (material: "null", interior: "m", priority: 3, geometry: Sphere(centre: (0, 1, 0), radius: 0.5)),
-        (material: "glass", geometry: Box(min: (-1, 0, -1), max: (-0.5, 1, -0.5))),
-        (material: "metal", geometry: Mesh(positions: [(0, 0, 0), (1, 0, 0), (0, 1, 0)], indices: [(0, 1, 2)], scale: 2), emission: 1),
-    ],
-    lights: [Point(position: (0, 3, 0), intensity: (5, 5, 5)), Spot(position: (0, 2, 1), target: (0, 0, 0), intensity: 1, cutoff_degrees: 20)])"#,
+    include_str!("data/parsers/everything.ron"),
 ];
 
-const SETTINGS: &str = "(techniques: \"bpt+surf+pp3d\", seed: 7, light_paths: Count(100), beams: 10, connections: 2, min_length: 1, \
-    max_length: 12, roulette: false, heuristic: Power, photon_beams: Long, radii: (pb2d: Absolute(0.1), surf: Scene(1e-3)), \
-    progressive: false, memory: 64)";
+const SETTINGS: &str = include_str!("data/parsers/settings.ron");
 
-const MESH: &str = "# a mesh\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nvt 0 0\ng name\nf 1//1 2//1 3//1\nf -4 -2 -1\nf 1/1/1 2/1/1 3/1/1 4/1/1\n";
+const MESH: &str = include_str!("data/parsers/mesh.obj");
 
 /// What takes the place of a piece.
 const PIECES: [&str; 24] = [
@@ -85,60 +78,34 @@ fn change(text: &str, changes: &[(usize, usize, usize, bool)]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Reads a scene; one that is accepted is written, read again, and a little of it rendered.
-fn read_scene(text: &str) {
-    let Ok(mut description) = SceneDescription::from_ron(text) else { return };
-    let written = description.to_ron().expect("what was read can be written");
-    assert_eq!(SceneDescription::from_ron(&written).expect("what was written can be read"), description);
-    description.film = upbp_scene::description::Film {
-        width: upbp_scene::description::Count::new(3).expect("a size"),
-        height: upbp_scene::description::Count::new(2).expect("a size"),
-        crop: None,
-    };
-    let Ok(scene) = ReadyScene::build(&description, "no/such/folder") else { return };
-    let settings = Settings {
-        techniques: "all".parse().expect("technique names"),
-        light_paths: upbp_core::LightPaths::Count(8),
-        max_length: 6,
-        ..Settings::default()
-    };
-    if let Ok(mut renderer) = Renderer::new(&scene, settings.validate().expect("valid settings")) {
-        renderer.iterate();
-        let fine = |value: &f32| value.is_finite() && *value >= 0.0;
-        assert!(renderer.film().image().pixels.iter().flatten().all(fine), "{text}");
-    }
-}
-
-fn read_settings(text: &str) {
-    if let Ok(settings) = Settings::from_ron(text) {
-        let _ = settings.validate();
-    }
-}
-
-fn read_mesh(text: &str) {
-    if let Ok(mesh) = ObjMesh::parse(text) {
-        let _ = upbp_accel::TriangleMesh::new(mesh.positions, mesh.indices, mesh.normals);
-    }
-}
-
+/// Reads an image. A file for each thread: tests run at the same time.
 fn read_image(bytes: &[u8]) {
-    // A file for each thread: tests run at the same time.
     let name = format!("image_{:?}.exr", std::thread::current().id());
-    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    std::fs::write(&path, bytes).expect("a writable folder");
-    let _ = upbp_scene::light::EnvironmentImage::load(&path);
-    let _ = upbp_core::read_exr(&path);
-    let _ = std::fs::remove_file(&path);
+    readers::read_image(bytes, &Path::new(env!("CARGO_TARGET_TMPDIR")).join(name));
 }
 
 /// A good image.
 fn image() -> &'static [u8] {
-    static IMAGE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+    static IMAGE: OnceLock<Vec<u8>> = OnceLock::new();
     IMAGE.get_or_init(|| {
-        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("seed.exr");
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("seed.exr");
         exr::prelude::write_rgb_file(&path, 8, 4, |x, y| (x as f32, y as f32, 1.0_f32))
             .expect("a writable folder");
         std::fs::read(&path).expect("the file")
+    })
+}
+
+/// A good state.
+fn state() -> &'static [u8] {
+    static STATE: OnceLock<Vec<u8>> = OnceLock::new();
+    STATE.get_or_init(|| {
+        let scene = ReadyScene::from_ron_str(SCENES[2], "").expect("a good scene");
+        let mut renderer =
+            Renderer::new(&scene, little().validate().expect("valid settings")).expect("a renderer");
+        renderer.iterate();
+        let mut bytes = Vec::new();
+        renderer.state().write(&mut bytes).expect("a vector takes all");
+        bytes
     })
 }
 
@@ -166,12 +133,35 @@ proptest! {
     }
 
     #[test]
+    fn states_whose_header_is_nearly_right(changes in changes()) {
+        let length = u32::from_le_bytes(state()[12..16].try_into().expect("four bytes")) as usize;
+        let header = str::from_utf8(&state()[16..16 + length]).expect("text");
+        let changed = change(header, &changes);
+        read_state(&sealed(&[&state()[..16], changed.as_bytes(), &state()[16 + length..]].concat()));
+    }
+
+    #[test]
+    fn states_whose_sums_are_nearly_right(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+    ) {
+        let mut bytes = state().to_vec();
+        for (place, value) in changes {
+            let place = place.index(bytes.len());
+            bytes[place] = value;
+        }
+        read_state(&bytes);
+        read_state(&sealed(&bytes));
+    }
+
+    #[test]
     fn noise(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
         let text = String::from_utf8_lossy(&bytes);
         read_scene(&text);
         read_settings(&text);
         read_mesh(&text);
         read_image(&bytes);
+        read_state(&bytes);
+        read_state(&sealed(&bytes));
     }
 
     #[test]
@@ -190,6 +180,11 @@ proptest! {
         }
         read_image(&bytes);
     }
+}
+
+#[test]
+fn a_good_state_is_sealed_already() {
+    assert!(sealed(state()) == state());
 }
 
 #[test]

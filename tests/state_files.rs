@@ -2,10 +2,13 @@
 
 #[path = "../examples/host_renderer/scene.rs"]
 mod host;
+#[path = "support/readers.rs"]
+mod readers;
 
 use std::sync::OnceLock;
 
 use proptest::prelude::*;
+use readers::sealed;
 use upbp_core::{ErrorPoint, LightPaths, Renderer, Settings, State, StateError};
 
 /// The bytes of a good state.
@@ -79,27 +82,21 @@ proptest! {
     }
 }
 
+/// The header of the good state.
+fn header() -> &'static str {
+    let length = u32::from_le_bytes(good()[12..16].try_into().expect("four bytes")) as usize;
+    str::from_utf8(&good()[16..16 + length]).expect("text")
+}
+
 /// A file with a header of our own, its checksum right: what a program with bad intentions would write.
 fn forged(header: &str) -> Vec<u8> {
-    let mut bytes = b"UPBPSTAT\x01\0\0\0".to_vec();
-    bytes.extend((header.len() as u32).to_le_bytes());
-    bytes.extend(header.as_bytes());
-    let mut checksum = 0xcbf2_9ce4_8422_2325_u64;
-    let padded = [header.as_bytes(), &[0; 8][header.len() % 8..]].concat();
-    let words = padded.chunks(8).map(|word| u64::from_le_bytes(word.try_into().expect("eight bytes")));
-    for word in words.chain([header.len() as u64]) {
-        checksum = (checksum ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        checksum ^= checksum >> 32;
-    }
-    bytes.extend(checksum.to_le_bytes());
-    bytes
+    sealed(&[&good()[..16], header.as_bytes()].concat())
 }
 
 #[test]
 fn sizes_in_a_header_cost_no_memory() {
-    let length = u32::from_le_bytes(good()[12..16].try_into().expect("four bytes")) as usize;
-    let header = str::from_utf8(&good()[16..16 + length]).expect("text");
-    assert_eq!(forged(header), good()[..16 + length + 8], "the forger knows the format");
+    let header = header();
+    assert_eq!(forged(header), good()[..16 + header.len() + 8], "the forger knows the format");
 
     let huge = header
         .replace("film:(5,5)", "film:(4294967295,4294967295)")
@@ -127,4 +124,20 @@ fn sizes_in_a_header_cost_no_memory() {
         let error = State::read(forged(&changed).as_slice()).expect_err(to);
         assert!(error.to_string().contains("header"), "{to}: {error}");
     }
+}
+
+#[test]
+fn counts_of_any_size_are_merged_and_reported() {
+    let read = |iterations: &str| {
+        let mut changed = header().replace("[(0,2),(7,8)]", iterations);
+        for count in ["dropped", "cut_walks", "lost_walks", "boundary_conflicts"] {
+            changed = changed.replace(&format!("{count}:0"), &format!("{count}:{}", u64::MAX));
+        }
+        let rows = &good()[16 + header().len()..];
+        State::read(sealed(&[&good()[..16], changed.as_bytes(), rows].concat()).as_slice()).expect("a state")
+    };
+    let mut state = read("[(0,2),(7,8)]");
+    state.merge(read("[(3,6)]")).expect("no iterations in common");
+    let text = state.report().to_string();
+    assert!(text.contains(&format!("{} walks lost", u64::MAX)), "{text}");
 }

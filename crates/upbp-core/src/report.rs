@@ -231,7 +231,7 @@ impl fmt::Display for Report {
                 c.cut_walks
             )?;
         }
-        if c.dropped + c.lost_walks + c.boundary_conflicts > 0 {
+        if [c.dropped, c.lost_walks, c.boundary_conflicts].iter().any(|count| *count > 0) {
             writeln!(
                 f,
                 "dropped: {} contributions that were not finite; geometry that is not closed: {} walks lost, {} boundaries ignored",

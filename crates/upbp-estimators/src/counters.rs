@@ -32,20 +32,21 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// Adds the counts of another pass.
+    /// Adds the counts of another pass. What comes from files may be of any size: sums end at the largest number.
     pub fn add(&mut self, other: &Self) {
-        self.light_edges += other.light_edges;
-        self.camera_edges += other.camera_edges;
-        self.shadow_rays += other.shadow_rays;
-        self.light_vertices += other.light_vertices;
-        self.photon_beams += other.photon_beams;
-        for (sum, count) in self.contributions.iter_mut().zip(other.contributions) {
-            *sum += count;
+        let sum = |a: &mut u64, b: u64| *a = a.saturating_add(b);
+        sum(&mut self.light_edges, other.light_edges);
+        sum(&mut self.camera_edges, other.camera_edges);
+        sum(&mut self.shadow_rays, other.shadow_rays);
+        sum(&mut self.light_vertices, other.light_vertices);
+        sum(&mut self.photon_beams, other.photon_beams);
+        for (own, count) in self.contributions.iter_mut().zip(other.contributions) {
+            sum(own, count);
         }
-        self.dropped += other.dropped;
-        self.cut_walks += other.cut_walks;
-        self.lost_walks += other.lost_walks;
-        self.boundary_conflicts += other.boundary_conflicts;
+        sum(&mut self.dropped, other.dropped);
+        sum(&mut self.cut_walks, other.cut_walks);
+        sum(&mut self.lost_walks, other.lost_walks);
+        sum(&mut self.boundary_conflicts, other.boundary_conflicts);
     }
 
     /// Contributions of one technique.
