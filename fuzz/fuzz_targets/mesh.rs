@@ -1,7 +1,8 @@
-//! Text as an OBJ file.
+//! Text as an OBJ file: refused, or made a shape.
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|text: &str| {
-    let _ = upbp_scene::obj::ObjMesh::parse(text);
-});
+#[path = "../../tests/support/readers.rs"]
+mod readers;
+
+libfuzzer_sys::fuzz_target!(|text: &str| readers::read_mesh(text));

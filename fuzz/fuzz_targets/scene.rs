@@ -1,7 +1,8 @@
-//! Text as a scene file: refused or built.
+//! Text as a scene file: refused, or built and rendered a little.
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|text: &str| {
-    let _ = upbp_scene::ReadyScene::from_ron_str(text, "no/such/folder");
-});
+#[path = "../../tests/support/readers.rs"]
+mod readers;
+
+libfuzzer_sys::fuzz_target!(|text: &str| readers::read_scene(text));

@@ -2,6 +2,7 @@
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|text: &str| {
-    let _ = upbp_core::Settings::from_ron(text).map(upbp_core::Settings::validate);
-});
+#[path = "../../tests/support/readers.rs"]
+mod readers;
+
+libfuzzer_sys::fuzz_target!(|text: &str| readers::read_settings(text));

@@ -451,7 +451,7 @@ fn on_photons(cases: &mut Vec<Case>) {
                 [(1.0, None), (1.0, Some(1e-7)), (1.0, Some(1.0)), (1e2, None), (1e2, Some(1e-7))]
             {
                 for (index, technique) in [(0, "bpt"), (0, "all"), (101, "all")] {
-                    let axes = Axes { tau, light, layout, radius, technique, ..Axes::default() };
+                    let axes = Axes { tau, layout, light, technique, radius, ..Axes::default() };
                     cases.push(Case::new("photon", axes, Check::OnPhoton(index)));
                 }
             }

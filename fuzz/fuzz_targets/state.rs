@@ -1,0 +1,11 @@
+//! Bytes as a state file, as they are and with the lengths and checksums that they should have.
+
+#![no_main]
+
+#[path = "../../tests/support/readers.rs"]
+mod readers;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    readers::read_state(bytes);
+    readers::read_state(&readers::sealed(bytes));
+});
