@@ -188,6 +188,24 @@ fn a_good_state_is_sealed_already() {
 }
 
 #[test]
+fn images_larger_than_their_file_are_refused() {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("vast.exr");
+    let name = b"dataWindow\0box2i\0\x10\0\0\0";
+    let window =
+        image().windows(name.len()).position(|part| part == name).expect("a data window") + name.len();
+    let mut bytes = image().to_vec();
+    // The last column and the last row.
+    bytes[window + 8..window + 12].copy_from_slice(&8_388_703_i32.to_le_bytes());
+    bytes[window + 12..window + 16].copy_from_slice(&95_i32.to_le_bytes());
+    std::fs::write(&path, bytes).expect("a writable folder");
+    let expected = "more pixels than the file can hold";
+    let error = upbp_core::read_exr(&path).expect_err("gigabytes");
+    assert!(error.to_string().contains(expected), "{error}");
+    let error = upbp_scene::light::EnvironmentImage::load(&path).expect_err("gigabytes");
+    assert!(format!("{error:?}").contains(expected), "{error:?}");
+}
+
+#[test]
 fn what_nests_deeply_is_refused() {
     for depth in [10, 100, 1000, 100_000] {
         let phase = "Blend([(1, ".repeat(depth) + "Isotropic" + &")])".repeat(depth);

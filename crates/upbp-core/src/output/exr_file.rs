@@ -67,6 +67,9 @@ fn push(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, prefix: &str, ima
 /// # Errors
 /// What the file system or the decoder says.
 pub fn read_exr(path: &Path) -> std::result::Result<Picture, OutputError> {
+    let unreadable =
+        |error: exr::error::Error| OutputError::Read { path: path.to_owned(), reason: error.to_string() };
+    check_size(path).map_err(unreadable)?;
     let image = read_first_rgba_layer_from_file(
         path,
         |size, _| Picture {
@@ -79,6 +82,22 @@ pub fn read_exr(path: &Path) -> std::result::Result<Picture, OutputError> {
             picture.pixels[index] = [r, g, b];
         },
     )
-    .map_err(|error| OutputError::Read { path: path.to_owned(), reason: error.to_string() })?;
+    .map_err(unreadable)?;
     Ok(image.layer_data.channel_data.pixels)
+}
+
+/// Refuses an image that says it is larger than its file can hold: all memory is taken before the first pixel is read.
+fn check_size(path: &Path) -> exr::error::UnitResult {
+    // No compression of the format makes more of a byte; the rest is for small images.
+    const BYTES_PER_BYTE: u64 = 1100;
+    const SMALL: u64 = 1 << 16;
+    let told = exr::meta::MetaData::read_from_file(path, false)?
+        .headers
+        .iter()
+        .map(|layer| (layer.layer_size.area() as u64).saturating_mul(layer.channels.bytes_per_pixel as u64))
+        .fold(0, u64::saturating_add);
+    if told > SMALL.saturating_add(BYTES_PER_BYTE.saturating_mul(std::fs::metadata(path)?.len())) {
+        return Err(exr::error::Error::Invalid("more pixels than the file can hold".into()));
+    }
+    Ok(())
 }

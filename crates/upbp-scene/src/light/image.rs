@@ -117,6 +117,7 @@ impl EnvironmentImage {
             height: usize,
             values: Vec<Spectrum>,
         }
+        check_size(path).map_err(EnvironmentImageError::Unreadable)?;
         let image = read()
             .no_deep_data()
             .largest_resolution_level()
@@ -319,4 +320,20 @@ impl Emitter for ImageEnvironment {
             pdf_direction: 1.0 / disc_area(bounds),
         })
     }
+}
+
+/// Refuses an image that says it is larger than its file can hold: all memory is taken before the first pixel is read.
+fn check_size(path: &Path) -> exr::error::UnitResult {
+    // No compression of the format makes more of a byte; the rest is for small images.
+    const BYTES_PER_BYTE: u64 = 1100;
+    const SMALL: u64 = 1 << 16;
+    let told = exr::meta::MetaData::read_from_file(path, false)?
+        .headers
+        .iter()
+        .map(|layer| (layer.layer_size.area() as u64).saturating_mul(layer.channels.bytes_per_pixel as u64))
+        .fold(0, u64::saturating_add);
+    if told > SMALL.saturating_add(BYTES_PER_BYTE.saturating_mul(std::fs::metadata(path)?.len())) {
+        return Err(exr::error::Error::Invalid("more pixels than the file can hold".into()));
+    }
+    Ok(())
 }
