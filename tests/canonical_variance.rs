@@ -32,8 +32,8 @@ use upbp_estimators::scene::{
 };
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, MediumId, PathLengths, Plan, PlanChoices, Ray, Spectrum, StreamKind,
-    TechniqueSet, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, MediumId, PathLengths, Plan, PlanChoices, Ray, Spectrum,
+    StreamKind, TechniqueSet, World,
 };
 
 /// There are no surfaces.
@@ -244,6 +244,8 @@ impl Setup {
                 light_paths: paths,
                 beam_paths: paths,
                 connections: 1,
+                next_events: 1,
+                look_ups: LookUps::ALL,
                 vertices_per_light_path: 1.0,
                 lengths: PathLengths { min: 2, max: 2 },
                 roulette: false,

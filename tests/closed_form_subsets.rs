@@ -13,7 +13,7 @@ use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, PathLengths, Plan, PlanChoices, StreamKind, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, StreamKind, World,
 };
 
 const SIZE: u32 = 48;
@@ -29,6 +29,8 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> PlanChoices {
         light_paths: SIZE * SIZE,
         beam_paths: SIZE * SIZE / 2,
         connections: 1,
+        next_events: 1,
+        look_ups: LookUps::ALL,
         vertices_per_light_path: 2.3,
         lengths,
         roulette: true,
@@ -142,6 +144,23 @@ fn lights_that_are_never_hit() {
     let lengths = PathLengths { min: 2, max: 2 };
     let sets = ["nee+lt", "lt", "nee+surf+pp3d+pb2d+bp2d+bb1d", "surf+pb2d", "surf+bb1d"];
     agree(OUTSIDE, [0.0, 0.0, 2.0, 1.0, 0.0], lengths, &sets);
+}
+
+#[test]
+fn seldom_look_ups_and_many_next_events() {
+    let scene = ClosedForm::new(OUTSIDE, SIZE);
+    let usual = choices("all", PathLengths { min: 1, max: 6 }, 200);
+    let other = PlanChoices {
+        seed: 201,
+        next_events: 3,
+        look_ups: LookUps { surf: 0.25, pp3d: 0.5, pb2d: 0.25, bp2d: 0.75, bb1d: 0.125 },
+        ..usual.clone()
+    };
+    let ((expected, expected_error), (found, error)) = (mean(&scene, &usual), mean(&scene, &other));
+    let sigma = error.hypot(expected_error);
+    println!("{found:.5} ± {error:.5}, expected {expected:.5} ± {expected_error:.5}");
+    assert!((found - expected).abs() < 4.0 * sigma, "{found}, expected {expected} ± {sigma}");
+    assert!(sigma < 0.02 * expected, "too noisy to tell: {sigma} of {expected}");
 }
 
 #[test]

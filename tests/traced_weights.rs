@@ -20,8 +20,8 @@ use upbp_estimators::walk::{
     Context, Extent, LightChunk, Passage, Scratch, Site, trace_camera_path, trace_light_path,
 };
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, PathLengths, Plan, PlanChoices, Stream, StreamKind, Technique,
-    TechniqueSet, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Stream, StreamKind,
+    Technique, TechniqueSet, World,
 };
 
 /// Weights below this are compared with nothing: they are rounding of others.
@@ -100,6 +100,7 @@ impl<'a> Auditor<'a> {
         let suffix = |vertices: u32| self.camera_vertices[..vertices as usize].iter().rev().copied();
         let depth = sample.camera_depth;
         let (light, interior, lens, strategy) = match sample.joint {
+            Joint::Emission => unreachable!("no medium of the scene emits"),
             Joint::Hit(light) => (light, suffix(depth - 1).collect(), self.lens, Strategy::Hit),
             Joint::Nee { light, camera: (position, site) } => {
                 let interior = [joint(position, position, &site)].into_iter().chain(suffix(depth - 1));
@@ -215,6 +216,8 @@ fn choices() -> PlanChoices {
         light_paths: 6000,
         beam_paths: 500,
         connections: 2,
+        next_events: 1,
+        look_ups: LookUps::ALL,
         vertices_per_light_path: 2.3,
         lengths: PathLengths { min: 1, max: 8 },
         roulette: true,

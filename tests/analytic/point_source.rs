@@ -5,7 +5,7 @@
 use upbp_core::TechniqueSet;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_light_path};
-use upbp_estimators::{Kernel, Kernels, PathLengths, Plan, PlanChoices, StreamKind, World};
+use upbp_estimators::{Kernel, Kernels, LookUps, PathLengths, Plan, PlanChoices, StreamKind, World};
 
 use crate::cases::{Case, Table, cases, medium, narrow_camera, scene};
 use crate::support::Estimate;
@@ -30,6 +30,8 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             light_paths: paths,
             beam_paths: 1,
             connections: 1,
+            next_events: 1,
+            look_ups: LookUps::ALL,
             vertices_per_light_path: 1.0,
             lengths: PathLengths { min: 1, max: 1_000_000 },
             roulette: true,

@@ -1,4 +1,4 @@
-//! A view into the walks for tests: every vertex, every accepted sample with its weight.
+//! A view into the walks: every vertex, every accepted sample with its weight, and what the time goes to.
 
 use glam::Vec3;
 use upbp_media::Spectrum;
@@ -34,6 +34,8 @@ pub struct ObservedVertex<B> {
 /// What joins the two sub-paths of a sample.
 #[derive(Clone, Copy, Debug)]
 pub enum Joint<B> {
+    /// The camera sub-path went through a medium that emits.
+    Emission,
     /// The camera sub-path reached the light.
     Hit(LightEnd),
     /// A camera vertex and a point on a light.
@@ -109,6 +111,11 @@ pub trait Observer<B> {
     /// A camera sub-path's vertex has scattered.
     fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
         let _ = vertex;
+    }
+
+    /// The walk turns to a technique: to the tracing of one next event or connection, to one look-up. `None`: it goes on.
+    fn turns_to(&mut self, technique: Option<Technique>) {
+        let _ = technique;
     }
 
     /// A sample was accepted. Samples of light tracing come with the light sub-paths.

@@ -3,6 +3,7 @@
 use upbp_media::Medium;
 
 use crate::kernel::Kernel;
+use crate::look_ups::LookUps;
 use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
 use crate::scene::Scene;
 use crate::technique::{Technique, TechniqueSet};
@@ -66,12 +67,16 @@ pub struct Plan {
     pub beam_paths: u32,
     /// Light vertices that each camera vertex is connected to.
     pub connections: u32,
+    /// Points on lights that each camera vertex is connected to.
+    pub next_events: u32,
     /// Limits of the path length.
     pub lengths: PathLengths,
     /// Whether walks end by local Russian roulette.
     pub roulette: bool,
     /// Kernels with the radii of this iteration.
     pub kernels: Kernels,
+    /// How many camera sub-paths look photons up.
+    pub look_ups: LookUps,
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
 }
@@ -91,6 +96,8 @@ pub struct PlanChoices {
     pub beam_paths: u32,
     /// Light vertices that each camera vertex is connected to.
     pub connections: u32,
+    /// Points on lights that each camera vertex is connected to.
+    pub next_events: u32,
     /// Expected number of connectible vertices of a light sub-path. Must be known before the iteration: a figure of
     /// the iteration itself would correlate with its samples.
     pub vertices_per_light_path: f64,
@@ -100,6 +107,8 @@ pub struct PlanChoices {
     pub roulette: bool,
     /// Kernels.
     pub kernels: Kernels,
+    /// How many camera sub-paths look photons up.
+    pub look_ups: LookUps,
     /// Heuristic of the weights.
     pub heuristic: Heuristic,
     /// Extent of photon beams.
@@ -123,7 +132,10 @@ impl Plan {
     pub fn new<S: Scene>(scene: &S, choices: &PlanChoices) -> Self {
         let PlanChoices { techniques, light_paths, kernels, .. } = *choices;
         let beam_paths = choices.beam_paths.min(light_paths);
-        let on = |technique, value: f64| if techniques.has(technique) { value } else { 0.0 };
+        let look_ups = choices.look_ups;
+        let on = |technique, value: f64| {
+            if techniques.has(technique) { value * f64::from(look_ups.probability(technique)) } else { 0.0 }
+        };
         let paths = f64::from(light_paths);
         let beams = f64::from(beam_paths);
         // The two numbers of a photon beam are counted with N_B, all others with N_L (docs/theory.md, section 2.1).
@@ -158,7 +170,7 @@ impl Plan {
         let mis = MisPlan {
             heuristic: choices.heuristic,
             hit: on(Technique::Hit, 1.0),
-            nee: on(Technique::Nee, 1.0),
+            nee: on(Technique::Nee, f64::from(choices.next_events)),
             connect,
             light_tracing: on(Technique::LightTracing, paths),
             surf: on(Technique::Surf, paths * kernels.surf.effective_volume()),
@@ -173,9 +185,11 @@ impl Plan {
             light_paths,
             beam_paths,
             connections: if connect > 0.0 { choices.connections } else { 0 },
+            next_events: if techniques.has(Technique::Nee) { choices.next_events } else { 0 },
             lengths: choices.lengths,
             roulette: choices.roulette,
             kernels,
+            look_ups,
             mis,
         }
     }

@@ -156,6 +156,12 @@ impl TechniqueSet {
         Self(self.0 | other.0)
     }
 
+    /// The techniques in both sets.
+    #[must_use]
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
     /// Whether any of `other` is in the set.
     #[must_use]
     pub const fn intersects(self, other: Self) -> bool {

@@ -8,6 +8,7 @@ use upbp_accel::Ray;
 use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
 use crate::light_map::{LightMap, queries_beams, queries_points};
+use crate::look_ups::LookUps;
 use crate::mis::{BeamExtent, Edge, Tip};
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::scene::{Scene, Walk};
@@ -18,6 +19,7 @@ use crate::walk::{Context, Output, Passage, PhotonBeam, QueryEdge, Site, Span};
 pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf>,
+    look_ups: &LookUps,
     passage: &Passage<S::Bsdf>,
     edge: &QueryEdge,
     out: &mut Output<'_, O>,
@@ -40,18 +42,21 @@ pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf>>(
             let merges = plan.mis.merges_in(medium);
             let ray =
                 Ray { origin: passage.origin, direction: passage.direction, t_min: span.start, t_max: end };
-            let query = Query { context, passage, span, edge, medium };
-            if queries_points(&merges) {
+            let query = Query { context, look_ups, passage, span, edge, medium };
+            if queries_points(&merges) && look_ups.pb2d > 0.0 {
+                out.observer.turns_to(Some(Technique::Pb2d));
                 map.medium.around_ray(&ray, plan.kernels.pb2d.radius(), |index, t, distance2| {
                     query.merge_point(map, index, t, distance2, out);
                 });
             }
-            if queries_beams(&merges) {
+            if queries_beams(&merges) && look_ups.bb1d > 0.0 {
+                out.observer.turns_to(Some(Technique::Bb1d));
                 map.beam_tree.around_ray(&ray, plan.kernels.bb1d.radius(), |index, approach| {
                     query.merge_beam(&map.beams[index as usize], &approach, out);
                 });
             }
         }
+        out.observer.turns_to(None);
         if last {
             break;
         }
@@ -91,6 +96,7 @@ fn transmitted(density: &EdgeDensity, extent: BeamExtent) -> Spectrum {
 /// A query beam in one medium.
 struct Query<'a, 'b, S: Scene> {
     context: &'a Context<'b, S>,
+    look_ups: &'a LookUps,
     passage: &'a Passage<S::Bsdf>,
     span: &'a Span,
     edge: &'a QueryEdge,
@@ -136,7 +142,7 @@ impl<S: Scene> Query<'_, '_, S> {
             return;
         }
         let Some(foot) = self.foot(t) else { return };
-        let kernel = plan.kernels.pb2d.value(distance2) / plan.light_paths as f32;
+        let kernel = plan.kernels.pb2d.value(distance2) * self.look_ups.pb2d / plan.light_paths as f32;
         self.merge(
             &Incoming {
                 technique: Technique::Pb2d,
@@ -166,7 +172,7 @@ impl<S: Scene> Query<'_, '_, S> {
         }
         let Some((tip, throughput)) = beam_tip(self.context, beam, approach.t_segment) else { return };
         let Some(foot) = self.foot(approach.t_ray) else { return };
-        let kernel = plan.kernels.bb1d.value(approach.distance * approach.distance)
+        let kernel = plan.kernels.bb1d.value(approach.distance * approach.distance) * self.look_ups.bb1d
             / (approach.sin_theta * plan.beam_paths as f32);
         self.merge(
             &Incoming {

@@ -28,9 +28,11 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf>>(
     for _ in 0..plan.connections {
         let light = &map.vertices[stream.index(map.vertices.len())];
         if plan.lengths.contain(vertex.depth + light.depth + 1) {
+            out.observer.turns_to(Some(Technique::Connect));
             connect(context, vertex, light, factor, crossings, out);
         }
     }
+    out.observer.turns_to(None);
 }
 
 fn connect<S: Scene, O: Observer<S::Bsdf>>(

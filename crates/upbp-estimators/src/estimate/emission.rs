@@ -13,7 +13,7 @@ use crate::walk::{Output, Passage, QueryEdge};
 /// Emission of media along the whole ray to the next surface, integrated in closed form.
 ///
 /// No other technique starts a path in a medium, so the weight is one.
-pub(crate) fn emission_along<S: Scene, O>(
+pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
     edge: &QueryEdge,
@@ -28,7 +28,16 @@ pub(crate) fn emission_along<S: Scene, O>(
         let medium = &world.scene.media()[medium.0 as usize];
         if medium.emits() {
             let emitted = medium.emitted(&passage.segment(span, span.end));
-            out.add(Technique::Hit, edge.throughput * span.before.transmittance * emitted, 1.0);
+            let value = edge.throughput * span.before.transmittance * emitted;
+            if out.add(Technique::Hit, value, 1.0) {
+                out.observer.sample(&ObservedSample {
+                    technique: Technique::Hit,
+                    camera_depth: edge.depth,
+                    joint: Joint::Emission,
+                    weight: 1.0,
+                    value,
+                });
+            }
         }
     }
 }

@@ -13,5 +13,5 @@ pub(crate) use beams::along_beam;
 pub(crate) use connect::connections;
 pub(crate) use emission::{emission_along, emitter_hit, environment};
 pub(crate) use light_tracing::light_tracing;
-pub(crate) use next_event::next_event;
+pub(crate) use next_event::next_events;
 pub(crate) use points::at_point;

@@ -7,8 +7,26 @@ use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
 use crate::walk::{Context, MIN_COSINE, Output, QueryVertex, Target, clear_edge, ray_origin};
 
-/// Connects `vertex` to a light.
-pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
+/// Connects `vertex` to as many points on lights as the plan says.
+pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf>>(
+    context: &Context<'_, S>,
+    vertex: &QueryVertex<S::Bsdf>,
+    stream: &mut Stream,
+    crossings: &mut Vec<Crossing>,
+    out: &mut Output<'_, O>,
+) {
+    let plan = context.plan;
+    if plan.next_events == 0 || !plan.lengths.contain(vertex.depth + 1) {
+        return;
+    }
+    for _ in 0..plan.next_events {
+        out.observer.turns_to(Some(Technique::Nee));
+        next_event(context, vertex, stream, crossings, out);
+    }
+    out.observer.turns_to(None);
+}
+
+fn next_event<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     vertex: &QueryVertex<S::Bsdf>,
     stream: &mut Stream,
@@ -16,11 +34,7 @@ pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
     out: &mut Output<'_, O>,
 ) {
     let Context { world, plan } = *context;
-    let mis = &plan.mis;
-    if mis.nee == 0.0 || !plan.lengths.contain(vertex.depth + 1) {
-        return;
-    }
-    let scene = world.scene;
+    let (scene, mis) = (world.scene, &plan.mis);
     let Some((emitter, probability)) = world.choose_next_event(stream.uniform()) else { return };
     let light = &scene.emitters()[emitter.0 as usize];
     let Some(incident) = light.sample_incident(&world.bounds, vertex.position, stream.pair()) else {
@@ -85,7 +99,7 @@ pub(crate) fn next_event<S: Scene, O: Observer<S::Bsdf>>(
         * scattering.value
         * density.transmittance
         * incident.radiance
-        * (geometry / pdf) as f32;
+        * (geometry / (pdf * f64::from(plan.next_events))) as f32;
     if out.add(Technique::Nee, value, weight) {
         out.observer.sample(&ObservedSample {
             technique: Technique::Nee,

@@ -4,6 +4,7 @@ use upbp_media::{Medium, MediumId};
 
 use super::beams::beam_tip;
 use crate::light_map::LightMap;
+use crate::look_ups::LookUps;
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::scene::{Scene, Walk};
 use crate::technique::Technique;
@@ -20,35 +21,55 @@ const MAX_PLANE_DISTANCE: f32 = 0.3;
 pub(crate) fn at_point<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf>,
+    look_ups: &LookUps,
     vertex: &QueryVertex<S::Bsdf>,
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
     match &vertex.site {
         Site::Surface(surface) => {
-            if plan.mis.surf > 0.0 {
+            if plan.mis.surf > 0.0 && look_ups.surf > 0.0 {
                 let kernel = &plan.kernels.surf;
+                out.observer.turns_to(Some(Technique::Surf));
                 map.surface.in_ball(vertex.position, kernel.radius(), |index, distance2| {
                     let photon = &map.vertices[index as usize];
                     if lies_on(surface, vertex, photon, kernel.radius()) {
-                        merge_point(context, vertex, photon, distance2, Technique::Surf, out);
+                        merge_point(
+                            context,
+                            vertex,
+                            photon,
+                            [distance2, look_ups.surf],
+                            Technique::Surf,
+                            out,
+                        );
                     }
                 });
+                out.observer.turns_to(None);
             }
         }
         Site::Medium(medium) => {
             let merges = plan.mis.merges_in(*medium);
-            if merges.pp3d > 0.0 {
+            if merges.pp3d > 0.0 && look_ups.pp3d > 0.0 {
+                out.observer.turns_to(Some(Technique::Pp3d));
                 map.medium.in_ball(vertex.position, plan.kernels.pp3d.radius(), |index, distance2| {
                     let photon = &map.vertices[index as usize];
                     if matches!(photon.site, Site::Medium(other) if other == *medium) {
-                        merge_point(context, vertex, photon, distance2, Technique::Pp3d, out);
+                        merge_point(
+                            context,
+                            vertex,
+                            photon,
+                            [distance2, look_ups.pp3d],
+                            Technique::Pp3d,
+                            out,
+                        );
                     }
                 });
             }
-            if merges.bp2d > 0.0 {
-                beams_around(context, map, vertex, *medium, out);
+            if merges.bp2d > 0.0 && look_ups.bp2d > 0.0 {
+                out.observer.turns_to(Some(Technique::Bp2d));
+                beams_around(context, map, vertex, (*medium, look_ups.bp2d), out);
             }
+            out.observer.turns_to(None);
         }
     }
 }
@@ -66,12 +87,13 @@ fn lies_on<B>(
         && (photon.position - vertex.position).dot(normal).abs() < MAX_PLANE_DISTANCE * radius
 }
 
-/// Merges a photon with the query point: surface merging and PP3D differ in kernel and factor only.
+/// Merges a photon with the query point: surface merging and PP3D differ in kernel and factor only. The photon comes with its
+/// squared distance and with how often the look-up counts.
 fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     vertex: &QueryVertex<S::Bsdf>,
     photon: &LightVertex<S::Bsdf>,
-    distance2: f32,
+    [distance2, scale]: [f32; 2],
     technique: Technique,
     out: &mut Output<'_, O>,
 ) {
@@ -109,7 +131,7 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
     let value = vertex.throughput
         * photon.throughput
         * scattering.value
-        * (kernel.value(distance2) / plan.light_paths as f32);
+        * (kernel.value(distance2) * scale / plan.light_paths as f32);
     if out.add(technique, value, weight) {
         out.observer.sample(&ObservedSample {
             technique,
@@ -125,12 +147,12 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
     }
 }
 
-/// BP2D: photon beams around the query point.
+/// BP2D: photon beams around the query point, in its medium; `scale` is how often the look-up counts.
 fn beams_around<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf>,
     vertex: &QueryVertex<S::Bsdf>,
-    medium_id: MediumId,
+    (medium_id, scale): (MediumId, f32),
     out: &mut Output<'_, O>,
 ) {
     let Context { world, plan } = *context;
@@ -154,7 +176,7 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf>>(
         let value = vertex.throughput
             * light
             * medium.sigma_s(vertex.position)
-            * (phase * kernel.value(distance2) / plan.beam_paths as f32);
+            * (phase * kernel.value(distance2) * scale / plan.beam_paths as f32);
         if out.add(Technique::Bp2d, value, weight) {
             out.observer.sample(&ObservedSample {
                 technique: Technique::Bp2d,

@@ -46,6 +46,12 @@ pub trait Scene: Sync {
         true
     }
 
+    /// Whether any surface has no smooth lobe. If there is none, or if all lights can be hit, camera sub-paths alone find every
+    /// path, and light sub-paths may be left out.
+    fn has_specular_surfaces(&self) -> bool {
+        true
+    }
+
     /// The nearest surface that scatters, and in `crossings` (empty before, sorted by distance after) the null
     /// boundaries before it, or all along the ray if there is none.
     ///

@@ -14,6 +14,7 @@ use crate::mis::{BeamExtent, Edge, Pending};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::random::{Stream, StreamKind};
 use crate::scene::{Emitter, EmitterKind, Scene, Walk};
+use crate::technique::Technique;
 use crate::world::World;
 
 /// The walk's state between two vertices.
@@ -85,7 +86,9 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
         let vertex = LightVertex { position, towards_light: from, throughput, tip, depth, path: index, site };
         if connectible {
             if plan.mis.light_tracing > 0.0 && plan.lengths.contain(depth + 1) {
+                observer.turns_to(Some(Technique::LightTracing));
                 light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
+                observer.turns_to(None);
             }
             if plan.stores_vertices() {
                 out.vertices.push(vertex);
