@@ -16,6 +16,9 @@ use crate::media::Medium;
 pub struct Census {
     /// The techniques that run.
     pub techniques: TechniqueSet,
+    /// Whether there may be light that only merges find: of a light that cannot be hit, through a specular surface to a place that
+    /// is seen through another.
+    pub needs_merges: bool,
     /// One sentence for each reason to leave something out.
     pub reasons: Vec<String>,
 }
@@ -24,8 +27,13 @@ impl Census {
     /// Looks at the scene and at path lengths of up to `max_length` edges.
     #[must_use]
     pub fn take<S: Scene>(world: &World<'_, S>, chosen: TechniqueSet, max_length: u32) -> Self {
-        let mut census = Self { techniques: chosen, reasons: Vec::new() };
         let scene = world.scene;
+        let all_hittable = scene.emitters().iter().all(|emitter| emitter.kind().is_hittable());
+        let mut census = Self {
+            techniques: chosen,
+            needs_merges: scene.has_specular_surfaces() && !all_hittable,
+            reasons: Vec::new(),
+        };
         let scattering = scene.media().iter().any(Medium::scatters);
         if !scattering {
             census
@@ -73,7 +81,7 @@ impl Census {
 
 impl fmt::Display for Census {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "techniques: {}", self.techniques)?;
+        write!(f, "techniques that the scene can use: {}", self.techniques)?;
         for reason in &self.reasons {
             write!(f, "; {reason}")?;
         }

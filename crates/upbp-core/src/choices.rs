@@ -7,42 +7,58 @@ use crate::memory::LightCounts;
 use crate::pilot::{Neighbours, Pilot};
 use crate::radius::{Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
+use crate::stage::Stage;
+
+/// The techniques with photon beams.
+pub(crate) const BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Bp2d).with(Technique::Bb1d);
 
 /// The largest first radius of photon beams, relative to the scene's.
 const LARGEST_BEAM_RADIUS: f32 = 3e-3;
 
-/// Counts and first radii.
-pub(crate) struct Choices {
-    pub(crate) light_paths: u32,
-    pub(crate) beam_paths: u32,
-    pub(crate) radii: RadiusSchedule,
+/// A stage with all of `techniques`, for a film of `pixels` and what may take `bytes` beside it.
+pub(crate) fn everything<S: Scene>(
+    world: &World<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    pilot: &Pilot,
+    pixels: u32,
+    bytes: u64,
+) -> Stage {
+    let wanted = match settings.light_paths {
+        LightPaths::Auto => pixels,
+        LightPaths::Count(count) => count,
+    };
+    let wanted_beams = settings
+        .beams
+        .unwrap_or_else(|| enough_beams(world, settings, pilot).min(wanted / 10).max(1))
+        .min(wanted);
+    // Need grows in proportion: a part of the sub-paths takes this part of the memory.
+    let need = LightCounts::expected(pilot, wanted, wanted_beams).peak_bytes::<S::Bsdf>();
+    let part = (bytes as f64 / need.max(1.0)).min(1.0);
+    let afford = |count: u32| ((f64::from(count) * part) as u32).max(1);
+    let (light_paths, beam_paths) = (afford(wanted), afford(wanted_beams));
+    stage(world, settings, techniques, pilot, [light_paths, beam_paths])
 }
 
-impl Choices {
-    /// Chooses for a film of `pixels` and what may take `bytes` beside it.
-    pub(crate) fn new<S: Scene>(
-        world: &World<'_, S>,
-        settings: &CheckedSettings,
-        techniques: TechniqueSet,
-        pilot: &Pilot,
-        pixels: u32,
-        bytes: u64,
-    ) -> Self {
-        let wanted = match settings.light_paths {
-            LightPaths::Auto => pixels,
-            LightPaths::Count(count) => count,
-        };
-        let wanted_beams = settings
-            .beams
-            .unwrap_or_else(|| enough_beams(world, settings, pilot).min(wanted / 10).max(1))
-            .min(wanted);
-        // Need grows in proportion: a part of the sub-paths takes this part of the memory.
-        let need = LightCounts::expected(pilot, wanted, wanted_beams).peak_bytes::<S::Bsdf>();
-        let part = (bytes as f64 / need.max(1.0)).min(1.0);
-        let afford = |count: u32| ((f64::from(count) * part) as u32).max(1);
-        let (light_paths, beam_paths) = (afford(wanted), afford(wanted_beams));
-        let radii = first_radii(world, settings, techniques, pilot, [light_paths, beam_paths]);
-        Self { light_paths, beam_paths, radii }
+/// A stage with so many light sub-paths, of which so many leave beams.
+pub(crate) fn stage<S: Scene>(
+    world: &World<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    pilot: &Pilot,
+    [light_paths, beam_paths]: [u32; 2],
+) -> Stage {
+    let uses = |set: TechniqueSet, paths: u32| if techniques.intersects(set) { paths } else { 0 };
+    Stage {
+        from: 0,
+        techniques,
+        light_paths: uses(TechniqueSet::ALL.without(TechniqueSet::PT), light_paths),
+        beam_paths: uses(BEAMS, beam_paths),
+        connections: settings.connections.unwrap_or(1),
+        next_events: settings.next_events.unwrap_or(1),
+        look_ups: [1.0; 5],
+        vertices_per_light_path: pilot.vertices_per_path,
+        radii: first_radii(world, settings, techniques, pilot, [light_paths, beam_paths]),
     }
 }
 
@@ -62,7 +78,7 @@ fn enough_beams<S: Scene>(world: &World<'_, S>, settings: &CheckedSettings, pilo
 }
 
 /// First radii for so many light sub-paths, of which so many leave beams.
-pub(crate) fn first_radii<S: Scene>(
+fn first_radii<S: Scene>(
     world: &World<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
@@ -95,14 +111,11 @@ pub(crate) fn first_radii<S: Scene>(
     }
 }
 
-/// The plan of an iteration with so many light sub-paths, of which so many leave beams.
+/// The plan of an iteration of a stage.
 pub(crate) fn plan<S: Scene>(
     world: &World<'_, S>,
     settings: &Settings,
-    techniques: TechniqueSet,
-    vertices_per_light_path: f64,
-    radii: &RadiusSchedule,
-    [light_paths, beam_paths]: [u32; 2],
+    stage: &Stage,
     iteration: u64,
 ) -> Plan {
     Plan::new(
@@ -110,14 +123,16 @@ pub(crate) fn plan<S: Scene>(
         &PlanChoices {
             seed: settings.seed,
             iteration,
-            techniques,
-            light_paths,
-            beam_paths,
-            connections: settings.connections,
-            vertices_per_light_path,
+            techniques: stage.techniques,
+            light_paths: stage.light_paths,
+            beam_paths: stage.beam_paths,
+            connections: stage.connections,
+            next_events: stage.next_events,
+            vertices_per_light_path: stage.vertices_per_light_path,
             lengths: PathLengths { min: settings.min_length, max: settings.max_length },
             roulette: settings.roulette,
-            kernels: radii.kernels(iteration),
+            kernels: stage.radii.kernels(iteration),
+            look_ups: stage.look_ups(),
             heuristic: settings.heuristic,
             photon_beams: settings.photon_beams,
             query_beams: settings.query_beams,

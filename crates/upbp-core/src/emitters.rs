@@ -186,7 +186,7 @@ impl<B> Observer<B> for Seen {
     fn sample(&mut self, sample: &ObservedSample<B>) {
         let seen = Contribution { value: f64::from(sample.value.mean()), weight: sample.weight };
         match sample.joint {
-            Joint::Hit(_) => {}
+            Joint::Emission | Joint::Hit(_) => {}
             Joint::Nee { light: end, .. } => self.next_event.push((end.emitter.0, seen)),
             Joint::Connect { path, .. } | Joint::LightTracing { path, .. } | Joint::Merge { path, .. } => {
                 self.emission.push((path, seen));

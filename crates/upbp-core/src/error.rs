@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use upbp_estimators::TechniqueSet;
 use upbp_estimators::WorldError;
 
 /// A setting that makes no sense.
@@ -20,6 +21,18 @@ pub struct SettingsError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
+    /// A plan that does not go with the scene or the settings.
+    #[error(
+        "plan, stage from iteration {from}: {extra} cannot be used here, expected techniques of {techniques}"
+    )]
+    Plan {
+        /// The first iteration of the stage.
+        from: u64,
+        /// The techniques that are ruled out.
+        extra: TechniqueSet,
+        /// Those that are not.
+        techniques: TechniqueSet,
+    },
     /// A setting.
     #[error(transparent)]
     Settings(#[from] SettingsError),

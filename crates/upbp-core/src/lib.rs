@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod adapt;
 mod census;
 mod choices;
 mod emitters;
@@ -10,13 +11,16 @@ mod memory;
 mod output;
 mod passes;
 mod pilot;
+mod planner;
 mod radius;
 mod render;
 mod report;
 mod settings;
+mod stage;
 mod state;
 mod stop;
 mod sum;
+mod techniques;
 
 pub use glam;
 /// Participating media, phase functions, spectra.
@@ -31,8 +35,10 @@ pub use radius::{Radii, Radius, RadiusSchedule};
 pub use render::Renderer;
 pub use report::{ErrorPoint, ErrorSeries, PassSeconds, Report};
 pub use settings::{CheckedSettings, LightPaths, Settings};
+pub use stage::{RenderPlan, Stage};
 pub use state::{Identity, State};
 pub use stop::{Canceller, Outcome, Progress, Stop, StopReason};
+pub use techniques::{Techniques, UnknownTechniques};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic};
 pub use upbp_estimators::{
     BodyId, Counters, Interior, Layer, MediumId, MediumStack, Ray, Spectrum, Technique, TechniqueSet, check,

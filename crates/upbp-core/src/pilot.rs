@@ -6,13 +6,15 @@
 use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
+use rayon::prelude::*;
 use upbp_accel::{SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{ObservedVertex, Observer};
 use upbp_estimators::scene::Scene;
 use upbp_estimators::walk::{Context, LightVertex, PhotonBeam, Scratch, Site, trace_camera_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, PathLengths, Plan, PlanChoices, StreamKind, TechniqueSet, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, StreamKind, TechniqueSet,
+    World,
 };
 
 use crate::emitters::pixel;
@@ -28,6 +30,8 @@ const BEAM_PATHS: u32 = 1024;
 const CAMERA_PATHS: u64 = 1024;
 /// Queries of each kind that are measured.
 const QUERIES: usize = 256;
+/// Light vertices that distances are measured to: those of the first light sub-paths.
+const NEIGHBOURS: usize = 16384;
 
 /// What the pilot found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -94,6 +98,8 @@ pub(crate) fn run<S: Scene>(
             light_paths: LIGHT_PATHS,
             beam_paths: BEAM_PATHS,
             connections: 1,
+            next_events: 1,
+            look_ups: LookUps::ALL,
             vertices_per_light_path: 1.0,
             lengths: PathLengths { min: settings.min_length, max: settings.max_length },
             roulette: settings.roulette,
@@ -122,24 +128,28 @@ pub(crate) fn run<S: Scene>(
     let queries = camera_queries(world, &plan);
     let beam_paths = f64::from(plan.beam_paths);
     let paths = f64::from(plan.light_paths);
-
-    let surface: Vec<_> = photons(&light.vertices, |site| matches!(site, Site::Surface(_)));
-    let medium: Vec<_> = photons(&light.vertices, |site| matches!(site, Site::Medium(_)));
+    let near = first_paths(&light.vertices, paths);
+    let all_photons =
+        |keep: fn(&Site<S::Bsdf>) -> bool| light.vertices.iter().filter(|v| keep(&v.site)).count() as f64;
+    let (on_surfaces, in_media) =
+        (|site: &Site<_>| matches!(site, Site::Surface(_)), |site: &Site<_>| matches!(site, Site::Medium(_)));
+    let surface: Vec<_> = photons(near.0, on_surfaces);
+    let medium: Vec<_> = photons(near.0, in_media);
     let around = |points: &[Vec3], photons: &[Vec3], paths, dimension| {
-        neighbours(points, photons.len(), 8, paths, dimension, |query, i| query.distance(photons[i]))
+        neighbours(points, photons.len(), 8, paths, dimension, |query: &Vec3, i| query.distance(photons[i]))
     };
     let segments = light.beams.iter().map(|beam| (beam.segment, ())).collect();
     let pieces = SegmentTree::build(segments, SplitParams::default()).pieces();
-    let looked_up = |on: bool, photons: &[Vec3]| if on { photons.len() as f64 / paths } else { 0.0 };
+    let looked_up = |on: bool, keep| if on { all_photons(keep) / paths } else { 0.0 };
     Pilot {
         vertices_per_path: light.vertices.len() as f64 / paths,
-        surface_per_path: looked_up(plan.mis.surf > 0.0, &surface),
-        medium_per_path: looked_up(plan.stores_medium_photons(), &medium),
+        surface_per_path: looked_up(plan.mis.surf > 0.0, on_surfaces),
+        medium_per_path: looked_up(plan.stores_medium_photons(), in_media),
         pieces_per_path: pieces as f64 / beam_paths,
         beams_per_path: light.beams.len() as f64 / beam_paths,
-        surf: around(&queries.surfaces, &surface, paths, 2.0),
-        pp3d: around(&queries.media, &medium, paths, 3.0),
-        pb2d: neighbours(&queries.edges, medium.len(), 8, paths, 2.0, |edge, i| {
+        surf: around(&queries.surfaces, &surface, near.1, 2.0),
+        pp3d: around(&queries.media, &medium, near.1, 3.0),
+        pb2d: neighbours(&queries.edges, medium.len(), 8, near.1, 2.0, |edge, i| {
             edge.distance_to_point(medium[i])
         }),
         bp2d: neighbours(&queries.media, light.beams.len(), 8, beam_paths, 2.0, |point, i| {
@@ -151,18 +161,26 @@ pub(crate) fn run<S: Scene>(
     }
 }
 
+/// The vertices of the first light sub-paths, and how many sub-paths those are.
+fn first_paths<B>(vertices: &[LightVertex<B>], paths: f64) -> (&[LightVertex<B>], f64) {
+    match vertices.get(NEIGHBOURS) {
+        None => (vertices, paths),
+        Some(next) => (&vertices[..NEIGHBOURS], f64::from(next.path + 1)),
+    }
+}
+
 fn photons<B>(vertices: &[LightVertex<B>], keep: impl Fn(&Site<B>) -> bool) -> Vec<Vec3> {
     vertices.iter().filter(|v| keep(&v.site)).map(|v| v.position).collect()
 }
 
 /// Median over the queries of the distance to the `rank`-th nearest of `count` elements, by looking at all of them.
-fn neighbours<Q>(
+fn neighbours<Q: Sync>(
     queries: &[Q],
     count: usize,
     rank: usize,
     paths: f64,
     dimension: f64,
-    distance: impl Fn(&Q, usize) -> f32,
+    distance: impl Fn(&Q, usize) -> f32 + Sync,
 ) -> Option<Neighbours> {
     // Enough elements that the rank-th is still near.
     let rank = rank.min(count / 4).max(1);
@@ -170,7 +188,7 @@ fn neighbours<Q>(
         return None;
     }
     let mut nearest: Vec<f32> = queries
-        .iter()
+        .par_iter()
         .filter_map(|query| {
             let mut all: Vec<f32> = (0..count).map(|i| distance(query, i)).collect();
             let (_, value, _) = all.select_nth_unstable_by(rank - 1, f32::total_cmp);

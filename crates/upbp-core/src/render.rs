@@ -9,8 +9,9 @@ use upbp_estimators::scene::{Camera, EmitterId, Scene};
 use upbp_estimators::walk::Context;
 use upbp_estimators::{LightMap, Plan, StreamKind, Technique, TechniqueSet, World};
 
+use crate::adapt;
 use crate::census::Census;
-use crate::choices::{Choices, first_radii, plan};
+use crate::choices::{everything, plan, stage};
 use crate::emitters;
 use crate::error::{RenderError, StateError};
 use crate::film::{Film, Pixel};
@@ -18,10 +19,13 @@ use crate::iterations::MAX_ITERATIONS;
 use crate::memory::LightCounts;
 use crate::passes::{BLACK, Lists, add_splats, camera_pass, light_pass};
 use crate::pilot::{self, Pilot};
+use crate::planner::Planner;
 use crate::report::{ErrorPoint, PassTimes, Report};
 use crate::settings::CheckedSettings;
+use crate::stage::{RenderPlan, Stage};
 use crate::state::{Identity, Record, State, fingerprint};
 use crate::stop::{Canceller, Outcome, Progress, Stop, StopReason};
+use crate::techniques::Techniques;
 
 /// A render of one scene.
 ///
@@ -30,6 +34,8 @@ use crate::stop::{Canceller, Outcome, Progress, Stop, StopReason};
 pub struct Renderer<'a, S: Scene> {
     world: World<'a, S>,
     pilot: Pilot,
+    /// Chooses the plan, unless it is given.
+    planner: Option<Planner>,
     state: State,
     /// The iterations that are rendered.
     range: Range<u64>,
@@ -39,15 +45,40 @@ pub struct Renderer<'a, S: Scene> {
 }
 
 impl<'a, S: Scene> Renderer<'a, S> {
-    /// Takes the census and runs the pilot.
+    /// Takes the census, runs the pilot, and makes a plan.
     ///
     /// # Errors
     /// A scene whose bounds, powers or crop make no sense, or a film that exceeds the memory budget.
     pub fn new(scene: &'a S, settings: CheckedSettings) -> Result<Self, RenderError> {
+        Self::prepare(scene, settings, None)
+    }
+
+    /// As [`new`](Self::new), but with a plan that was made before, perhaps on another machine, and does not change.
+    ///
+    /// # Errors
+    /// As `new`; or the plan has techniques that the settings or the scene rule out.
+    pub fn with_plan(scene: &'a S, settings: CheckedSettings, plan: RenderPlan) -> Result<Self, RenderError> {
+        Self::prepare(scene, settings, Some(plan))
+    }
+
+    fn prepare(
+        scene: &'a S,
+        settings: CheckedSettings,
+        frozen: Option<RenderPlan>,
+    ) -> Result<Self, RenderError> {
         let start = Instant::now();
         let mut world = World::new(scene)?;
-        let census = Census::take(&world, settings.techniques, settings.max_length);
+        let census = Census::take(&world, settings.techniques.candidates(), settings.max_length);
         let techniques = census.techniques;
+        if let Some(stage) =
+            frozen.iter().flat_map(RenderPlan::stages).find(|s| !s.techniques.without(techniques).is_empty())
+        {
+            return Err(RenderError::Plan {
+                from: stage.from,
+                extra: stage.techniques.without(techniques),
+                techniques,
+            });
+        }
         let rect = scene.camera().crop();
         let budget = u64::from(settings.memory) << 20;
         let film_bytes = Film::memory_bytes(rect, techniques);
@@ -74,15 +105,22 @@ impl<'a, S: Scene> Renderer<'a, S> {
         if scene.emitters().len() > 1 {
             let light_paths = emitters::light_paths(pilot.vertices_per_path);
             let paths = [light_paths, light_paths / 8];
-            let radii = first_radii(&world, &settings, techniques, &pilot, paths);
-            let plan = plan(&world, &settings, techniques, pilot.vertices_per_path, &radii, paths, 0);
+            let plan = plan(&world, &settings, &stage(&world, &settings, techniques, &pilot, paths), 0);
             let (emission, next_event) = emitters::measure(&world, &plan);
             world.choose_emitters_by(&emission, &next_event);
             // Other light sub-paths than before.
             pilot = look(&world);
         }
         let pixels = rect.width.saturating_mul(rect.height);
-        let choices = Choices::new(&world, &settings, techniques, &pilot, pixels, budget - film_bytes);
+        let everything = everything(&world, &settings, techniques, &pilot, pixels, budget - film_bytes);
+        let planner = Planner { settings: settings.clone(), everything, bytes: budget - film_bytes };
+        let (plan, planner) = match (frozen, settings.techniques) {
+            (Some(plan), _) => (plan, None),
+            (None, Techniques::Auto) => {
+                (RenderPlan::new(planner.stage(&world, &census, &pilot, 0)), Some(planner))
+            }
+            (None, Techniques::Set(_)) => (RenderPlan::new(planner.everything), None),
+        };
         let probabilities: Vec<u8> = (0..scene.emitters().len() as u32)
             .map(EmitterId)
             .flat_map(|emitter| [world.emission_probability(emitter), world.next_event_probability(emitter)])
@@ -96,11 +134,8 @@ impl<'a, S: Scene> Renderer<'a, S> {
             part: (rect.x, rect.y, rect.width, rect.height),
             settings: settings.into_inner(),
             census,
-            light_paths: choices.light_paths,
-            beam_paths: choices.beam_paths,
-            vertices_per_light_path: pilot.vertices_per_path,
             emitters: fingerprint(&probabilities),
-            radii: choices.radii,
+            plan,
         };
         let film = Film::new(rect, techniques);
         let pixels = vec![BLACK; rect.width as usize * rect.height as usize];
@@ -108,11 +143,13 @@ impl<'a, S: Scene> Renderer<'a, S> {
             times: PassTimes { pilot: start.elapsed(), ..PassTimes::default() },
             ..Record::default()
         };
-        let counts = LightCounts::expected(&pilot, choices.light_paths, choices.beam_paths);
+        let first = identity.plan.stage(0);
+        let counts = LightCounts::expected(&pilot, first.light_paths, first.beam_paths);
         record.expected_bytes = film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>() as u64);
         Ok(Self {
             world,
             pilot,
+            planner,
             state: State { identity, record, film },
             range: 0..MAX_ITERATIONS,
             pixels,
@@ -140,11 +177,18 @@ impl<'a, S: Scene> Renderer<'a, S> {
     /// # Errors
     /// As [`State::merge`]: then nothing has changed.
     pub fn resume(&mut self, state: State) -> Result<(), StateError> {
-        let identity = self.state.identity.clone();
-        self.state.merge(state)?;
+        let mut identity = self.state.identity.clone();
+        if self.planner.is_some() && self.state.film.iteration_set().is_empty() {
+            // What was chosen then stays chosen, even if time was measured and would now be measured otherwise.
+            self.state.identity.plan.clone_from(&state.identity.plan);
+        }
+        let merged = self.state.merge(state);
+        if merged.is_ok() {
+            identity.plan.clone_from(&self.state.identity.plan);
+        }
         // The settings of this render, where they do not matter.
         self.state.identity = identity;
-        Ok(())
+        merged
     }
 
     /// All that was done so far, to be saved or merged.
@@ -153,32 +197,39 @@ impl<'a, S: Scene> Renderer<'a, S> {
         &self.state
     }
 
-    /// The plan of an iteration.
+    /// What an iteration does, as far as it has been decided.
     #[must_use]
     pub fn plan(&self, iteration: u64) -> Plan {
-        let identity = &self.state.identity;
-        plan(
-            &self.world,
-            &identity.settings,
-            identity.census.techniques,
-            identity.vertices_per_light_path,
-            &identity.radii,
-            [identity.light_paths, identity.beam_paths],
-            iteration,
-        )
+        let Identity { settings, plan: stages, .. } = &self.state.identity;
+        plan(&self.world, settings, stages.stage(iteration), iteration)
+    }
+
+    /// Makes the plan for all iterations up to this one.
+    fn plan_up_to(&mut self, iteration: u64) {
+        let Some(planner) = &self.planner else { return };
+        let Identity { census, plan, .. } = &mut self.state.identity;
+        let start = Instant::now();
+        while let Some(from) = adapt::REVIEWS.get(plan.stages().len()).filter(|from| **from <= iteration) {
+            let review = plan.stages().len() as u32;
+            plan.push(Stage { from: *from, ..planner.stage(&self.world, census, &self.pilot, review) });
+        }
+        self.state.record.times.pilot += start.elapsed();
     }
 
     /// Renders the next iteration: the first of the [range](Self::set_range) that is not on the film yet. `false` if there
     /// is none, or if it was cancelled: then it is as if it had not begun.
     pub fn iterate(&mut self) -> bool {
         let Some(iteration) = self.next_iteration() else { return false };
+        self.plan_up_to(iteration);
         let plan = self.plan(iteration);
         let context = Context { world: &self.world, plan: &plan };
         let (rect, pixels) = (self.state.film.rect(), &mut self.pixels);
         let mut times = PassTimes::default();
         let mut clock = Clock::start();
         pixels.fill(BLACK);
+        let stores = plan.stores_vertices() || plan.stores_beams();
         let expected = LightCounts::expected(&self.pilot, plan.light_paths, plan.beam_paths);
+        let expected = if stores { expected } else { LightCounts::default() };
         let lists = &mut self.lists;
         let light = light_pass(&context, StreamKind::Light, &expected, lists, &self.cancelled, |splats| {
             add_splats(rect, splats, pixels);

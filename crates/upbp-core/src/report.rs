@@ -8,7 +8,7 @@ use upbp_estimators::{Counters, Technique};
 
 use crate::census::Census;
 use crate::iterations::IterationSet;
-use crate::radius::RadiusSchedule;
+use crate::stage::RenderPlan;
 use crate::state::State;
 
 /// Wall seconds of the passes.
@@ -125,12 +125,14 @@ pub struct Report {
     pub film_fingerprint: String,
     /// Seconds of rendering by pass.
     pub seconds: PassSeconds,
-    /// Light sub-paths per iteration.
+    /// Whether costs came from a model; else time was measured.
+    pub deterministic: bool,
+    /// What iterations ran, from which on.
+    pub plan: RenderPlan,
+    /// Light sub-paths of the iteration with the largest index.
     pub light_paths: u32,
     /// Of them with photon beams.
     pub beam_paths: u32,
-    /// Radii of the first iteration.
-    pub first_radii: RadiusSchedule,
     /// Radii of the iteration with the largest index: `surf`, `pp3d`, `pb2d`, `bp2d`, `bb1d`.
     pub last_radii: [f32; 5],
     /// Counts over all iterations.
@@ -150,7 +152,9 @@ pub struct Report {
 impl Report {
     pub(crate) fn new(state: &State) -> Self {
         let State { identity, record, film } = state;
-        let last = identity.radii.kernels(film.iteration_set().last().unwrap_or(0));
+        let last = film.iteration_set().last().unwrap_or(0);
+        let stage = identity.plan.stage(last);
+        let radii = stage.radii.kernels(last);
         let error = film.estimated_error();
         Self {
             version: identity.version.clone(),
@@ -161,15 +165,16 @@ impl Report {
             iteration_set: film.iteration_set().clone(),
             film_fingerprint: film.fingerprint(),
             seconds: record.times.seconds(),
-            light_paths: identity.light_paths,
-            beam_paths: identity.beam_paths,
-            first_radii: identity.radii,
+            deterministic: identity.settings.deterministic,
+            plan: identity.plan.clone(),
+            light_paths: stage.light_paths,
+            beam_paths: stage.beam_paths,
             last_radii: [
-                last.surf.radius(),
-                last.pp3d.radius(),
-                last.pb2d.radius(),
-                last.bp2d.radius(),
-                last.bb1d.radius(),
+                radii.surf.radius(),
+                radii.pp3d.radius(),
+                radii.pb2d.radius(),
+                radii.bp2d.radius(),
+                radii.bb1d.radius(),
             ],
             counters: record.counters,
             shares: film.shares().into_iter().map(|(layer, share)| (layer.name(), share)).collect(),
@@ -185,6 +190,9 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [width, height] = self.resolution;
         writeln!(f, "{}", self.census)?;
+        for stage in self.plan.stages() {
+            writeln!(f, "{stage}")?;
+        }
         let s = &self.seconds;
         writeln!(
             f,
@@ -200,9 +208,7 @@ impl fmt::Display for Report {
         let c = &self.counters;
         writeln!(
             f,
-            "{} light paths per iteration, {} with beams; {} light vertices and {} beams in all, {:.1} MiB at most",
-            self.light_paths,
-            self.beam_paths,
+            "{} light vertices and {} beams in all, {:.1} MiB at most",
             c.light_vertices,
             c.photon_beams,
             self.map_bytes as f64 / 1_048_576.0

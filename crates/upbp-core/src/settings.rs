@@ -1,11 +1,11 @@
 //! What a user may choose, and its validation.
 
 use serde::{Deserialize, Serialize};
-use upbp_estimators::TechniqueSet;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 
 use crate::error::SettingsError;
 use crate::radius::{Radii, Radius};
+use crate::techniques::Techniques;
 
 /// A number of light sub-paths per iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -21,16 +21,20 @@ pub enum LightPaths {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Techniques, as in `"bpt+surf+pp3d+pb2d+bb1d"`. Those that the scene cannot use are left out.
-    pub techniques: TechniqueSet,
+    /// `"auto"`, or a set as in `"bpt+surf+pp3d+pb2d+bb1d"`, of which what the scene cannot use is left out.
+    pub techniques: Techniques,
+    /// Choose by a model of costs instead of measured time, so that every run of the same render chooses the same.
+    pub deterministic: bool,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Light sub-paths per iteration.
+    /// Light sub-paths per iteration. A count is kept as it is, whatever techniques are chosen.
     pub light_paths: LightPaths,
     /// Light sub-paths that leave photon beams; `None` for as many as a pilot finds useful.
     pub beams: Option<u32>,
-    /// Light vertices that every camera vertex is connected to, `[1, 1000]`.
-    pub connections: u32,
+    /// Light vertices that every camera vertex is connected to, `[1, 1000]`; `None` for a number that goes with the techniques.
+    pub connections: Option<u32>,
+    /// Points on lights that every camera vertex is connected to, `[1, 1000]`; `None` as for connections.
+    pub next_events: Option<u32>,
     /// Fewest edges of a path between light and camera, at least 1.
     pub min_length: u32,
     /// Most edges of a path, at least `min_length`. Thick media that hardly absorb need many: walks that are cut are counted
@@ -55,11 +59,13 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            techniques: TechniqueSet::default(),
+            techniques: Techniques::Auto,
+            deterministic: false,
             seed: 0,
             light_paths: LightPaths::Auto,
             beams: None,
-            connections: 1,
+            connections: None,
+            next_events: None,
             min_length: 1,
             max_length: 1000,
             roulette: true,
@@ -98,7 +104,7 @@ impl Settings {
     /// The first setting that is out of its range, with what was expected.
     pub fn validate(self) -> Result<CheckedSettings, SettingsError> {
         let refuse = |name, expected, found: String| Err(SettingsError { name, expected, found });
-        if self.techniques.is_empty() {
+        if self.techniques.candidates().is_empty() {
             return refuse("techniques", "at least one technique", self.techniques.to_string());
         }
         if self.light_paths == LightPaths::Count(0) {
@@ -107,8 +113,12 @@ impl Settings {
         if self.beams == Some(0) {
             return refuse("beams", "at least 1 (leave out bb1d and bp2d for none)", "0".into());
         }
-        if !(1..=1000).contains(&self.connections) {
-            return refuse("connections", "1 to 1000", self.connections.to_string());
+        for (name, count) in [("connections", self.connections), ("next_events", self.next_events)] {
+            if let Some(count) = count
+                && !(1..=1000).contains(&count)
+            {
+                return refuse(name, "1 to 1000", count.to_string());
+            }
         }
         if self.min_length == 0 {
             return refuse("min_length", "at least 1", "0".into());
@@ -165,10 +175,11 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let cases: [(&str, &str); 8] = [
+        let cases: [(&str, &str); 9] = [
             ("(light_paths: Count(0))", "light_paths"),
             ("(beams: 0)", "beams"),
             ("(connections: 0)", "connections"),
+            ("(next_events: 1001)", "next_events"),
             ("(min_length: 0)", "min_length"),
             ("(min_length: 5, max_length: 4)", "max_length"),
             ("(memory: 0)", "memory"),

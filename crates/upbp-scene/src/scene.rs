@@ -6,7 +6,7 @@
 
 use glam::Vec3;
 use upbp_accel::{Candidate, Ray, SceneGeometry, ShapeId, Visit};
-use upbp_estimators::scene::{BoundingSphere, Crossing, EmitterId, Hit, Scene};
+use upbp_estimators::scene::{BoundingSphere, Bsdf, Crossing, EmitterId, Hit, Scene};
 use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
 
 use crate::camera::PerspectiveCamera;
@@ -142,6 +142,14 @@ impl Scene for ReadyScene {
 
     fn outside(&self) -> Option<MediumId> {
         self.outside
+    }
+
+    fn has_connectible_surfaces(&self) -> bool {
+        self.surfaces.iter().filter_map(|surface| surface.bsdf).any(|bsdf| bsdf.is_connectible())
+    }
+
+    fn has_specular_surfaces(&self) -> bool {
+        self.surfaces.iter().filter_map(|surface| surface.bsdf).any(|bsdf| !bsdf.is_connectible())
     }
 
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Material>> {

@@ -5,8 +5,8 @@ use upbp_estimators::scene::PixelRect;
 
 use crate::census::Census;
 use crate::error::StateError;
-use crate::radius::RadiusSchedule;
 use crate::settings::Settings;
+use crate::stage::{RenderPlan, Stage};
 
 /// All that the iterations of a render depend on, besides their index.
 ///
@@ -28,16 +28,10 @@ pub struct Identity {
     pub settings: Settings,
     /// What the scene can use of them.
     pub census: Census,
-    /// Light sub-paths per iteration.
-    pub light_paths: u32,
-    /// Of them with photon beams.
-    pub beam_paths: u32,
-    /// Connectible vertices per light sub-path, as the pilot found.
-    pub vertices_per_light_path: f64,
     /// Fingerprint of the probabilities with which emitters are chosen.
     pub emitters: String,
-    /// First radii and how they shrink.
-    pub radii: RadiusSchedule,
+    /// What iterations run, as far as it has been decided.
+    pub plan: RenderPlan,
 }
 
 impl Identity {
@@ -50,22 +44,26 @@ impl Identity {
     /// Compares with another render's. Settings count by what became of them: how much memory is allowed does not matter where
     /// the number of light sub-paths is the same.
     ///
+    /// Of two plans one may have gone farther.
+    ///
     /// # Errors
     /// [`StateError::Different`] with the names of what differs and both values.
     pub fn check_same(&self, other: &Self) -> Result<(), StateError> {
-        let differences: Vec<_> = self
-            .fields()
+        let mut pairs: Vec<_> = self.fields().into_iter().zip(other.fields()).collect();
+        for (own, theirs) in self.plan.stages().iter().zip(other.plan.stages()) {
+            pairs.extend(stage_fields(own).into_iter().zip(stage_fields(theirs)));
+        }
+        let differences: Vec<_> = pairs
             .into_iter()
-            .zip(other.fields())
             .filter(|(own, other)| own != other)
             .map(|((name, own), (_, other))| format!("{name} is {own} in one and {other} in the other"))
             .collect();
         if differences.is_empty() { Ok(()) } else { Err(StateError::Different { differences }) }
     }
 
-    /// All that counts, as text: the shortest decimals of two different numbers differ.
-    fn fields(&self) -> [(&'static str, String); 24] {
-        let Self { settings: s, radii: r, .. } = self;
+    /// All that counts beside the plan, as text: the shortest decimals of two different numbers differ.
+    fn fields(&self) -> [(&'static str, String); 11] {
+        let s = &self.settings;
         let (width, height) = self.film;
         let (x, y, columns, rows) = self.part;
         [
@@ -73,26 +71,34 @@ impl Identity {
             ("scene", if self.fingerprint.is_empty() { "unnamed".into() } else { self.fingerprint.clone() }),
             ("film", format!("{width} x {height}")),
             ("crop", format!("{columns} x {rows} at ({x}, {y})")),
-            ("techniques", self.census.techniques.to_string()),
             ("seed", s.seed.to_string()),
-            ("connections", s.connections.to_string()),
-            ("min_length", s.min_length.to_string()),
-            ("max_length", s.max_length.to_string()),
+            ("path lengths", format!("{} to {}", s.min_length, s.max_length)),
             ("roulette", s.roulette.to_string()),
             ("heuristic", format!("{:?}", s.heuristic)),
             ("photon_beams", format!("{:?}", s.photon_beams)),
             ("query_beams", format!("{:?}", s.query_beams)),
-            ("progressive", r.progressive.to_string()),
-            ("light_paths", self.light_paths.to_string()),
-            ("beams", self.beam_paths.to_string()),
-            ("vertices per light sub-path", self.vertices_per_light_path.to_string()),
             ("choice of emitters", self.emitters.clone()),
-            ("radii.surf", r.surf.to_string()),
-            ("radii.pp3d", r.pp3d.to_string()),
-            ("radii.pb2d", r.pb2d.to_string()),
-            ("radii.bp2d", r.bp2d.to_string()),
-            ("radii.bb1d", r.bb1d.to_string()),
-            ("least radius", r.floor.to_string()),
         ]
     }
+}
+
+fn stage_fields(stage: &Stage) -> [(&'static str, String); 15] {
+    let r = &stage.radii;
+    [
+        ("first iteration of a stage", stage.from.to_string()),
+        ("techniques", stage.techniques.to_string()),
+        ("light_paths", stage.light_paths.to_string()),
+        ("beams", stage.beam_paths.to_string()),
+        ("connections", stage.connections.to_string()),
+        ("next_events", stage.next_events.to_string()),
+        ("look_ups", format!("{:?}", stage.look_ups)),
+        ("vertices per light sub-path", stage.vertices_per_light_path.to_string()),
+        ("radii.surf", r.surf.to_string()),
+        ("radii.pp3d", r.pp3d.to_string()),
+        ("radii.pb2d", r.pb2d.to_string()),
+        ("radii.bp2d", r.bp2d.to_string()),
+        ("radii.bb1d", r.bb1d.to_string()),
+        ("least radius", r.floor.to_string()),
+        ("progressive", r.progressive.to_string()),
+    ]
 }

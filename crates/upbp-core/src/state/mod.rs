@@ -76,9 +76,12 @@ impl State {
         let (none, others_none) = (own.is_empty(), others.is_empty());
         // What may differ is that of the state with the first iteration, so that the order does not matter.
         let first = |set: &IterationSet| set.ranges().first().map_or(MAX_ITERATIONS, |range| range.start);
+        let theirs_goes_farther = other.identity.plan.stages().len() > self.identity.plan.stages().len();
+        let plan = if theirs_goes_farther { &other.identity.plan } else { &self.identity.plan }.clone();
         if first(others) < first(own) {
             self.identity = other.identity;
         }
+        self.identity.plan = plan;
         let record = &mut self.record;
         record.times.add(&other.record.times);
         record.counters.add(&other.record.counters);

@@ -1,0 +1,105 @@
+//! What an iteration of a plan costs.
+//!
+//! A model counts what sub-paths do, as the trial saw it, and takes nanoseconds per count from a table that was measured once, on
+//! one machine. That is enough for a decision that everybody repeats to the last bit. If time may be measured, each part of the
+//! model is corrected by the ratio of the time that the trial took for it; ratios are between parts of one run, side by side, so that
+//! a busy machine slows all of them.
+
+use upbp_estimators::Technique;
+
+use super::recorder::{TECHNIQUES, WALK};
+use super::search::Candidate;
+use super::trial::Trial;
+
+/// Nanoseconds of one edge of a camera sub-path, and of a light sub-path.
+const EDGE: [f64; 2] = [300.0, 300.0];
+/// Part of a camera edge's time if no query beam has to know what is beyond the end of the edge.
+const SHORT: f64 = 0.85;
+/// Nanoseconds of every turn to a technique, and of every sample that it finds then.
+const TURN: [f64; TECHNIQUES] = [0.0, 220.0, 330.0, 150.0, 110.0, 110.0, 220.0, 200.0, 420.0];
+const SAMPLE: [f64; TECHNIQUES] = [0.0, 0.0, 0.0, 0.0, 70.0, 90.0, 130.0, 200.0, 330.0];
+/// Nanoseconds of storing a light vertex, of building it into a tree, and of the same for a photon beam.
+const STORE: f64 = 25.0;
+const BUILD_POINT: f64 = 90.0;
+const BUILD_BEAM: f64 = 600.0;
+/// Nanoseconds of adding a pixel to the film.
+const PIXEL: f64 = 40.0;
+
+/// How many times as long as in the model the parts of an iteration take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Costs {
+    camera_walk: f64,
+    light_walk: f64,
+    techniques: [f64; TECHNIQUES],
+}
+
+impl Costs {
+    /// As in the model, or as the trial measured it.
+    pub(crate) fn of(trial: &Trial) -> Self {
+        /// Counts per sub-path below which there is nothing to measure.
+        const LEAST: f64 = 0.01;
+        let work = &trial.work;
+        let mut costs = Self { camera_walk: 1.0, light_walk: 1.0, techniques: [1.0; TECHNIQUES] };
+        let ratio = |measured: f64, model: f64| (measured / model).clamp(0.1, 10.0);
+        if let Some(time) = work.camera_time {
+            costs.camera_walk = ratio(time[WALK], work.camera_edges * EDGE[0]);
+            for technique in Technique::ALL {
+                let i = technique as usize;
+                // The trial has fewer photons than the plan.
+                let seen = work.samples[i] * trial.thinning(technique);
+                if technique != Technique::LightTracing && work.calls[i] > LEAST && TURN[i] > 0.0 {
+                    costs.techniques[i] = ratio(time[i], work.calls[i] * TURN[i] + seen * SAMPLE[i]);
+                }
+            }
+        }
+        if let Some([walk, splats]) = work.light_time
+            && work.light_edges > LEAST
+        {
+            costs.light_walk = ratio(walk, work.light_edges * EDGE[1] + work.vertices * STORE);
+            let i = Technique::LightTracing as usize;
+            if work.calls[i] > LEAST {
+                costs.techniques[i] = ratio(splats, work.calls[i] * TURN[i]);
+            }
+        }
+        costs
+    }
+
+    /// Nanoseconds of an iteration, on one thread.
+    pub(crate) fn iteration(&self, trial: &Trial, candidate: &Candidate) -> f64 {
+        let work = &trial.work;
+        let has = |technique| candidate.techniques.has(technique);
+        let beams = has(Technique::Pb2d) || has(Technique::Bb1d);
+        let walk = work.camera_edges * EDGE[0] * self.camera_walk * if beams { 1.0 } else { SHORT };
+        let mut camera = PIXEL + walk;
+        for technique in candidate.techniques.iter() {
+            let i = technique as usize;
+            let photons = match technique {
+                Technique::LightTracing => continue,
+                Technique::Bp2d | Technique::Bb1d => candidate.beam_paths,
+                _ => candidate.light_paths,
+            };
+            let each = work.calls[i] * TURN[i] + photons * work.samples[i] * SAMPLE[i];
+            camera += self.techniques[i] * candidate.look_up(technique) * each;
+        }
+        let mut light = work.light_edges * EDGE[1] * self.light_walk;
+        if has(Technique::LightTracing) {
+            let i = Technique::LightTracing as usize;
+            light += work.calls[i] * TURN[i] * self.techniques[i];
+        }
+        let merges = has(Technique::Surf) || has(Technique::Pp3d) || has(Technique::Pb2d);
+        if merges || has(Technique::Connect) {
+            light += work.vertices * STORE;
+        }
+        if merges {
+            light += work.vertices * BUILD_POINT;
+        }
+        let beams = if has(Technique::Bb1d) || has(Technique::Bp2d) {
+            candidate.beam_paths * trial.planned[1] * work.beams * BUILD_BEAM
+        } else {
+            0.0
+        };
+        let light_paths =
+            if candidate.needs_light() { candidate.light_paths * trial.planned[0] } else { 0.0 };
+        trial.pixels * camera + light_paths * light + beams
+    }
+}

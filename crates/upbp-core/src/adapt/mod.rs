@@ -1,0 +1,72 @@
+//! The choice of techniques and sample counts by efficiency (`docs/theory.md`, section 6(a)).
+//!
+//! A [trial] of a few thousand sub-paths with everything on is written down; from it follow the [variance](prediction) and the
+//! [cost] of any other plan; a [search] takes the one with the least product of both. The sub-paths of trials have random numbers of their
+//! own and add nothing to the picture: whatever is chosen, the picture is unbiased.
+
+mod cost;
+mod prediction;
+mod recorder;
+mod search;
+mod trial;
+
+use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::{Plan, TechniqueSet, World};
+
+use cost::Costs;
+use prediction::Prediction;
+use search::{Bounds, Candidate};
+use trial::{Grid, PASSES};
+
+/// The iterations before which the plan is chosen, again and again: radii have shrunk, and a larger trial is worth its time.
+pub(crate) const REVIEWS: [u64; 3] = [0, 512, 4096];
+/// The factor by which a change must make the product of variance and cost smaller.
+const GAINS: [f64; REVIEWS.len()] = [0.93, 0.96, 0.98];
+/// The first trial looks at one of so many pixels, more of them where no media make it slow, within bounds,
+const PIXELS_PER_CELL: [u32; 2] = [24, 6];
+const CELLS: [u32; 2] = [256, 2048];
+/// and the next one at so many times as many.
+const GROWTH: u32 = 4;
+/// Light sub-paths per cell in a pass of the trial.
+const LIGHT_PATHS_PER_CELL: u32 = 2;
+
+/// What may be chosen.
+pub(crate) struct Choice<'a> {
+    /// Everything that the scene can use, with the full number of light sub-paths.
+    pub(crate) everything: &'a Plan,
+    /// Techniques without which some path would have none.
+    pub(crate) always: TechniqueSet,
+    /// Techniques that a plan with light sub-paths has at least seldom.
+    pub(crate) careful: TechniqueSet,
+    /// Numbers of light sub-paths relative to it, if they are free.
+    pub(crate) light_paths: Vec<f64>,
+    pub(crate) beam_paths: Vec<f64>,
+    /// Camera sub-paths, and light sub-paths, of a pass at most: what is written down must fit into memory.
+    pub(crate) most_paths: u32,
+    /// Whether time may be measured.
+    pub(crate) timed: bool,
+}
+
+/// Chooses.
+pub(crate) fn choose<S: Scene>(world: &World<'_, S>, choice: &Choice<'_>, review: u32) -> Candidate {
+    let plan = choice.everything;
+    let crop = world.scene.camera().crop();
+    let media = plan.techniques.intersects(TechniqueSet::VOLUME_MERGES);
+    let pixels_per_cell = PIXELS_PER_CELL[usize::from(!media)];
+    let first = (crop.width.saturating_mul(crop.height) / pixels_per_cell).clamp(CELLS[0], CELLS[1]);
+    let cells = (first * GROWTH.pow(review)).min(choice.most_paths);
+    let grid = Grid::new(crop, cells);
+    let paths = choice.most_paths.min(LIGHT_PATHS_PER_CELL * cells);
+    let trial = trial::run(world, plan, &grid, paths, PASSES * review, choice.timed);
+    let prediction = Prediction::new(&trial, &grid);
+    let costs = Costs::of(&trial);
+    let bounds = Bounds {
+        techniques: plan.techniques,
+        always: choice.always,
+        careful: choice.careful,
+        light_paths: choice.light_paths.clone(),
+        beam_paths: choice.beam_paths.clone(),
+        gain: GAINS[review as usize],
+    };
+    search::best(&trial, &prediction, &costs, &bounds)
+}

@@ -1,0 +1,366 @@
+//! The variance that a plan would have, predicted from a trial of another one.
+//!
+//! With the balance heuristic, the second moment of single samples is `∫ f²/S`, `S` the sum of the densities of all techniques
+//! with their counts; it can be estimated for every `S` by the samples of a trial (`docs/theory.md`, section 6(a)), and
+//! knows of paths that the techniques of a plan would find once in a million years. What samples of one camera sub-path have in
+//! common is added: photons that are merged with one vertex share its error.
+
+use glam::DVec3;
+
+use super::recorder::TECHNIQUES;
+use super::trial::{Grid, PASSES, Sample, Trial};
+
+/// No sample says more than this part of the whole.
+const LARGEST_PART: f64 = 0.01;
+/// Of the squared mean of the picture, what is added to the squared radiance that errors are relative to: for a picture of mean
+/// 0.5 the 0.01 of relMSE.
+const DARKNESS: f64 = 0.04;
+/// The least variance, relative to the second moments of single samples.
+const LEAST_PART: f64 = 0.05;
+
+/// Parts that a variance is given in, so that its own error can be told.
+pub(crate) const GROUPS: usize = 8;
+/// Light sub-paths are at least so uneven.
+const LEAST_EVENNESS: f64 = 0.1;
+
+/// How many samples of each technique a plan has, relative to the trial's plan; and what part of the camera sub-paths look
+/// photons up, which those numbers contain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Counts {
+    pub(crate) relative: [f64; TECHNIQUES],
+    pub(crate) look_ups: [f64; TECHNIQUES],
+}
+
+/// A trial, made ready for predictions.
+pub(crate) struct Prediction<'a> {
+    trial: &'a Trial,
+    /// One over the squared radiance that errors are relative to, by cell.
+    scale: Vec<DVec3>,
+    /// Roots of the parts to which samples that say too much are reduced.
+    damping: Vec<f32>,
+    splat_damping: Vec<f32>,
+    evenness: f64,
+}
+
+impl<'a> Prediction<'a> {
+    pub(crate) fn new(trial: &'a Trial, grid: &Grid) -> Self {
+        let mut prediction = Self {
+            trial,
+            scale: relative_to(&smooth(&means(trial), grid.columns())),
+            damping: Vec::new(),
+            splat_damping: Vec::new(),
+            evenness: 1.0,
+        };
+        let parts: Vec<f64> = (0..trial.cells)
+            .flat_map(|cell| {
+                let per_look = 1.0 / (trial.cells * trial.passes) as f64;
+                let scale = prediction.scale[cell];
+                trial
+                    .of_cell(cell)
+                    .iter()
+                    .map(move |sample| per_look * square(sample, &scale) * trial.thinning(sample.technique))
+            })
+            .collect();
+        let splats: Vec<f64> = trial
+            .splats
+            .iter()
+            .map(|(cell, sample)| {
+                let scale = &prediction.scale[*cell as usize];
+                trial.per_splat() * square(sample, scale) * trial.thinning(sample.technique)
+            })
+            .collect();
+        let most = largest(parts.iter().chain(&splats).copied().collect());
+        let damp = |parts: Vec<f64>| {
+            parts
+                .into_iter()
+                .map(|part| if part > most { (most / part).sqrt() as f32 } else { 1.0 })
+                .collect()
+        };
+        (prediction.damping, prediction.splat_damping) = (damp(parts), damp(splats));
+        prediction.evenness = prediction.splat_evenness();
+        prediction
+    }
+
+    /// The relative variance of an iteration of a plan with these counts, mean over pixels and channels, in parts due to groups of
+    /// cells. Infinite if a path that the trial found is one that the plan cannot find.
+    pub(crate) fn relative_variance(&self, counts: &Counts) -> [f64; GROUPS] {
+        let trial = self.trial;
+        let mut single = [0.0; GROUPS];
+        let mut all = [0.0; GROUPS];
+        for cell in 0..trial.cells {
+            let sums = self.of_cell(cell, counts);
+            single[group(cell)] += sums[0] / trial.cells as f64;
+            all[group(cell)] += sums[1] / trial.cells as f64;
+        }
+        // The difference of two noisy numbers may be anything.
+        let mut variance = std::array::from_fn(|group| f64::max(all[group], LEAST_PART * single[group]));
+        for ((cell, sample), damping) in trial.splats.iter().zip(&self.splat_damping) {
+            let cell = *cell as usize;
+            let part = square(sample, &self.scale[cell]) * trial.thinning(sample.technique);
+            variance[group(cell)] += self.evenness * trial.per_splat() * part * f64::from(damping * damping)
+                / share(sample, counts);
+        }
+        variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
+    }
+
+    /// The variance of the light that splats bring to a cell between passes, relative to what it would be if light sub-paths were
+    /// independent: they are stratified among each other, and a cell gets as many splats of a pass as a pixel of an iteration.
+    fn splat_evenness(&self) -> f64 {
+        let trial = self.trial;
+        let mut sums = vec![[DVec3::ZERO; PASSES as usize]; trial.cells];
+        let mut independent = 0.0;
+        for (i, ((cell, sample), damping)) in trial.splats.iter().zip(&self.splat_damping).enumerate() {
+            let (cell, damping) = (*cell as usize, f64::from(*damping));
+            let pass = trial.splat_passes.partition_point(|end| *end <= i);
+            sums[cell][pass] += sample.value.as_dvec3() * damping;
+            independent += square(sample, &self.scale[cell]) * damping * damping;
+        }
+        // Two passes: the squared difference is twice the variance of one, and the sum of squares over both is twice its own.
+        let apart =
+            |([first, second], scale): (&[DVec3; 2], &DVec3)| (first - second).powf(2.0).dot(*scale) / 3.0;
+        let apart: f64 = sums.iter().zip(&self.scale).map(apart).sum();
+        if independent > 0.0 { (apart / independent).clamp(LEAST_EVENNESS, 1.0) } else { 1.0 }
+    }
+
+    /// Its second moments of single samples, and all of its variance.
+    fn of_cell(&self, cell: usize, counts: &Counts) -> [f64; 2] {
+        let trial = self.trial;
+        let scale = &self.scale[cell];
+        let passes = trial.passes as f64;
+        let (mut single, mut common) = (0.0, DVec3::ZERO);
+        let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+        for pass in 0..trial.passes {
+            let range = trial.range(cell, pass);
+            let mut own = DVec3::ZERO;
+            let mut looked_up = [DVec3::ZERO; TECHNIQUES];
+            for (sample, damping) in trial.samples[range.clone()].iter().zip(&self.damping[range]) {
+                let share = share(sample, counts);
+                let damping = f64::from(*damping);
+                single +=
+                    square(sample, scale) * trial.thinning(sample.technique) * damping * damping / share;
+                let technique = sample.technique as usize;
+                let weight = counts.relative[technique] / share * damping;
+                if weight > 0.0 {
+                    let y = sample.value.as_dvec3() * weight;
+                    own += y;
+                    // Pairs of different samples; those of a look-up that is made with probability p count 1/p times.
+                    let p = counts.look_ups[technique];
+                    common -= y * y / p;
+                    if p < 1.0 {
+                        looked_up[technique] += y;
+                    }
+                }
+            }
+            for (sum, p) in looked_up.iter().zip(counts.look_ups) {
+                common += sum * sum * (1.0 / p - 1.0);
+            }
+            common += own * own;
+            sum += own;
+            squares += own * own;
+        }
+        // The square of the mean from products of different passes, which have no part of their own variance.
+        let mean_square = (sum * sum - squares) / (passes * (passes - 1.0));
+        let rest = (common / passes - mean_square).dot(*scale) / 3.0;
+        [single / passes, single / passes + rest]
+    }
+}
+
+/// Groups are spread over the picture.
+const fn group(cell: usize) -> usize {
+    ((cell as u32).wrapping_mul(2_654_435_761) >> 29) as usize % GROUPS
+}
+
+/// The densities of a plan at a sample's path, relative to the trial's.
+fn share(sample: &Sample, counts: &Counts) -> f64 {
+    sample.shares.iter().zip(counts.relative).map(|(share, count)| f64::from(*share) * count).sum()
+}
+
+/// The squared value of a sample, relative, mean over channels.
+fn square(sample: &Sample, scale: &DVec3) -> f64 {
+    let value = sample.value.as_dvec3();
+    (value * value).dot(*scale) / 3.0
+}
+
+impl Trial {
+    fn range(&self, cell: usize, pass: usize) -> std::ops::Range<usize> {
+        let group = cell * self.passes + pass;
+        let start = if group == 0 { 0 } else { self.ends[group - 1] };
+        start as usize..self.ends[group] as usize
+    }
+
+    fn of_cell(&self, cell: usize) -> &[Sample] {
+        &self.samples[self.range(cell, 0).start..self.range(cell, self.passes - 1).end]
+    }
+
+    /// The part of a splat in a mean over pixels.
+    fn per_splat(&self) -> f64 {
+        1.0 / (self.pixels * self.passes as f64)
+    }
+}
+
+/// The mean radiance of each cell.
+fn means(trial: &Trial) -> Vec<DVec3> {
+    let passes = trial.passes as f64;
+    let of_cell =
+        |cell| trial.of_cell(cell).iter().map(|sample| sample.value.as_dvec3()).sum::<DVec3>() / passes;
+    let mut means: Vec<DVec3> = (0..trial.cells).map(of_cell).collect();
+    let pixels_per_cell = trial.pixels / trial.cells as f64;
+    for (cell, sample) in &trial.splats {
+        means[*cell as usize] += sample.value.as_dvec3() / (pixels_per_cell * passes);
+    }
+    means
+}
+
+/// Means over squares of three by three cells.
+fn smooth(cells: &[DVec3], columns: usize) -> Vec<DVec3> {
+    let rows = cells.len() / columns;
+    let around = |i: usize, count: usize| i.saturating_sub(1)..(i + 2).min(count);
+    let mean = |cell: usize| {
+        let (near_rows, near_columns) = (around(cell / columns, rows), around(cell % columns, columns));
+        let count = near_rows.len() * near_columns.len();
+        let row_sum =
+            |row: usize| near_columns.clone().map(|column| cells[row * columns + column]).sum::<DVec3>();
+        near_rows.map(row_sum).sum::<DVec3>() / count as f64
+    };
+    (0..cells.len()).map(mean).collect()
+}
+
+fn relative_to(means: &[DVec3]) -> Vec<DVec3> {
+    let overall = means.iter().map(|mean| mean.element_sum()).sum::<f64>() / (3 * means.len()) as f64;
+    let dark = (DARKNESS * overall * overall).max(f64::MIN_POSITIVE);
+    means.iter().map(|mean| (mean * mean + dark).recip()).collect()
+}
+
+/// The limit of parts such that none is more than [`LARGEST_PART`] of the sum of all that are so limited.
+fn largest(mut parts: Vec<f64>) -> f64 {
+    parts.sort_unstable_by(|a, b| b.total_cmp(a));
+    let mut rest: f64 = parts.iter().sum();
+    for (above, part) in parts.iter().enumerate() {
+        // With `above` parts limited to `most`: most = LARGEST_PART (above most + rest).
+        let most = LARGEST_PART * rest / (1.0 - LARGEST_PART * above as f64);
+        if *part <= most || LARGEST_PART * (above as f64 + 1.0) >= 1.0 {
+            return most.max(*part);
+        }
+        rest -= part;
+    }
+    f64::INFINITY
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use upbp_estimators::Technique;
+    use upbp_estimators::scene::PixelRect;
+
+    use super::super::trial::Work;
+    use super::*;
+
+    const SIDE: u32 = 128;
+
+    /// Uniform numbers that fill the unit interval evenly enough, and independently in two sequences.
+    fn uniform(i: usize, sequence: u32) -> f64 {
+        let mut x = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (u64::from(sequence) << 32);
+        for _ in 0..3 {
+            x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            x ^= x >> 27;
+        }
+        (x >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// `∫ 3x² dx = 1` over the unit interval, by one sample of density 1 and one of density `2x`, as if they were an emission
+    /// hit and a connection.
+    fn trial() -> Trial {
+        let cells = (SIDE * SIDE) as usize;
+        let passes = PASSES as usize;
+        let mut samples = Vec::new();
+        let mut ends = Vec::new();
+        for i in 0..cells * passes {
+            for (technique, x) in
+                [(Technique::Hit, uniform(i, 0)), (Technique::Connect, uniform(i, 1).sqrt())]
+            {
+                let mut shares = [0.0; TECHNIQUES];
+                shares[Technique::Hit as usize] = (1.0 / (1.0 + 2.0 * x)) as f32;
+                shares[Technique::Connect as usize] = (2.0 * x / (1.0 + 2.0 * x)) as f32;
+                let value = Vec3::splat((3.0 * x * x / (1.0 + 2.0 * x)) as f32);
+                samples.push(Sample { technique, value, shares });
+            }
+            ends.push(samples.len() as u32);
+        }
+        Trial {
+            passes,
+            cells,
+            samples,
+            ends,
+            splats: Vec::new(),
+            splat_passes: vec![0; passes],
+            thinning: [1.0; 2],
+            planned: [1.0; 2],
+            pixels: cells as f64,
+            work: Work::default(),
+        }
+    }
+
+    fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
+        let n = 100_000;
+        (0..n).map(|i| f((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)
+    }
+
+    #[test]
+    fn variances_are_those_of_the_estimators() {
+        let trial = trial();
+        let prediction = Prediction::new(
+            &trial,
+            &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE),
+        );
+        let f = |x: f64| 3.0 * x * x;
+        // The picture is 1 everywhere.
+        let relative = 1.0 / (1.0 + DARKNESS);
+        for (hit, connect) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+            let mut counts = Counts { relative: [0.0; TECHNIQUES], look_ups: [1.0; TECHNIQUES] };
+            counts.relative[Technique::Hit as usize] = hit;
+            counts.relative[Technique::Connect as usize] = connect;
+            // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n.
+            let sum = |x: f64| hit + connect * 2.0 * x;
+            let part = |n: f64, p: fn(f64) -> f64| {
+                if n == 0.0 {
+                    return 0.0;
+                }
+                let mean = quadrature(|x| n * p(x) * f(x) / sum(x));
+                quadrature(|x| n * p(x) * (f(x) / sum(x)).powi(2)) - mean * mean / n
+            };
+            let expected = relative * (part(hit, |_| 1.0) + part(connect, |x| 2.0 * x));
+            let found: f64 = prediction.relative_variance(&counts).iter().sum();
+            // Samples that make the local mean brighter count a little less.
+            assert!((found / expected - 1.0).abs() < 0.1, "{hit}, {connect}: {found}, expected {expected}");
+        }
+    }
+
+    #[test]
+    fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
+        let mut trial = trial();
+        for sample in &mut trial.samples {
+            if sample.technique == Technique::Connect {
+                sample.shares = [0.0; TECHNIQUES];
+                sample.shares[Technique::Connect as usize] = 1.0;
+            }
+        }
+        let prediction = Prediction::new(
+            &trial,
+            &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE),
+        );
+        let mut counts = Counts { relative: [0.0; TECHNIQUES], look_ups: [1.0; TECHNIQUES] };
+        counts.relative[Technique::Hit as usize] = 1.0;
+        assert!(prediction.relative_variance(&counts).iter().sum::<f64>().is_infinite());
+    }
+
+    #[test]
+    fn no_part_is_more_than_a_hundredth() {
+        let mut parts = vec![1.0; 1000];
+        parts.extend([1e6, 1e3]);
+        let most = largest(parts.clone());
+        let sum: f64 = parts.iter().map(|part: &f64| part.min(most)).sum();
+        assert!((most / sum - LARGEST_PART).abs() < 1e-9, "{most} of {sum}");
+        // Nothing to limit.
+        assert!(largest(vec![1.0; 1000]) >= 1.0);
+    }
+}

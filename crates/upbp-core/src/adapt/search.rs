@@ -1,0 +1,201 @@
+//! The plan with the least product of variance and cost.
+
+use rayon::prelude::*;
+use upbp_estimators::{Technique, TechniqueSet};
+
+use super::cost::Costs;
+use super::prediction::{Counts, GROUPS, Prediction};
+use super::recorder::TECHNIQUES;
+use super::trial::Trial;
+
+/// A plan that may be chosen. Numbers of sub-paths are relative to the trial's plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Candidate {
+    pub(crate) techniques: TechniqueSet,
+    pub(crate) light_paths: f64,
+    pub(crate) beam_paths: f64,
+    /// Merges whose photons only a part of the camera sub-paths look up.
+    pub(crate) seldom: TechniqueSet,
+}
+
+/// What a candidate may be.
+#[derive(Clone, Debug)]
+pub(crate) struct Bounds {
+    /// All techniques that the scene can use.
+    pub(crate) techniques: TechniqueSet,
+    /// Those that stay on.
+    pub(crate) always: TechniqueSet,
+    /// Those that a plan with light sub-paths has at least seldom: there may be light that a trial misses.
+    pub(crate) careful: TechniqueSet,
+    /// Numbers of light sub-paths, relative to the trial's plan; ascending, with 1.
+    pub(crate) light_paths: Vec<f64>,
+    pub(crate) beam_paths: Vec<f64>,
+    /// A step must make the product smaller by this factor: predictions are noisy, and the least of many is so by chance.
+    pub(crate) gain: f64,
+}
+
+/// What part of the camera sub-paths look up what is looked up seldom.
+const SELDOM: f32 = 0.25;
+
+impl Candidate {
+    pub(crate) fn look_up(&self, technique: Technique) -> f64 {
+        if self.seldom.has(technique) { f64::from(SELDOM) } else { 1.0 }
+    }
+
+    /// As a stage has it.
+    pub(crate) fn look_ups(&self) -> [f32; 5] {
+        use Technique::{Bb1d, Bp2d, Pb2d, Pp3d, Surf};
+        [Surf, Pp3d, Pb2d, Bp2d, Bb1d].map(|technique| if self.seldom.has(technique) { SELDOM } else { 1.0 })
+    }
+
+    /// Whether any technique uses light sub-paths.
+    pub(crate) fn needs_light(&self) -> bool {
+        !self.techniques.without(TechniqueSet::PT).is_empty()
+    }
+
+    fn counts(&self) -> Counts {
+        let mut counts = Counts { relative: [0.0; TECHNIQUES], look_ups: [1.0; TECHNIQUES] };
+        // Camera sub-paths are never told apart by how they find the light.
+        counts.relative[Technique::Hit as usize] = 1.0;
+        counts.relative[Technique::Nee as usize] = 1.0;
+        for technique in self.techniques.without(TechniqueSet::PT).iter() {
+            let p = self.look_up(technique);
+            counts.look_ups[technique as usize] = p;
+            counts.relative[technique as usize] = match technique {
+                Technique::Hit | Technique::Nee | Technique::Connect => 1.0,
+                Technique::LightTracing => self.light_paths,
+                Technique::Surf | Technique::Pp3d | Technique::Pb2d => p * self.light_paths,
+                Technique::Bp2d | Technique::Bb1d => p * self.beam_paths,
+            };
+        }
+        counts
+    }
+}
+
+/// A candidate with what is predicted of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Judged {
+    pub(crate) candidate: Candidate,
+    /// Relative variance of one iteration, in parts due to groups of pixels.
+    pub(crate) variance: [f64; GROUPS],
+    /// Nanoseconds of one iteration, on one thread.
+    pub(crate) cost: f64,
+}
+
+impl Judged {
+    /// What an error costs: variance times time.
+    pub(crate) fn product(&self) -> f64 {
+        self.variance.iter().sum::<f64>() * self.cost
+    }
+
+    /// Whether the product is less than `gain` times the other's, and by more than the uncertainty of that.
+    fn beats(&self, other: &Self, gain: f64) -> bool {
+        if other.product().is_infinite() {
+            return self.product().is_finite();
+        }
+        let differences: [f64; GROUPS] =
+            std::array::from_fn(|i| gain * other.cost * other.variance[i] - self.cost * self.variance[i]);
+        let n = GROUPS as f64;
+        let sum: f64 = differences.iter().sum();
+        let spread: f64 = differences.iter().map(|d| (d - sum / n).powi(2)).sum();
+        sum > (n / (n - 1.0) * spread).sqrt()
+    }
+}
+
+/// Judges candidates, each once.
+struct Judge<'a> {
+    trial: &'a Trial,
+    prediction: &'a Prediction<'a>,
+    costs: &'a Costs,
+    known: Vec<Judged>,
+}
+
+impl Judge<'_> {
+    /// The judgement of each.
+    fn judge(&mut self, candidates: &[Candidate]) -> Vec<Judged> {
+        let find =
+            |known: &[Judged], candidate| known.iter().find(|judged| judged.candidate == candidate).copied();
+        let new: Vec<_> = candidates
+            .par_iter()
+            .filter(|candidate| find(&self.known, **candidate).is_none())
+            .map(|&candidate| Judged {
+                candidate,
+                variance: self.prediction.relative_variance(&candidate.counts()),
+                cost: self.costs.iteration(self.trial, &candidate),
+            })
+            .collect();
+        self.known.extend(new);
+        candidates.iter().filter_map(|candidate| find(&self.known, *candidate)).collect()
+    }
+}
+
+/// The best candidate that small steps from some sensible ones lead to.
+pub(crate) fn best(trial: &Trial, prediction: &Prediction<'_>, costs: &Costs, bounds: &Bounds) -> Candidate {
+    let mut judge = Judge { trial, prediction, costs, known: Vec::new() };
+    let everything = Candidate {
+        techniques: bounds.techniques,
+        light_paths: 1.0,
+        beam_paths: 1.0,
+        seldom: TechniqueSet::EMPTY,
+    };
+    let mut best: Option<Judged> = None;
+    for start in starts(bounds, everything) {
+        let mut at = judge.judge(&[start])[0];
+        loop {
+            let steps = judge.judge(&steps(&at.candidate, bounds));
+            let better = steps.into_iter().filter(|step| step.beats(&at, bounds.gain));
+            match better.min_by(|a, b| a.product().total_cmp(&b.product())) {
+                Some(next) => at = next,
+                None => break,
+            }
+        }
+        if best.is_none_or(|best| at.product() < bounds.gain * best.product()) {
+            best = Some(at);
+        }
+    }
+    let best = best.map_or(everything, |best| best.candidate);
+    let missing = bounds.careful.without(best.techniques);
+    if best.needs_light() {
+        Candidate { techniques: best.techniques.union(missing), seldom: best.seldom.union(missing), ..best }
+    } else {
+        best
+    }
+}
+
+/// Where to begin, the simplest first: with camera sub-paths alone, with paths alone, and with everything.
+fn starts(bounds: &Bounds, everything: Candidate) -> [Candidate; 3] {
+    let with = |set: TechniqueSet| set.union(bounds.always).intersection(bounds.techniques);
+    // What stays on only for the sake of paths that were not seen is to cost little.
+    let least = bounds.light_paths.first().copied().unwrap_or(1.0);
+    let camera = Candidate { techniques: with(TechniqueSet::PT), light_paths: least, ..everything };
+    let seldom = bounds.careful.without(bounds.always);
+    let paths = Candidate { techniques: with(TechniqueSet::BPT.union(bounds.careful)), seldom, ..everything };
+    [camera, paths, everything]
+}
+
+/// All that differ from a candidate in one thing.
+fn steps(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
+    let mut steps = Vec::new();
+    for technique in bounds.techniques.without(TechniqueSet::PT).iter() {
+        let alone = TechniqueSet::EMPTY.with(technique);
+        let (on, seldom) = (from.techniques.with(technique), from.seldom.without(alone));
+        let states = [
+            (!bounds.always.has(technique)).then_some((from.techniques.without(alone), seldom)),
+            (technique > Technique::LightTracing).then_some((on, seldom.with(technique))),
+            Some((on, seldom)),
+        ];
+        steps.extend(states.into_iter().flatten().map(|(techniques, seldom)| Candidate {
+            techniques,
+            seldom,
+            ..*from
+        }));
+    }
+    if from.needs_light() {
+        steps.extend(bounds.light_paths.iter().map(|&light_paths| Candidate { light_paths, ..*from }));
+    }
+    if from.techniques.has(Technique::Bb1d) {
+        steps.extend(bounds.beam_paths.iter().map(|&beam_paths| Candidate { beam_paths, ..*from }));
+    }
+    steps.retain(|step| step != from);
+    steps
+}

@@ -1,0 +1,94 @@
+//! From the choice of techniques to a stage of the plan.
+
+use upbp_estimators::scene::Scene;
+use upbp_estimators::{Technique, TechniqueSet, World};
+
+use crate::adapt;
+use crate::census::Census;
+use crate::choices::{BEAMS, plan};
+use crate::emitters;
+use crate::memory::LightCounts;
+use crate::pilot::Pilot;
+use crate::settings::{CheckedSettings, LightPaths};
+use crate::stage::Stage;
+
+/// What chooses stages.
+pub(crate) struct Planner {
+    pub(crate) settings: CheckedSettings,
+    /// All that the scene can use.
+    pub(crate) everything: Stage,
+    /// Memory beside the film.
+    pub(crate) bytes: u64,
+}
+
+impl Planner {
+    /// The stage that follows from a review.
+    pub(crate) fn stage<S: Scene>(
+        &self,
+        world: &World<'_, S>,
+        census: &Census,
+        pilot: &Pilot,
+        review: u32,
+    ) -> Stage {
+        /// Numbers of light sub-paths that are tried, relative to one per pixel.
+        const LIGHT_PATHS: [f64; 3] = [0.0625, 0.25, 1.0];
+        const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
+        let Self { settings, everything, .. } = self;
+        if everything.techniques.without(TechniqueSet::PT).is_empty() {
+            return everything.clone();
+        }
+        let plan = plan(world, settings, everything, adapt::REVIEWS[review as usize]);
+        let fits = |factor: &f64| {
+            let beams = f64::from(everything.beam_paths) * factor;
+            let counts = LightCounts::expected(pilot, everything.light_paths, beams as u32);
+            *factor <= 1.0 || counts.peak_bytes::<S::Bsdf>() < self.bytes as f64
+        };
+        let candidate = adapt::choose(
+            world,
+            &adapt::Choice {
+                everything: &plan,
+                always: if census.needs_merges { floor(census.techniques) } else { TechniqueSet::EMPTY },
+                careful: if world.scene.has_specular_surfaces() {
+                    floor(census.techniques).intersection(TechniqueSet::EMPTY.with(Technique::Surf))
+                } else {
+                    TechniqueSet::EMPTY
+                },
+                light_paths: match settings.light_paths {
+                    LightPaths::Auto => LIGHT_PATHS.to_vec(),
+                    LightPaths::Count(_) => vec![1.0],
+                },
+                beam_paths: match settings.beams {
+                    None => BEAM_PATHS.into_iter().filter(fits).collect(),
+                    Some(_) => vec![1.0],
+                },
+                most_paths: emitters::light_paths(pilot.vertices_per_path),
+                timed: !settings.deterministic,
+            },
+            review,
+        );
+        let count = |planned: u32, factor: f64| ((f64::from(planned) * factor) as u32).max(1);
+        let light_paths =
+            if candidate.needs_light() { count(everything.light_paths, candidate.light_paths) } else { 0 };
+        let beam_paths = if candidate.techniques.intersects(BEAMS) {
+            count(everything.beam_paths, candidate.beam_paths).min(light_paths)
+        } else {
+            0
+        };
+        // Fewer photons do not make kernels wider: the blur is not part of the prediction.
+        Stage {
+            techniques: candidate.techniques,
+            light_paths,
+            beam_paths,
+            look_ups: candidate.look_ups(),
+            ..everything.clone()
+        }
+    }
+}
+
+/// Merges find every path that has a vertex where anything but specular surfaces scatters: those on surfaces, and one kind of
+/// those in media.
+fn floor(techniques: TechniqueSet) -> TechniqueSet {
+    let volume = [Technique::Pb2d, Technique::Pp3d, Technique::Bb1d, Technique::Bp2d];
+    let one = volume.into_iter().find(|technique| techniques.has(*technique));
+    one.into_iter().chain([Technique::Surf]).collect::<TechniqueSet>().intersection(techniques)
+}
