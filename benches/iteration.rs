@@ -11,7 +11,7 @@ use std::path::Path as FilePath;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use upbp_core::{MediumId, Renderer, Settings};
+use upbp_core::{MediumId, Renderer, Settings, TechniqueSet};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy, VertexKind};
 use upbp_estimators::mis::{
     BeamExtent, Edge, End, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges,
@@ -38,7 +38,9 @@ fn iteration(criterion: &mut Criterion) {
         })
         .expect("a shipped scene");
         let bpt = Settings { techniques: "bpt".parse().expect("a set"), ..Settings::default() };
-        for (set, settings) in [("default", Settings::default()), ("bpt", bpt)] {
+        let everything = Settings { techniques: TechniqueSet::default().into(), ..Settings::default() };
+        let auto = Settings { deterministic: true, ..Settings::default() };
+        for (set, settings) in [("auto", auto), ("everything", everything), ("bpt", bpt)] {
             let settings = settings.validate().expect("valid settings");
             let mut renderer = Renderer::new(&scene, settings).expect("a scene that can be rendered");
             group.bench_function(BenchmarkId::new(name, set), |bencher| {

@@ -125,7 +125,12 @@ impl Batches {
         let radii = Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius };
         let (mut images, mut iterations, mut seconds) = (Vec::new(), 0, 0.0);
         for batch in 0..u64::from(count) {
-            let settings = Settings { techniques, radii, seed: options.seed + batch, ..Settings::default() };
+            let settings = Settings {
+                techniques: techniques.into(),
+                radii,
+                seed: options.seed + batch,
+                ..Settings::default()
+            };
             let mut renderer = Renderer::new(scene, settings.validate()?)?;
             let stop = Stop { seconds: Some(options.time), ..Stop::default() };
             renderer.render(&stop, |_| ControlFlow::Continue(()));

@@ -17,8 +17,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use upbp_core::{
-    OutputError, Renderer, Settings, State, StateError, StopReason, check_writable, read_exr,
-    remove_leftovers,
+    OutputError, RenderPlan, Renderer, Settings, State, StateError, StopReason, check_writable, read_exr,
+    remove_leftovers, write_text,
 };
 use upbp_scene::ReadyScene;
 
@@ -43,7 +43,12 @@ fn run(options: &Options) -> Result<(), Failure> {
     let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
     let scene = load(&path, options).map_err(Failure::input)?;
     let reference = options.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
-    let mut renderer = Renderer::new(&scene, settings).map_err(Failure::input)?;
+    let plan = options.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
+    let mut renderer = match plan {
+        None => Renderer::new(&scene, settings),
+        Some(plan) => Renderer::with_plan(&scene, settings, plan),
+    }
+    .map_err(Failure::input)?;
     renderer
         .identify_scene(&format!("{} ({:016x})", path.display(), scene.hash()), &scene.hash().to_le_bytes());
     let rect = renderer.film().rect();
@@ -75,6 +80,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         Some(picture.as_path()),
         options.report.as_deref(),
         options.state.as_deref(),
+        options.save_plan.as_deref(),
     ];
     for output in outputs.into_iter().flatten() {
         check_writable(output).map_err(Failure::input)?;
@@ -89,6 +95,12 @@ fn run(options: &Options) -> Result<(), Failure> {
     };
     let reason = render(&mut renderer, &options.stop(), &beside);
     write(renderer.state(), reason, options)
+}
+
+fn read_plan(path: &Path) -> Result<RenderPlan, String> {
+    let text =
+        std::fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    RenderPlan::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))
 }
 
 /// Goes on from a state file, if there is one.
@@ -112,6 +124,9 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
     let mut attempt = |written: Result<(), OutputError>| failures.extend(written.err());
     if let Some(path) = &options.state {
         attempt(state.save(path));
+    }
+    if let Some(path) = &options.save_plan {
+        attempt(write_text(path, &state.identity().plan.to_string()));
     }
     let report = state.report();
     // Before the first iteration there is no picture.

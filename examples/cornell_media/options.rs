@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Parser;
-use upbp_core::{LightPaths, MAX_ITERATIONS, Settings, Stop, TechniqueSet};
+use upbp_core::{LightPaths, MAX_ITERATIONS, Settings, Stop, Techniques};
 use upbp_scene::description::Count;
 
 /// Seconds of rendering if nothing else says when to stop.
@@ -15,6 +15,7 @@ const DEFAULT_SECONDS: f64 = 60.0;
 /// Renders light in participating media: photon points, photon beams and bidirectional paths in one estimate.
 #[derive(Debug, Parser)]
 #[command(version, about)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct Options {
     /// Scene file (RON) [default: the one that comes with the project]
     pub(crate) scene: Option<PathBuf>,
@@ -26,16 +27,25 @@ pub(crate) struct Options {
     pub(crate) size: Option<[Count; 2]>,
     /// Render iterations 0..N, or A..B as a share of a render that others work on too
     #[arg(long, value_name = "N|A..B", value_parser = iterations)]
-    iterations: Option<Range<u64>>,
+    iterations: Option<Iterations>,
     /// Stop after this many seconds of rendering, resumed ones included [default: 60 if no other limit is given]
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     time: Option<f64>,
     /// Stop when the estimated relMSE is below this
     #[arg(long, value_name = "E", value_parser = positive)]
     target_error: Option<f64>,
-    /// Techniques: names joined by `+` out of bpt, pt, hit, nee, connect, lt, surf, pp3d, pb2d, bp2d, bb1d, all
+    /// Techniques: auto [default, those that pay in the scene], or names joined by `+` out of bpt, pt, hit, nee, connect, lt, surf, pp3d, pb2d, bp2d, bb1d, all
     #[arg(long, value_name = "LIST")]
-    techniques: Option<TechniqueSet>,
+    techniques: Option<Techniques>,
+    /// Choose techniques by a model of costs instead of measured time: every run chooses the same. Goes without saying for A..B
+    #[arg(long)]
+    deterministic: bool,
+    /// Run what a plan says that another render has saved
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plan: Option<PathBuf>,
+    /// Save the plan: what iterations run, as far as it was decided
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save_plan: Option<PathBuf>,
     /// Most edges of a path between light and camera
     #[arg(long, value_name = "K")]
     max_length: Option<u32>,
@@ -98,7 +108,7 @@ impl Options {
 
     /// The iterations to render, if not all.
     pub(crate) fn range(&self) -> Option<Range<u64>> {
-        self.iterations.clone()
+        self.iterations.as_ref().map(|iterations| iterations.range.clone())
     }
 
     /// Overrides settings by what was given on the command line.
@@ -106,6 +116,7 @@ impl Options {
         if let Some(techniques) = self.techniques {
             settings.techniques = techniques;
         }
+        settings.deterministic |= self.deterministic || self.iterations.as_ref().is_some_and(|i| i.is_share);
         if let Some(length) = self.max_length {
             settings.max_length = length;
         }
@@ -135,10 +146,21 @@ fn size(text: &str) -> Result<[Count; 2], String> {
     }
 }
 
-fn iterations(text: &str) -> Result<Range<u64>, String> {
-    let (start, end) = text.split_once("..").unwrap_or(("0", text));
+/// Iterations to render.
+#[derive(Clone, Debug)]
+struct Iterations {
+    range: Range<u64>,
+    /// Whether others render the rest.
+    is_share: bool,
+}
+
+fn iterations(text: &str) -> Result<Iterations, String> {
+    let share = text.split_once("..");
+    let (start, end) = share.unwrap_or(("0", text));
     match (start.parse::<u64>(), end.parse::<u64>()) {
-        (Ok(start), Ok(end)) if start < end && end <= MAX_ITERATIONS => Ok(start..end),
+        (Ok(start), Ok(end)) if start < end && end <= MAX_ITERATIONS => {
+            Ok(Iterations { range: start..end, is_share: share.is_some() })
+        }
         _ => Err(format!(
             "expected a number of iterations such as 100, or a range such as 100..200 without its end, up to {MAX_ITERATIONS}"
         )),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Parser;
-use upbp_core::{Settings, TechniqueSet};
+use upbp_core::{Settings, Techniques};
 
 /// The set that is judged: the choice of the program.
 pub(crate) const AUTO: &str = "auto";
@@ -14,7 +14,8 @@ pub(crate) const AUTO: &str = "auto";
 pub(crate) const EVERYTHING: &str = "everything";
 
 /// Sets of a whole run.
-const SETS: [&str; 9] = [
+const SETS: [&str; 10] = [
+    AUTO,
     EVERYTHING,
     "pt",
     "bpt",
@@ -26,7 +27,7 @@ const SETS: [&str; 9] = [
     "bpt+pb2d",
 ];
 /// Sets of a quick run.
-const QUICK_SETS: [&str; 4] = [EVERYTHING, "pt", "bpt", "bpt+surf"];
+const QUICK_SETS: [&str; 5] = [AUTO, EVERYTHING, "pt", "bpt", "bpt+surf"];
 /// Seeds of a whole run, of which a quick one takes the first.
 const SEEDS: [u64; 3] = [1, 2, 3];
 /// Seconds per line of a whole run: with all scenes less than half an hour.
@@ -42,8 +43,8 @@ pub(crate) struct Options {
     /// made, or pairs SCENE.ron=REF.exr
     #[arg(long, value_delimiter = ',', default_value = "suite")]
     pub(crate) scenes: Vec<String>,
-    /// Sets of techniques, separated by semicolons; `everything` is bpt+surf+pp3d+pb2d+bb1d, `default` the default
-    /// [default: everything and eight smaller ones]
+    /// Sets of techniques, separated by semicolons; `auto` is the choice of the program, `everything` bpt+surf+pp3d+pb2d+bb1d
+    /// [default: auto, everything, and eight smaller ones]
     #[arg(long, value_delimiter = ';')]
     sets: Vec<NamedSet>,
     /// Seeds; curves are geometric means over them [default: 1,2,3]
@@ -106,7 +107,7 @@ impl Options {
 #[derive(Clone, Debug)]
 pub(crate) struct NamedSet {
     pub(crate) name: String,
-    pub(crate) techniques: TechniqueSet,
+    pub(crate) techniques: Techniques,
 }
 
 impl NamedSet {
@@ -117,12 +118,11 @@ impl NamedSet {
 }
 
 impl FromStr for NamedSet {
-    type Err = <TechniqueSet as FromStr>::Err;
+    type Err = <Techniques as FromStr>::Err;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let name = text.trim().to_owned();
         let techniques = match name.as_str() {
-            "default" => Settings::default().techniques,
             EVERYTHING => "bpt+surf+pp3d+pb2d+bb1d".parse()?,
             other => other.parse()?,
         };

@@ -116,7 +116,8 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     for name in &scenes {
         let (scene, reference) = open(name)?;
         for techniques in &sets {
-            let settings = Settings { techniques: *techniques, seed: options.seed, ..Settings::default() };
+            let settings =
+                Settings { techniques: (*techniques).into(), seed: options.seed, ..Settings::default() };
             let stop = Stop { seconds: Some(seconds), ..Stop::default() };
             let (renderer, spread) = render(&scene, settings, &stop)?;
             let film = renderer.film();
