@@ -3,7 +3,7 @@
 mod support;
 
 use support::{render, render_channels};
-use upbp_core::{LightPaths, Settings};
+use upbp_core::{LightPaths, Settings, TechniqueSet};
 use upbp_scene::ReadyScene;
 
 /// A scene whose colours are given as a function of the channel.
@@ -33,7 +33,12 @@ fn scene(sigma_s: [f32; 3], colour: [f32; 3]) -> ReadyScene {
 }
 
 fn settings() -> Settings {
-    Settings { light_paths: LightPaths::Count(1000), max_length: 50, ..Settings::default() }
+    Settings {
+        techniques: TechniqueSet::default().into(),
+        light_paths: LightPaths::Count(1000),
+        max_length: 50,
+        ..Settings::default()
+    }
 }
 
 #[test]

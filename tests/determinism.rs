@@ -5,7 +5,7 @@
 mod host;
 
 use proptest::prelude::*;
-use upbp_core::{LightPaths, Renderer, Settings, State, StateError};
+use upbp_core::{LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
 
@@ -24,6 +24,7 @@ fn bits(threads: usize, techniques: &str) -> Vec<u32> {
             techniques: techniques.parse().expect("technique names"),
             light_paths: LightPaths::Count(3000),
             beams: Some(200),
+            deterministic: true,
             ..Settings::default()
         };
         let mut renderer =
@@ -44,7 +45,7 @@ fn bits(threads: usize, techniques: &str) -> Vec<u32> {
 
 #[test]
 fn one_two_and_four_threads_give_the_same_bits() {
-    for techniques in ["all", "bpt"] {
+    for techniques in ["all", "bpt", "auto"] {
         let one = bits(1, techniques);
         assert!(one.iter().any(|b| *b != 0));
         assert!(one == bits(2, techniques), "{techniques}: two threads differ from one");
@@ -157,7 +158,11 @@ proptest! {
 fn what_does_not_belong_together_is_refused_by_name() {
     let room = host::Room::new(6).expect("valid coefficients");
     let render = |change: fn(&mut Settings), scene: &[u8], first: u64| {
-        let mut settings = Settings { light_paths: LightPaths::Count(100), ..Settings::default() };
+        let mut settings = Settings {
+            techniques: TechniqueSet::default().into(),
+            light_paths: LightPaths::Count(100),
+            ..Settings::default()
+        };
         change(&mut settings);
         let mut renderer =
             Renderer::new(&room, settings.validate().expect("valid settings")).expect("a renderer");

@@ -3,7 +3,7 @@
 mod support;
 
 use support::render;
-use upbp_core::{LightPaths, Settings};
+use upbp_core::{LightPaths, Settings, TechniqueSet};
 use upbp_scene::ReadyScene;
 
 fn scene(scale: f32, offset: f32) -> ReadyScene {
@@ -47,7 +47,12 @@ fn scene(scale: f32, offset: f32) -> ReadyScene {
 
 #[test]
 fn a_translation_by_a_million_radii_changes_no_bit() {
-    let settings = Settings { light_paths: LightPaths::Count(1000), max_length: 50, ..Settings::default() };
+    let settings = Settings {
+        techniques: TechniqueSet::default().into(),
+        light_paths: LightPaths::Count(1000),
+        max_length: 50,
+        ..Settings::default()
+    };
     let (_, expected) = render(&scene(1.0, 0.0), &settings, 2);
     for offset in [1024.0, 1_048_576.0] {
         let far = scene(1.0, offset);

@@ -18,7 +18,8 @@ use upbp_core::State;
 
 /// As [`program::command`], silent, one thread.
 fn render(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = command("cornell_media", folder, &["scene.ron", "--quiet", "--threads", "1"]);
+    let mut command =
+        command("cornell_media", folder, &["scene.ron", "--quiet", "--threads", "1", "--deterministic"]);
     command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }

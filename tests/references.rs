@@ -1,4 +1,4 @@
-//! Every reference scene, by bidirectional path tracing and by the default mixture, against an image of an
+//! Every reference scene, by bidirectional path tracing, by the whole mixture and by what the program chooses, against an image of an
 //! independent renderer: short renders, errors in standard deviations. `examples/validate` does the same with more
 //! time and all techniques.
 
@@ -15,11 +15,11 @@ use upbp_scene::ReadyScene;
 /// Iterations of each render: enough for the spread to be known.
 const ITERATIONS: u64 = 40;
 
-/// Standard errors that the mean of an image may be off. Of 20 renders with independent errors one is beyond with a
+/// Standard errors that the mean of an image may be off. Of 30 renders with independent errors one is beyond with a
 /// probability of 0.1 %.
 const MEAN: f64 = 4.0;
 
-/// The same for one of some 100 tiles of 3 channels in 20 renders. The spread of 40
+/// The same for one of some 100 tiles of 3 channels in 30 renders. The spread of 40
 /// iterations with a skew distribution has heavier tails than a normal one.
 const TILE: f64 = 6.0;
 
@@ -30,9 +30,12 @@ fn check(scene_name: &str) {
     let reference = Reference::read(&root.join(format!("tests/data/references/{scene_name}.exr")))
         .expect("an image with standard errors");
     let mut failures = Vec::new();
-    for techniques in ["bpt", "bpt+surf+pp3d+pb2d+bb1d"] {
-        let settings =
-            Settings { techniques: techniques.parse().expect("technique names"), ..Settings::default() };
+    for techniques in ["bpt", "bpt+surf+pp3d+pb2d+bb1d", "auto"] {
+        let settings = Settings {
+            techniques: techniques.parse().expect("technique names"),
+            deterministic: true,
+            ..Settings::default()
+        };
         let settings = settings.validate().expect("valid settings");
         let mut renderer = Renderer::new(&scene, settings).expect("a scene that can be rendered");
         let mut spread = Spread::default();

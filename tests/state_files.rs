@@ -9,14 +9,18 @@ use std::sync::OnceLock;
 
 use proptest::prelude::*;
 use readers::sealed;
-use upbp_core::{ErrorPoint, LightPaths, Renderer, Settings, State, StateError};
+use upbp_core::{ErrorPoint, LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
 
 /// The bytes of a good state.
 fn good() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
         let room = host::Room::new(5).expect("valid coefficients");
-        let settings = Settings { light_paths: LightPaths::Count(100), ..Settings::default() };
+        let settings = Settings {
+            techniques: TechniqueSet::default().into(),
+            light_paths: LightPaths::Count(100),
+            ..Settings::default()
+        };
         let mut renderer =
             Renderer::new(&room, settings.validate().expect("valid settings")).expect("a renderer");
         renderer.identify_scene("room", b"room");

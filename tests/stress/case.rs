@@ -191,6 +191,7 @@ impl Axes {
         let radius = self.radius.map_or(Radius::Auto, |radius| Radius::Scene(radius as f32));
         Settings {
             techniques: self.technique.parse().expect("technique names"),
+            deterministic: true,
             light_paths: LightPaths::Count(512),
             beams: Some(64),
             max_length: self.max_length,

@@ -315,7 +315,9 @@ fn layouts(cases: &mut Vec<Case>) {
                     && !matches!(layout, Layout::GlassBall | Layout::GlassOverlap)
                     && !matches!(light, Light::Laser | Light::LaserAcross | Light::Uneven(_));
                 let check = if known { Check::Like(bpt.clone()) } else { Check::Sane };
-                cases.push(Case::new("layout", Axes { technique: "all", ..bpt }, check));
+                let all = Axes { technique: "all", ..bpt.clone() };
+                cases.push(Case::new("layout", all, check.clone()));
+                cases.push(Case::new("layout", Axes { technique: "auto", ..bpt }, check));
             }
         }
     }
@@ -345,7 +347,7 @@ fn views(cases: &mut Vec<Case>) {
 fn view_cases(cases: &mut Vec<Case>, view: View, light: Light) {
     for layout in [Layout::Ball, Layout::Cube, Layout::Floor] {
         for (tau, g) in [(1.0, 0.0), (1.0, 0.99999), (1e2, 0.0), (1e2, -0.9)] {
-            for technique in ["bpt", "all"] {
+            for technique in ["bpt", "all", "auto"] {
                 let axes = Axes { tau, g, layout, light, view, technique, ..Axes::default() };
                 cases.push(Case::new("view", axes, Check::Sane));
             }

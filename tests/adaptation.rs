@@ -1,0 +1,158 @@
+//! The choice of techniques: it leaves out what a scene does not need, changes no expectation, and can be repeated and frozen.
+
+use std::path::Path;
+
+use glam::DVec3;
+use upbp_core::{LightPaths, RenderPlan, Renderer, Settings, Stop, TechniqueSet, Techniques, read_exr};
+use upbp_scene::ReadyScene;
+
+fn settings() -> Settings {
+    Settings { deterministic: true, ..Settings::default() }
+}
+
+fn renderer(scene: &ReadyScene, settings: Settings) -> Renderer<'_, ReadyScene> {
+    Renderer::new(scene, settings.validate().expect("valid settings")).expect("a scene that can be rendered")
+}
+
+fn shipped(name: &str) -> ReadyScene {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    ReadyScene::load(root.join(format!("examples/scenes/{name}.ron"))).expect("a valid scene")
+}
+
+/// A box of matt walls under a large lamp.
+const MATT: &str = r#"(
+  version: 1,
+  camera: Perspective(origin: (0, 1, 3.4), target: (0, 1, 0), fov_degrees: 40),
+  film: (width: 48, height: 48),
+  materials: { "white": Lambert(0.7), "red": Lambert((0.6, 0.1, 0.1)) },
+  shapes: [
+    (material: "white", geometry: Quad(origin: (-1, 0, -1), edge_u: (0, 0, 2), edge_v: (2, 0, 0))),
+    (material: "red", geometry: Quad(origin: (-1, 0, -1), edge_u: (2, 0, 0), edge_v: (0, 2, 0))),
+    (material: "white", geometry: Sphere(centre: (0, 0.5, 0), radius: 0.5)),
+    (material: "white", emission: (5, 5, 5), geometry: Quad(origin: (-0.8, 2, -0.8), edge_u: (1.6, 0, 0), edge_v: (0, 0, 1.6))),
+  ],
+)"#;
+
+#[test]
+fn camera_sub_paths_alone_where_they_suffice() {
+    let scene = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
+    let mut auto = renderer(&scene, settings());
+    let mut paths =
+        renderer(&scene, Settings { techniques: Techniques::Set(TechniqueSet::PT), ..settings() });
+    for _ in 0..8 {
+        assert!(auto.iterate() && paths.iterate());
+    }
+    let report = auto.report();
+    assert_eq!(report.plan.stages()[0].techniques, TechniqueSet::PT, "{report}");
+    let counters = report.counters;
+    assert_eq!(
+        [counters.light_edges, counters.light_vertices, counters.photon_beams, report.map_bytes],
+        [0; 4],
+        "no light sub-paths, nothing built"
+    );
+    // The same samples, at the same cost.
+    assert_eq!(auto.film().image(), paths.film().image());
+    assert_eq!(counters, paths.report().counters);
+}
+
+#[test]
+fn light_that_only_merges_find_is_not_lost() {
+    let scene = shipped("suite/surface_caustic");
+    for seed in 0..4 {
+        let stage = renderer(&scene, Settings { seed, ..settings() }).report().plan.stages()[0].clone();
+        assert!(stage.techniques.has(upbp_core::Technique::Surf) && stage.light_paths > 0, "{stage}");
+    }
+}
+
+/// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.
+fn unbiased(name: &str, folder: &str) {
+    const SEEDS: u64 = 20;
+    const ITERATIONS: u64 = 16;
+    let scene = shipped(&format!("{folder}/{name}"));
+    let data = if folder == "suite" { "suite" } else { "references" };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/data/{data}/{name}.exr"));
+    let mean = |pixels: &[[f32; 3]]| {
+        let sum: DVec3 = pixels.iter().map(|p| DVec3::from(p.map(f64::from))).sum();
+        sum / pixels.len() as f64
+    };
+    let expected = mean(&read_exr(&path).expect("a reference").pixels);
+    let mut plans = Vec::new();
+    let means: Vec<DVec3> = (0..SEEDS)
+        .map(|seed| {
+            // As users run it: with measured costs.
+            let mut renderer = renderer(&scene, Settings { seed, ..Settings::default() });
+            renderer.render(&Stop { iterations: Some(ITERATIONS), ..Stop::default() }, |_| {
+                std::ops::ControlFlow::Continue(())
+            });
+            plans.push(renderer.report().plan.stages()[0].to_string());
+            mean(&renderer.film().image().pixels)
+        })
+        .collect();
+    let n = SEEDS as f64;
+    let found = means.iter().sum::<DVec3>() / n;
+    let variance = means.iter().map(|m| (*m - found).powf(2.0)).sum::<DVec3>() / (n - 1.0);
+    let error = (variance / n).map(f64::sqrt);
+    plans.sort_unstable();
+    plans.dedup();
+    let sigmas = (found - expected) / error;
+    println!(
+        "{name}: {found:.5} ± {error:.5}, reference {expected:.5}, {sigmas:.2} sigma; {} plans: {plans:#?}",
+        plans.len()
+    );
+    // What kernels blur is below half a per cent here.
+    let tolerance = 4.0 * error + 0.005 * expected;
+    assert!(
+        (found - expected).abs().cmple(tolerance).all(),
+        "{name}: {found}, expected {expected} ± {error}"
+    );
+}
+
+#[test]
+fn no_bias_in_fog() {
+    unbiased("fog_cornell", "reference");
+}
+
+#[test]
+fn no_bias_in_a_forward_scattering_box() {
+    unbiased("forward_hg_box", "reference");
+}
+
+#[test]
+fn a_frozen_plan_makes_the_same_iterations() {
+    let scene = shipped("reference/mirror_fog");
+    // With measured time: what was chosen may not be chosen again.
+    let measured = Settings { light_paths: LightPaths::Count(2000), ..Settings::default() };
+    let mut first = renderer(&scene, measured.clone());
+    for _ in 0..4 {
+        assert!(first.iterate());
+    }
+    let plan = RenderPlan::from_ron(&first.state().identity().plan.to_string()).expect("a plan");
+    let checked = || measured.clone().validate().expect("valid settings");
+    let part = |range: std::ops::Range<u64>| {
+        let mut renderer = Renderer::with_plan(&scene, checked(), plan.clone()).expect("the plan fits");
+        renderer.set_range(range);
+        while renderer.iterate() {}
+        renderer.state().clone()
+    };
+    let mut whole = part(2..4);
+    whole.merge(part(0..2)).expect("parts of one render");
+    assert_eq!(whole.report().film_fingerprint, first.report().film_fingerprint);
+
+    // A state takes its plan along.
+    let mut resumed = renderer(&scene, measured.clone());
+    resumed.resume(part(0..2)).expect("the same render");
+    assert!(resumed.iterate() && resumed.iterate());
+    assert_eq!(resumed.report().film_fingerprint, first.report().film_fingerprint);
+    assert_eq!(resumed.report().plan, plan);
+}
+
+#[test]
+fn a_plan_of_another_scene_is_refused() {
+    let fog = shipped("reference/mirror_fog");
+    let everything = Settings { techniques: TechniqueSet::default().into(), ..settings() };
+    let plan = renderer(&fog, everything).report().plan;
+    let matt = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
+    let checked = settings().validate().expect("valid settings");
+    let error = Renderer::with_plan(&matt, checked, plan).map(|_| ()).expect_err("no media here").to_string();
+    assert!(error.contains("pb2d") && error.contains("cannot be used"), "{error}");
+}
