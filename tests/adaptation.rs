@@ -19,18 +19,18 @@ fn shipped(name: &str) -> ReadyScene {
     ReadyScene::load(root.join(format!("examples/scenes/{name}.ron"))).expect("a valid scene")
 }
 
-/// A box of matt walls under a large lamp.
+/// Matt things under an overcast sky.
 const MATT: &str = r#"(
   version: 1,
-  camera: Perspective(origin: (0, 1, 3.4), target: (0, 1, 0), fov_degrees: 40),
+  camera: Perspective(origin: (0, 1, 3.4), target: (0, 0.6, 0), fov_degrees: 40),
   film: (width: 48, height: 48),
   materials: { "white": Lambert(0.7), "red": Lambert((0.6, 0.1, 0.1)) },
   shapes: [
-    (material: "white", geometry: Quad(origin: (-1, 0, -1), edge_u: (0, 0, 2), edge_v: (2, 0, 0))),
+    (material: "white", geometry: Quad(origin: (-2, 0, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0))),
     (material: "red", geometry: Quad(origin: (-1, 0, -1), edge_u: (2, 0, 0), edge_v: (0, 2, 0))),
     (material: "white", geometry: Sphere(centre: (0, 0.5, 0), radius: 0.5)),
-    (material: "white", emission: (5, 5, 5), geometry: Quad(origin: (-0.8, 2, -0.8), edge_u: (1.6, 0, 0), edge_v: (0, 0, 1.6))),
   ],
+  lights: [ Constant(1) ],
 )"#;
 
 #[test]
