@@ -62,7 +62,7 @@ impl Identity {
     }
 
     /// All that counts beside the plan, as text: the shortest decimals of two different numbers differ.
-    fn fields(&self) -> [(&'static str, String); 11] {
+    fn fields(&self) -> [(&'static str, String); 12] {
         let s = &self.settings;
         let (width, height) = self.film;
         let (x, y, columns, rows) = self.part;
@@ -72,7 +72,8 @@ impl Identity {
             ("film", format!("{width} x {height}")),
             ("crop", format!("{columns} x {rows} at ({x}, {y})")),
             ("seed", s.seed.to_string()),
-            ("path lengths", format!("{} to {}", s.min_length, s.max_length)),
+            ("min_length", s.min_length.to_string()),
+            ("max_length", s.max_length.to_string()),
             ("roulette", s.roulette.to_string()),
             ("heuristic", format!("{:?}", s.heuristic)),
             ("photon_beams", format!("{:?}", s.photon_beams)),
