@@ -21,6 +21,16 @@ pub struct SettingsError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
+    /// A plan whose light sub-paths leave more than the memory budget has room for.
+    #[error("plan, stage from iteration {from}: needs {needed} MiB, the setting `memory` allows {budget}")]
+    PlanMemory {
+        /// The first iteration of the stage.
+        from: u64,
+        /// MiB that an iteration needs.
+        needed: u64,
+        /// MiB that are allowed.
+        budget: u64,
+    },
     /// A plan that does not go with the scene or the settings.
     #[error(
         "plan, stage from iteration {from}: {extra} cannot be used here, expected techniques of {techniques}"

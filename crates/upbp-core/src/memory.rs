@@ -38,29 +38,27 @@ impl LightCounts {
 
     /// The most bytes that they take at one time, from the first vertex to the end of the iteration.
     pub(crate) fn peak_bytes<B>(&self) -> f64 {
-        /// The boxes of a tree, per item.
-        const NODES: f64 = 192.0 / 64.0 * 8.0 / 7.0;
-        /// Centre and index of an item that is sorted, and its place in the result.
-        const SORT: f64 = 16.0 + 4.0;
-        /// A position with its payload, before it is in a tree; and in its place there.
+        /// The boxes of a tree, per item: those of leaves, rounded for points, and the nodes above them.
+        const NODES: f64 = 256.0 / 512.0 * 8.0 / 7.0;
+        const POINT_BOXES: f64 = 64.0 / 64.0 + NODES;
+        const PIECE_BOXES: f64 = 192.0 / 64.0 + NODES;
+        /// A position with its payload: given to be sorted, sorted into buckets, and in its place in the tree.
         const POINT: f64 = 16.0;
-        /// A segment with its payload; a piece of one, before and in the tree.
+        /// A segment with its payload.
         const SEGMENT: f64 = 36.0;
+        /// A piece of one; its centre and index, given to be sorted and sorted into buckets; its place in the tree.
         const PIECE: f64 = 12.0;
-        const PLACED: f64 = 36.0;
-        /// The light pass has a wave of pieces in two places, and what their buffers leave is not given back before the build.
-        const WAVE: f64 = 1.0 / 32.0;
-        let kept =
+        const CENTRE: f64 = 16.0;
+        const PLACED: f64 = 40.0;
+        let held =
             self.vertices * size_of::<LightVertex<B>>() as f64 + self.beams * size_of::<PhotonBeam>() as f64;
-        let held = (1.0 + WAVE) * kept;
-        let point_tree = NODES + POINT;
-        let built = self.surface * point_tree;
-        let surface = self.surface * (POINT + SORT + NODES);
-        let medium = built + self.medium * (POINT + SORT + NODES);
-        let built = built + self.medium * point_tree;
-        let segments = self.beams * SEGMENT;
-        let sorting = segments + self.pieces * (PIECE + SORT + NODES);
-        let placing = segments + self.pieces * (PIECE + 4.0 + NODES + PLACED);
-        held + surface.max(medium).max(built + sorting.max(placing))
+        // What is sorted is kept until the tree is there.
+        let (building, tree) = (3.0 * POINT + POINT_BOXES, POINT + POINT_BOXES);
+        let surface = self.surface * building;
+        let medium = self.surface * tree + self.medium * building;
+        let points = (self.surface + self.medium) * tree;
+        let beams =
+            points + self.beams * SEGMENT + self.pieces * (PIECE + 2.0 * CENTRE + PLACED + PIECE_BOXES);
+        held + surface.max(medium).max(beams)
     }
 }

@@ -47,19 +47,22 @@ impl Planner {
             world,
             &adapt::Choice {
                 everything: &plan,
-                always: if census.needs_merges { floor(census.techniques) } else { TechniqueSet::EMPTY },
-                careful: if world.scene.has_specular_surfaces() {
-                    floor(census.techniques).intersection(TechniqueSet::EMPTY.with(Technique::Surf))
-                } else {
-                    TechniqueSet::EMPTY
-                },
-                light_paths: match settings.light_paths {
-                    LightPaths::Auto => LIGHT_PATHS.to_vec(),
-                    LightPaths::Count(_) => vec![1.0],
-                },
-                beam_paths: match settings.beams {
-                    None => BEAM_PATHS.into_iter().filter(fits).collect(),
-                    Some(_) => vec![1.0],
+                bounds: adapt::Bounds {
+                    techniques: plan.techniques,
+                    always: if census.needs_merges { floor(census.techniques) } else { TechniqueSet::EMPTY },
+                    careful: if world.scene.has_specular_surfaces() {
+                        census.techniques.intersection(TechniqueSet::EMPTY.with(Technique::Surf))
+                    } else {
+                        TechniqueSet::EMPTY
+                    },
+                    light_paths: match settings.light_paths {
+                        LightPaths::Auto => LIGHT_PATHS.to_vec(),
+                        LightPaths::Count(_) => vec![1.0],
+                    },
+                    beam_paths: match settings.beams {
+                        None => BEAM_PATHS.into_iter().filter(fits).collect(),
+                        Some(_) => vec![1.0],
+                    },
                 },
                 most_paths: emitters::light_paths(pilot.vertices_per_path),
                 timed: !settings.deterministic,

@@ -112,6 +112,17 @@ impl<'a, S: Scene> Renderer<'a, S> {
             pilot = look(&world);
         }
         let pixels = rect.width.saturating_mul(rect.height);
+        for stage in frozen.iter().flat_map(RenderPlan::stages) {
+            let counts = LightCounts::expected(&pilot, stage.light_paths, stage.beam_paths);
+            let needed = film_bytes + counts.peak_bytes::<S::Bsdf>() as u64;
+            if needed > budget {
+                return Err(RenderError::PlanMemory {
+                    from: stage.from,
+                    needed: needed.div_ceil(1 << 20),
+                    budget: u64::from(settings.memory),
+                });
+            }
+        }
         let everything = everything(&world, &settings, techniques, &pilot, pixels, budget - film_bytes);
         let planner = Planner { settings: settings.clone(), everything, bytes: budget - film_bytes };
         let (plan, planner) = match (frozen, settings.techniques) {

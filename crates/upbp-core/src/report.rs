@@ -125,7 +125,7 @@ pub struct Report {
     pub film_fingerprint: String,
     /// Seconds of rendering by pass.
     pub seconds: PassSeconds,
-    /// Whether costs came from a model; else time was measured.
+    /// Whether techniques, if they were chosen, were so by a model of costs; else time was measured.
     pub deterministic: bool,
     /// What iterations ran, from which on.
     pub plan: RenderPlan,

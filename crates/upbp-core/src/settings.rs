@@ -10,7 +10,7 @@ use crate::techniques::Techniques;
 /// A number of light sub-paths per iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LightPaths {
-    /// As many as there are pixels, within the memory budget.
+    /// As many as there are pixels, within the memory budget; fewer where [`Techniques::Auto`] finds that this pays.
     #[default]
     Auto,
     /// This many, within the memory budget.
@@ -29,11 +29,12 @@ pub struct Settings {
     pub seed: u64,
     /// Light sub-paths per iteration. A count is kept as it is, whatever techniques are chosen.
     pub light_paths: LightPaths,
-    /// Light sub-paths that leave photon beams; `None` for as many as a pilot finds useful.
+    /// Light sub-paths that leave photon beams; `None` for as many as a pilot finds useful, or a quarter or four times of that if techniques are
+    /// chosen.
     pub beams: Option<u32>,
-    /// Light vertices that every camera vertex is connected to, `[1, 1000]`; `None` for a number that goes with the techniques.
+    /// Light vertices that every camera vertex is connected to, `[1, 1000]`; `None` for one.
     pub connections: Option<u32>,
-    /// Points on lights that every camera vertex is connected to, `[1, 1000]`; `None` as for connections.
+    /// Points on lights that every camera vertex is connected to, `[1, 1000]`; `None` for one.
     pub next_events: Option<u32>,
     /// Fewest edges of a path between light and camera, at least 1.
     pub min_length: u32,

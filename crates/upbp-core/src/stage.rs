@@ -43,6 +43,8 @@ impl Stage {
         let finite = |x: &f32| (0.0..f32::INFINITY).contains(x);
         if self.techniques.is_empty() {
             Err("techniques: expected at least one".into())
+        } else if self.light_paths == 0 && !self.techniques.without(TechniqueSet::PT).is_empty() {
+            Err(format!("light_paths: expected at least 1 for {}", self.techniques))
         } else if self.beam_paths > self.light_paths {
             Err(format!(
                 "beam_paths: expected at most light_paths ({}), found {}",
@@ -209,6 +211,7 @@ mod tests {
             refused(vec![stage(0), second])
         };
         assert!(wrong(|s| s.look_ups[2] = 0.0).contains("stage 1: look_ups"));
+        assert!(wrong(|s| s.light_paths = 0).contains("light_paths"));
         assert!(wrong(|s| s.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|s| s.radii.pb2d = f32::NAN).contains("radii"));
         assert!(wrong(|s| s.techniques = TechniqueSet::EMPTY).contains("techniques"));

@@ -1,7 +1,7 @@
 //! What an iteration of a plan costs.
 //!
-//! A model counts what sub-paths do, as the trial saw it, and takes nanoseconds per count from a table that was measured once, on
-//! one machine. That is enough for a decision that everybody repeats to the last bit. If time may be measured, each part of the
+//! A model counts what sub-paths do, as the trial saw it, and takes nanoseconds per count from a table that was set by hand after
+//! measurements on one machine. That is enough for a decision that everybody repeats to the last bit. If time may be measured, each part of the
 //! model is corrected by the ratio of the time that the trial took for it; ratios are between parts of one run, side by side, so that
 //! a busy machine slows all of them.
 

@@ -15,7 +15,8 @@ use upbp_estimators::{Plan, TechniqueSet, World};
 
 use cost::Costs;
 use prediction::Prediction;
-use search::{Bounds, Candidate};
+pub(crate) use search::Bounds;
+use search::Candidate;
 use trial::{Grid, PASSES};
 
 /// The iterations before which the plan is chosen, again and again: radii have shrunk, and a larger trial is worth its time.
@@ -34,20 +35,14 @@ const LIGHT_PATHS_PER_CELL: u32 = 2;
 pub(crate) struct Choice<'a> {
     /// Everything that the scene can use, with the full number of light sub-paths.
     pub(crate) everything: &'a Plan,
-    /// Techniques without which some path would have none.
-    pub(crate) always: TechniqueSet,
-    /// Techniques that a plan with light sub-paths has at least seldom.
-    pub(crate) careful: TechniqueSet,
-    /// Numbers of light sub-paths relative to it, if they are free.
-    pub(crate) light_paths: Vec<f64>,
-    pub(crate) beam_paths: Vec<f64>,
+    pub(crate) bounds: Bounds,
     /// Camera sub-paths, and light sub-paths, of a pass at most: what is written down must fit into memory.
     pub(crate) most_paths: u32,
     /// Whether time may be measured.
     pub(crate) timed: bool,
 }
 
-/// Chooses.
+/// Makes the choice of a review, by the number of it.
 pub(crate) fn choose<S: Scene>(world: &World<'_, S>, choice: &Choice<'_>, review: u32) -> Candidate {
     let plan = choice.everything;
     let crop = world.scene.camera().crop();
@@ -60,13 +55,5 @@ pub(crate) fn choose<S: Scene>(world: &World<'_, S>, choice: &Choice<'_>, review
     let trial = trial::run(world, plan, &grid, paths, PASSES * review, choice.timed);
     let prediction = Prediction::new(&trial, &grid);
     let costs = Costs::of(&trial);
-    let bounds = Bounds {
-        techniques: plan.techniques,
-        always: choice.always,
-        careful: choice.careful,
-        light_paths: choice.light_paths.clone(),
-        beam_paths: choice.beam_paths.clone(),
-        gain: GAINS[review as usize],
-    };
-    search::best(&trial, &prediction, &costs, &bounds)
+    search::best(&trial, &prediction, &costs, &choice.bounds, GAINS[review as usize])
 }

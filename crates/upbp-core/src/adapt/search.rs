@@ -23,15 +23,14 @@ pub(crate) struct Candidate {
 pub(crate) struct Bounds {
     /// All techniques that the scene can use.
     pub(crate) techniques: TechniqueSet,
-    /// Those that stay on.
+    /// Those that stay on: some path may have no other.
     pub(crate) always: TechniqueSet,
     /// Those that a plan with light sub-paths has at least seldom: there may be light that a trial misses.
     pub(crate) careful: TechniqueSet,
     /// Numbers of light sub-paths, relative to the trial's plan; ascending, with 1.
     pub(crate) light_paths: Vec<f64>,
+    /// The same of those with photon beams.
     pub(crate) beam_paths: Vec<f64>,
-    /// A step must make the product smaller by this factor: predictions are noisy, and the least of many is so by chance.
-    pub(crate) gain: f64,
 }
 
 /// What part of the camera sub-paths look up what is looked up seldom.
@@ -129,8 +128,15 @@ impl Judge<'_> {
     }
 }
 
-/// The best candidate that small steps from some sensible ones lead to.
-pub(crate) fn best(trial: &Trial, prediction: &Prediction<'_>, costs: &Costs, bounds: &Bounds) -> Candidate {
+/// The best candidate that small steps from some sensible ones lead to. A step must make the product smaller by the factor
+/// `gain`: predictions are noisy, and the least of many is so by chance.
+pub(crate) fn best(
+    trial: &Trial,
+    prediction: &Prediction<'_>,
+    costs: &Costs,
+    bounds: &Bounds,
+    gain: f64,
+) -> Candidate {
     let mut judge = Judge { trial, prediction, costs, known: Vec::new() };
     let everything = Candidate {
         techniques: bounds.techniques,
@@ -143,13 +149,13 @@ pub(crate) fn best(trial: &Trial, prediction: &Prediction<'_>, costs: &Costs, bo
         let mut at = judge.judge(&[start])[0];
         loop {
             let steps = judge.judge(&steps(&at.candidate, bounds));
-            let better = steps.into_iter().filter(|step| step.beats(&at, bounds.gain));
+            let better = steps.into_iter().filter(|step| step.beats(&at, gain));
             match better.min_by(|a, b| a.product().total_cmp(&b.product())) {
                 Some(next) => at = next,
                 None => break,
             }
         }
-        if best.is_none_or(|best| at.product() < bounds.gain * best.product()) {
+        if best.is_none_or(|best| at.product() < gain * best.product()) {
             best = Some(at);
         }
     }
