@@ -195,7 +195,7 @@ impl<'a> Ends<'a> {
         let factors = plan.volume_factors(MediumId(0), light.c, camera.c, vertex.sin_theta);
         let (before_light, before_camera) =
             (light.before(plan, vertex.rho_camera), camera.before(plan, vertex.rho_light));
-        plan.merge_weight(factors.bb1d, factors.sum(), before_light, before_camera)
+        plan.merge_weight(factors.bb1d, factors.sum(), before_light, before_camera).value()
     }
 
     /// The connection of the vertex in fog to the wall before it.
@@ -217,7 +217,7 @@ impl<'a> Ends<'a> {
         let square = edge.distance * edge.distance;
         let light_density = b.rho_camera * a.cos_camera / square * edge.t_camera;
         let camera_density = a.rho_light * b.cos_light / square * edge.t_light;
-        plan.connect_weight(light_end, light_density, camera_end, camera_density)
+        plan.connect_weight(light_end, light_density, camera_end, camera_density).value()
     }
 }
 

@@ -168,8 +168,11 @@ impl Sums {
 }
 
 impl Observer<Nothing> for Sums {
+    type Densities = f64;
+
     fn sample(&mut self, sample: &ObservedSample<Nothing>) {
-        assert!((sample.weight - 1.0).abs() < 1e-12, "one technique alone has weight {}", sample.weight);
+        let weight = sample.weight.value();
+        assert!((weight - 1.0).abs() < 1e-12, "one technique alone has weight {weight}");
         self.add(f64::from(sample.value[0]));
     }
 }

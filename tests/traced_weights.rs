@@ -13,7 +13,7 @@ use closed_form::{ClosedForm, Material};
 use glam::Vec3;
 use rebuild::{Trace, Vertex};
 use upbp_estimators::mis::oracle::{Path, Strategy};
-use upbp_estimators::mis::{BeamExtent, Heuristic};
+use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::scene::Scene;
 use upbp_estimators::walk::{
@@ -139,7 +139,8 @@ impl<'a> Auditor<'a> {
     fn audit(&mut self, sample: &ObservedSample<Material>) {
         let technique = sample.technique as usize;
         self.comparisons[technique].seen += 1;
-        assert!((0.0..=1.0 + 1e-6).contains(&sample.weight), "{sample:?}");
+        let found = sample.weight.value();
+        assert!((0.0..=1.0 + 1e-6).contains(&found), "{sample:?}");
         let (trace, strategy) = self.trace(sample);
         assert!(self.plan.lengths.contain(trace.length() as u32), "{sample:?}");
         let Ok(path) = trace.rebuild(self.scene, self.plan.roulette) else {
@@ -153,10 +154,10 @@ impl<'a> Auditor<'a> {
             weights.iter().find(|(other, _)| *other == strategy).map_or(0.0, |w| w.1)
         };
         let expected = weight(&path);
-        if expected.max(sample.weight) < SMALLEST_WEIGHT {
+        if expected.max(found) < SMALLEST_WEIGHT {
             return;
         }
-        let difference = (sample.weight / expected - 1.0).abs();
+        let difference = (found / expected - 1.0).abs();
         let mut excess = difference / TOLERANCE;
         if excess > 1.0 {
             let rounding = trace.sensitivity(self.scene, self.plan.roulette, weight, expected);
@@ -165,13 +166,15 @@ impl<'a> Auditor<'a> {
         let comparison = &mut self.comparisons[technique];
         comparison.differences.push(difference);
         if excess > comparison.worst.0 {
-            let text = format!("{strategy:?}: {}, expected {expected}\n{trace:?}\n{path:?}", sample.weight);
+            let text = format!("{strategy:?}: {found}, expected {expected}\n{trace:?}\n{path:?}");
             comparison.worst = (excess, text);
         }
     }
 }
 
 impl Observer<Material> for Auditor<'_> {
+    type Densities = f64;
+
     fn light_end(&mut self, path: u32, end: &LightEnd) {
         self.light_ends[path as usize] = Some(*end);
     }
@@ -352,6 +355,82 @@ fn subsets_of_techniques() {
 #[test]
 fn walks_without_roulette() {
     audit("no roulette", CAMERAS[0], 48, &PlanChoices { roulette: false, ..choices() }, 500);
+}
+
+/// Samples with their weights.
+struct Weights<D>(Vec<(Technique, Weight<D>)>);
+
+impl<B, D: Densities> Observer<B> for Weights<D> {
+    type Densities = D;
+
+    fn sample(&mut self, sample: &ObservedSample<B, D>) {
+        self.0.push((sample.technique, sample.weight));
+    }
+}
+
+fn weights<D: Densities>(plan: &Plan) -> Vec<(Technique, Weight<D>)> {
+    let scene = ClosedForm::new(CAMERAS[1], 24);
+    let world = World::new(&scene).expect("the scene is in order");
+    let context = Context { world: &world, plan };
+    let mut weights = Weights(Vec::new());
+    let (mut scratch, mut chunk) = (Scratch::default(), LightChunk::default());
+    for index in 0..plan.light_paths {
+        trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, &mut weights);
+    }
+    let map = LightMap::build(plan, chunk.vertices, chunk.beams);
+    let mut counters = Counters::default();
+    for i in 0..24 * 24 {
+        let (kind, pixel) = (StreamKind::Camera, [i % 24, i / 24]);
+        let index = u64::from(i);
+        let _ =
+            trace_camera_path(&context, &map, kind, pixel, index, &mut scratch, &mut counters, &mut weights);
+    }
+    weights.0
+}
+
+#[test]
+fn parts_of_techniques_are_what_counting_one_twice_shows() {
+    for heuristic in [Heuristic::Balance, Heuristic::Power] {
+        let plan = Plan::new(&ClosedForm::new(CAMERAS[1], 24), &PlanChoices { heuristic, ..choices() });
+        let parts = weights::<ByTechnique>(&plan);
+        assert!(parts.len() > 10_000, "{}", parts.len());
+        let squared = if heuristic == Heuristic::Power { 2 } else { 1 };
+        for counted in Technique::ALL {
+            let mut twice = plan.clone();
+            let MisPlan { hit, nee, connect, light_tracing, surf, volume, .. } = &mut twice.mis;
+            match counted {
+                Technique::Hit => *hit *= 2.0,
+                Technique::Nee => *nee *= 2.0,
+                Technique::Connect => *connect *= 2.0,
+                Technique::LightTracing => *light_tracing *= 2.0,
+                Technique::Surf => *surf *= 2.0,
+                Technique::Pp3d => volume.iter_mut().for_each(|v| v.pp3d *= 2.0),
+                Technique::Pb2d => volume.iter_mut().for_each(|v| v.pb2d *= 2.0),
+                Technique::Bp2d => volume.iter_mut().for_each(|v| v.bp2d *= 2.0),
+                Technique::Bb1d => volume.iter_mut().for_each(|v| v.bb1d *= 2.0),
+            }
+            let found = weights::<f64>(&twice);
+            assert_eq!(found.len(), parts.len());
+            let mut seen = 0;
+            for ((technique, found), (_, weight)) in found.iter().zip(&parts) {
+                let part = weight.all.0[counted as usize] / weight.all.total();
+                // A light that is seen directly has no other technique.
+                if part == 1.0 && *technique == Technique::Hit && found.value() == 1.0 {
+                    continue;
+                }
+                let factor = 2.0_f64.powi(squared);
+                let own = if *technique == counted { factor } else { 1.0 };
+                let expected = own * weight.value() / (1.0 + (factor - 1.0) * part);
+                let found = found.value();
+                assert!(
+                    (found / expected - 1.0).abs() < 1e-9,
+                    "{technique:?}, {counted:?}: {found}, {expected}"
+                );
+                seen += usize::from(part > 1e-3);
+            }
+            assert!(seen > 100, "{counted:?}: {seen}");
+        }
+    }
 }
 
 #[test]

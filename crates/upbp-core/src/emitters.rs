@@ -179,12 +179,14 @@ struct Contribution {
 }
 
 impl<B> Observer<B> for Seen {
+    type Densities = f64;
+
     fn light_end(&mut self, path: u32, end: &LightEnd) {
         self.starts[(path - self.first) as usize] = Some(end.emitter.0);
     }
 
     fn sample(&mut self, sample: &ObservedSample<B>) {
-        let seen = Contribution { value: f64::from(sample.value.mean()), weight: sample.weight };
+        let seen = Contribution { value: f64::from(sample.value.mean()), weight: sample.weight.value() };
         match sample.joint {
             Joint::Emission | Joint::Hit(_) => {}
             Joint::Nee { light: end, .. } => self.next_event.push((end.emitter.0, seen)),

@@ -213,6 +213,8 @@ struct Queries {
 }
 
 impl<B> Observer<B> for Queries {
+    type Densities = f64;
+
     fn camera_end(&mut self, lens: Vec3, _: Vec3, _: f32) {
         self.last = lens;
     }

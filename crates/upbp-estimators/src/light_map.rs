@@ -2,16 +2,16 @@
 
 use upbp_accel::{PointTree, SegmentTree, SplitParams};
 
-use crate::mis::VolumeMerges;
+use crate::mis::{Densities, VolumeMerges};
 use crate::plan::Plan;
 use crate::walk::{LightVertex, PhotonBeam, Site};
 
 /// Light vertices and photon beams with their look-up structures.
-pub struct LightMap<B> {
+pub struct LightMap<B, D = f64> {
     /// All vertices that can be connected or merged.
-    pub vertices: Vec<LightVertex<B>>,
+    pub vertices: Vec<LightVertex<B, D>>,
     /// All photon beams.
-    pub beams: Vec<PhotonBeam>,
+    pub beams: Vec<PhotonBeam<D>>,
     /// Surface photons; the payload is an index into `vertices`.
     pub(crate) surface: PointTree<u32>,
     /// Photons in media.
@@ -20,10 +20,10 @@ pub struct LightMap<B> {
     pub(crate) beam_tree: SegmentTree<u32>,
 }
 
-impl<B: Copy + Send + Sync> LightMap<B> {
+impl<B: Copy + Send + Sync, D: Densities> LightMap<B, D> {
     /// Builds the structures that the plan queries, and no others.
     #[must_use]
-    pub fn build(plan: &Plan, vertices: Vec<LightVertex<B>>, beams: Vec<PhotonBeam>) -> Self {
+    pub fn build(plan: &Plan, vertices: Vec<LightVertex<B, D>>, beams: Vec<PhotonBeam<D>>) -> Self {
         let photons = |on: bool, keep: fn(&Site<B>) -> bool| {
             let chosen = vertices.iter().enumerate().filter(|(_, v)| on && keep(&v.site));
             PointTree::build(chosen.map(|(i, v)| (v.position, i as u32)).collect())
@@ -50,8 +50,8 @@ impl<B: Copy + Send + Sync> LightMap<B> {
     /// Bytes that the map occupies.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
-        self.vertices.capacity() * size_of::<LightVertex<B>>()
-            + self.beams.capacity() * size_of::<PhotonBeam>()
+        self.vertices.capacity() * size_of::<LightVertex<B, D>>()
+            + self.beams.capacity() * size_of::<PhotonBeam<D>>()
             + self.surface.memory_bytes()
             + self.medium.memory_bytes()
             + self.beam_tree.memory_bytes()

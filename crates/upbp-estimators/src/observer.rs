@@ -3,6 +3,7 @@
 use glam::Vec3;
 use upbp_media::Spectrum;
 
+use crate::mis::{Densities, Weight};
 use crate::scene::{EmitterId, EmitterPoint};
 use crate::technique::Technique;
 use crate::walk::Site;
@@ -78,7 +79,7 @@ pub enum Joint<B> {
 
 /// An accepted sample.
 #[derive(Clone, Copy, Debug)]
-pub struct ObservedSample<B> {
+pub struct ObservedSample<B, D = f64> {
     /// The technique.
     pub technique: Technique,
     /// Edges of the camera sub-path up to the joint.
@@ -86,13 +87,16 @@ pub struct ObservedSample<B> {
     /// How the sub-paths meet.
     pub joint: Joint<B>,
     /// Weight of the technique.
-    pub weight: f64,
+    pub weight: Weight<D>,
     /// Contribution before weighting.
     pub value: Spectrum,
 }
 
 /// Receives what the walks do. All methods do nothing by default and then cost nothing.
 pub trait Observer<B> {
+    /// What weights are to tell: `f64`, or [`ByTechnique`](crate::mis::ByTechnique).
+    type Densities: Densities;
+
     /// A light sub-path starts.
     fn light_end(&mut self, path: u32, end: &LightEnd) {
         let _ = (path, end);
@@ -119,10 +123,12 @@ pub trait Observer<B> {
     }
 
     /// A sample was accepted. Samples of light tracing come with the light sub-paths.
-    fn sample(&mut self, sample: &ObservedSample<B>) {
+    fn sample(&mut self, sample: &ObservedSample<B, Self::Densities>) {
         let _ = sample;
     }
 }
 
 /// Nobody looks.
-impl<B> Observer<B> for () {}
+impl<B> Observer<B> for () {
+    type Densities = f64;
+}

@@ -9,22 +9,23 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use support::{TECHNIQUES, masked, modes, path, plan};
-use upbp_estimators::MediumId;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
 use upbp_estimators::mis::{
-    BeamExtent, Edge, End, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges,
+    BeamExtent, ByTechnique, Densities, Edge, End, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges,
+    Weight,
 };
 use upbp_estimators::scene::Walk;
+use upbp_estimators::{MediumId, Technique};
 
 /// Weights by the recursion, with exactly the calls that the walks make.
-struct Recursion<'a> {
+struct Recursion<'a, D> {
     plan: &'a MisPlan,
     path: &'a Path,
     /// By vertex; those that a walk does not arrive at stay empty.
-    light: Vec<Tip>,
-    camera: Vec<Tip>,
+    light: Vec<Tip<D>>,
+    camera: Vec<Tip<D>>,
     /// On arrival of the camera walk at the light, with next events as connections.
-    at_light: Tip,
+    at_light: Tip<D>,
 }
 
 fn is_ok(vertex: &PathVertex) -> bool {
@@ -48,15 +49,15 @@ fn distance_squared(edge: &PathEdge) -> f64 {
 }
 
 /// What a vertex passes on after it has scattered.
-fn pend(
+fn pend<D: Densities>(
     plan: &MisPlan,
     vertex: &PathVertex,
-    tip: &Tip,
+    tip: &Tip<D>,
     rho: f64,
     rho_opposite: f64,
     cos_out: f64,
-) -> Pending {
-    let tip = if is_ok(vertex) { *tip } else { Tip { connect: 0.0, ..*tip } };
+) -> Pending<D> {
+    let tip = if is_ok(vertex) { *tip } else { Tip { connect: D::ZERO, ..*tip } };
     Pending {
         before: tip.before(plan, rho_opposite),
         rho,
@@ -68,10 +69,11 @@ fn pend(
     }
 }
 
-impl<'a> Recursion<'a> {
+impl<'a, D: Densities> Recursion<'a, D> {
     fn new(plan: &'a MisPlan, path: &'a Path) -> Self {
         let (k, v) = (path.length(), &path.vertices);
-        let mut light = vec![Tip::default(); k + 1];
+        let nowhere = Tip { connect: D::ZERO, below: D::ZERO, c: 0.0 };
+        let mut light = vec![nowhere; k + 1];
         let mut pending =
             Pending::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
         for i in 1..k {
@@ -84,13 +86,18 @@ impl<'a> Recursion<'a> {
                 reach: e.reach,
                 ends_in_medium: in_medium(&v[i]),
             };
-            let connections =
-                if i == 1 { plan.nee * path.pdf_incident / path.pdf_position } else { plan.connect };
-            light[i] = pending.arrive(plan, Walk::Light, &edge, if is_ok(&v[i]) { connections } else { 0.0 });
+            let connections = if !is_ok(&v[i]) {
+                D::ZERO
+            } else if i == 1 {
+                D::of(Technique::Nee, plan.pow(plan.nee * path.pdf_incident / path.pdf_position))
+            } else {
+                plan.connections()
+            };
+            light[i] = pending.arrive(plan, Walk::Light, &edge, connections);
             pending = pend(plan, &v[i], &light[i], v[i].rho_light, v[i].rho_camera, v[i].cos_camera);
         }
-        let mut camera = vec![Tip::default(); k + 1];
-        let mut at_light = Tip::default();
+        let mut camera = vec![nowhere; k + 1];
+        let mut at_light = nowhere;
         let mut pending = Pending::at_camera(v[k].rho_camera);
         for i in (0..k).rev() {
             let e = &path.edges[i];
@@ -103,19 +110,25 @@ impl<'a> Recursion<'a> {
                 ends_in_medium: in_medium(&v[i]),
             };
             if i == 0 {
-                at_light = pending.arrive(plan, Walk::Camera, &edge, plan.nee);
+                let next_events = D::of(Technique::Nee, plan.pow(plan.nee));
+                at_light = pending.arrive(plan, Walk::Camera, &edge, next_events);
                 break;
             }
-            let connections = if i + 1 == k { plan.light_tracing } else { plan.connect };
-            camera[i] =
-                pending.arrive(plan, Walk::Camera, &edge, if is_ok(&v[i]) { connections } else { 0.0 });
+            let connections = if !is_ok(&v[i]) {
+                D::ZERO
+            } else if i + 1 == k {
+                D::of(Technique::LightTracing, plan.pow(plan.light_tracing))
+            } else {
+                plan.connections()
+            };
+            camera[i] = pending.arrive(plan, Walk::Camera, &edge, connections);
             pending = pend(plan, &v[i], &camera[i], v[i].rho_camera, v[i].rho_light, v[i].cos_light);
         }
         Self { plan, path, light, camera, at_light }
     }
 
     /// The end of the light sub-path at vertex `i`, with the edge that the camera's side would arrive by.
-    fn light_end(&self, i: usize) -> End {
+    fn light_end(&self, i: usize) -> End<D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i]);
         let c = match vertex.kind {
             VertexKind::Medium(_) => self.plan.distance_factor(Walk::Camera, edge.reach, edge.t_camera),
@@ -128,7 +141,7 @@ impl<'a> Recursion<'a> {
     }
 
     /// The end of the camera sub-path at vertex `i`, with the edge that the light's side would arrive by.
-    fn camera_end(&self, i: usize) -> End {
+    fn camera_end(&self, i: usize) -> End<D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i - 1]);
         let c = match vertex.kind {
             VertexKind::Medium(_) => self.plan.distance_factor(Walk::Light, edge.reach, edge.t_light),
@@ -152,7 +165,7 @@ impl<'a> Recursion<'a> {
         v[i + 1].rho_camera * v[i].cos_camera / distance_squared(edge) * edge.t_camera
     }
 
-    fn merge(&self, i: usize, factor: impl Fn(&VolumeMerges) -> f64) -> f64 {
+    fn merge(&self, i: usize, factor: impl Fn(&VolumeMerges) -> f64) -> Weight<D> {
         let vertex = &self.path.vertices[i];
         let (light, camera) = (&self.light[i], &self.camera[i]);
         let (factor, merges) = match vertex.kind {
@@ -160,19 +173,22 @@ impl<'a> Recursion<'a> {
                 let factors = self.plan.volume_factors(medium, light.c, camera.c, vertex.sin_theta);
                 (factor(&factors), factors.sum())
             }
-            _ => (self.plan.pow(self.plan.surf), self.plan.pow(self.plan.surf)),
+            _ => {
+                let factor = self.plan.pow(self.plan.surf);
+                (factor, D::of(Technique::Surf, factor))
+            }
         };
         let before_light = light.before(self.plan, vertex.rho_camera);
         let before_camera = camera.before(self.plan, vertex.rho_light);
         self.plan.merge_weight(factor, merges, before_light, before_camera)
     }
 
-    fn weight(&self, way: Way) -> f64 {
+    fn weight(&self, way: Way) -> Weight<D> {
         let Self { plan, path, .. } = *self;
         let k = path.length();
         let rho_light = path.vertices[0].rho_light;
         match way {
-            Way::Hit if k == 1 => 1.0,
+            Way::Hit if k == 1 => Weight::alone(Technique::Hit),
             Way::Hit => plan.hit_weight(&self.at_light, path.pdf_incident, path.pdf_position, rho_light),
             Way::Nee => plan.nee_weight(
                 path.pdf_incident,
@@ -236,10 +252,10 @@ impl Reached {
     /// weight down to `1e-200`, below which squares of densities leave the range of normal numbers.
     fn compare(&mut self, plan: &MisPlan, path: &Path, mask: u32) -> Result<(), TestCaseError> {
         let expected = path.weights(plan);
-        let recursion = Recursion::new(plan, path);
+        let recursion = Recursion::<f64>::new(plan, path);
         let mut sum = 0.0;
         for &(way, weight) in &expected {
-            let found = recursion.weight(way);
+            let found = recursion.weight(way).value();
             sum += found;
             if weight < 1e-200 {
                 prop_assert!(found < 1e-190, "{way:?}: {found} for {weight}");
@@ -260,12 +276,39 @@ impl Reached {
                 prop_assert_eq!(path.weight(plan, way), 0.0);
                 // The recursion is only asked by techniques that run; zero counts must give zero all the
                 // same, unless nothing makes the path or this sub-path does not exist.
-                let found = recursion.weight(way);
+                let found = recursion.weight(way).value();
                 prop_assert!(
                     found == 0.0 || !found.is_finite() || way == Way::Hit,
                     "{way:?} is off: {found}"
                 );
             }
+        }
+        Ok(())
+    }
+
+    /// Compares the parts that techniques have in all weights of one path.
+    fn compare_by_technique(&mut self, plan: &MisPlan, path: &Path) -> Result<(), TestCaseError> {
+        let expected = path.weights(plan);
+        let recursion = Recursion::<ByTechnique>::new(plan, path);
+        let bits = strategies(path);
+        let mut parts = [0.0; TECHNIQUES as usize];
+        for (way, weight) in &expected {
+            let (_, bit) = bits.iter().find(|(other, _)| other == way).expect("a strategy");
+            parts[*bit as usize] += weight;
+        }
+        for &(way, weight) in expected.iter().filter(|(_, weight)| *weight > 1e-200) {
+            let found = recursion.weight(way);
+            let difference = (found.value() / weight - 1.0).abs();
+            prop_assert!(difference <= 1e-10, "{way:?}: {found:?}, expected {weight}");
+            for (bit, (density, part)) in found.all.0.iter().zip(parts).enumerate() {
+                let found = density / found.all.total();
+                prop_assert!(
+                    (found - part).abs() <= 1e-10 * part + 1e-200,
+                    "{way:?}, {bit}: {found}, {part}"
+                );
+            }
+            self.weights += 1;
+            self.difference = self.difference.max(difference);
         }
         Ok(())
     }
@@ -302,6 +345,26 @@ fn recursion_equals_the_enumeration_for_all_masks() {
                 reached.compare(&plan, &path, (1 << TECHNIQUES) - 1).unwrap();
             }
             reached.report(&format!("k <= {longest}, e^±{spread}, {heuristic:?}"));
+        }
+    }
+}
+
+#[test]
+fn the_recursion_by_technique_tells_the_part_of_each() {
+    for (longest, spread) in RANGES {
+        let mut runner = TestRunner::deterministic();
+        let strategy = (path(longest, spread), plan());
+        for heuristic in [Heuristic::Balance, Heuristic::Power] {
+            let mut reached = Reached::default();
+            for case in 0..3000_u32 {
+                let (path, plan) = strategy.new_tree(&mut runner).unwrap().current();
+                let (_, photon_beams, query_beams) = modes().nth(case as usize % 4).unwrap();
+                let plan = MisPlan { heuristic, photon_beams, query_beams, ..plan };
+                reached.compare_by_technique(&plan, &path).unwrap();
+                let mask = case * 189 % (1 << TECHNIQUES);
+                reached.compare_by_technique(&masked(&plan, mask), &path).unwrap();
+            }
+            reached.report(&format!("by technique, k <= {longest}, e^±{spread}, {heuristic:?}"));
         }
     }
 }
@@ -366,11 +429,11 @@ proptest! {
             let plan = MisPlan { heuristic, photon_beams, query_beams, ..plan.clone() };
             let fewer = masked(&plan, mask & !(1 << added));
             let more = masked(&plan, mask | 1 << added);
-            let recursion = Recursion::new(&more, &path);
+            let recursion = Recursion::<f64>::new(&more, &path);
             for (way, before) in path.weights(&fewer) {
                 let after = path.weight(&more, way);
                 prop_assert!(after <= before * (1.0 + 1e-12), "{way:?}: {before} to {after}");
-                prop_assert!(recursion.weight(way) <= before * (1.0 + 1e-10) + 1e-200, "{way:?}");
+                prop_assert!(recursion.weight(way).value() <= before * (1.0 + 1e-10) + 1e-200, "{way:?}");
             }
         }
     }
@@ -396,7 +459,7 @@ proptest! {
             let weights = path.weights(&plan);
             let there = reversed(&path);
             prop_assert_eq!(weights.len(), there.weights(&mirrored).len());
-            let recursion = Recursion::new(&mirrored, &there);
+            let recursion = Recursion::<f64>::new(&mirrored, &there);
             for (way, weight) in weights {
                 let image = match way {
                     Way::Hit => Way::Hit,
@@ -411,7 +474,7 @@ proptest! {
                 };
                 let mirror = there.weight(&mirrored, image);
                 prop_assert!((mirror - weight).abs() <= 1e-11 * weight, "{way:?}: {weight}, {mirror}");
-                let mirror = recursion.weight(image);
+                let mirror = recursion.weight(image).value();
                 prop_assert!((mirror - weight).abs() <= 1e-10 * weight + 1e-200, "{way:?}: {weight}, {mirror}");
             }
         }
@@ -527,11 +590,11 @@ fn the_golden_vector() {
     ];
     for (query_beams, weights) in columns {
         let plan = golden_plan(query_beams);
-        let recursion = Recursion::new(&plan, &path);
+        let recursion = Recursion::<f64>::new(&plan, &path);
         assert_eq!(path.weights(&plan).len(), ways.len());
         for (way, weight) in ways.into_iter().zip(weights) {
             assert_close(path.weight(&plan, way), weight, &format!("{way:?} enumerated"));
-            assert_close(recursion.weight(way), weight, &format!("{way:?} by recursion"));
+            assert_close(recursion.weight(way).value(), weight, &format!("{way:?} by recursion"));
         }
     }
 }
@@ -540,7 +603,7 @@ fn the_golden_vector() {
 fn the_golden_densities_and_partial_sums() {
     let path = golden_path();
     let plan = golden_plan(BeamExtent::Long);
-    let recursion = Recursion::new(&plan, &path);
+    let recursion = Recursion::<f64>::new(&plan, &path);
     for (i, density) in [(1, 0.020_580_436_353_5), (2, 0.022_673_594_531_6), (3, 0.890_625)] {
         assert_close(recursion.light_density(i), density, &format!("L_{i}"));
     }

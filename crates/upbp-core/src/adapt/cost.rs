@@ -7,9 +7,10 @@
 
 use upbp_estimators::Technique;
 
-use super::recorder::{TECHNIQUES, WALK};
+use super::recorder::TECHNIQUES;
 use super::search::Candidate;
 use super::trial::Trial;
+use super::watch::WALK;
 
 /// Nanoseconds of one edge of a camera sub-path, and of a light sub-path.
 const EDGE: [f64; 2] = [300.0, 300.0];

@@ -5,19 +5,23 @@
 //! own and add nothing to the picture: whatever is chosen, the picture is unbiased.
 
 mod cost;
+mod grid;
 mod prediction;
 mod recorder;
 mod search;
+mod trace;
 mod trial;
+mod watch;
 
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{Plan, TechniqueSet, World};
 
 use cost::Costs;
+use grid::Grid;
 use prediction::Prediction;
 pub(crate) use search::Bounds;
 use search::Candidate;
-use trial::{Grid, PASSES};
+use trial::PASSES;
 
 /// The iterations before which the plan is chosen, again and again: radii have shrunk, and a larger trial is worth its time.
 pub(crate) const REVIEWS: [u64; 3] = [0, 512, 4096];

@@ -7,8 +7,9 @@
 
 use glam::DVec3;
 
-use super::recorder::TECHNIQUES;
-use super::trial::{Grid, PASSES, Sample, Trial};
+use super::grid::Grid;
+use super::recorder::{Sample, TECHNIQUES};
+use super::trial::{PASSES, Trial};
 
 /// No sample says more than this part of the whole.
 const LARGEST_PART: f64 = 0.01;

@@ -9,7 +9,7 @@ use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
 use crate::light_map::{LightMap, queries_beams, queries_points};
 use crate::look_ups::LookUps;
-use crate::mis::{BeamExtent, Edge, Tip};
+use crate::mis::{BeamExtent, Densities, Edge, Tip};
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::scene::{Scene, Walk};
 use crate::technique::Technique;
@@ -18,10 +18,10 @@ use crate::walk::{Context, Output, Passage, PhotonBeam, QueryEdge, Site, Span};
 /// The merges along an edge of the camera sub-path, through all its media. A short query beam ends where the walk stops.
 pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf>,
+    map: &LightMap<S::Bsdf, O::Densities>,
     look_ups: &LookUps,
     passage: &Passage<S::Bsdf>,
-    edge: &QueryEdge,
+    edge: &QueryEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
@@ -64,11 +64,11 @@ pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf>>(
 }
 
 /// The light that arrives at distance `t` along a photon beam and what the weights know there.
-pub(crate) fn beam_tip<S: Scene>(
+pub(crate) fn beam_tip<S: Scene, D: Densities>(
     context: &Context<'_, S>,
-    beam: &PhotonBeam,
+    beam: &PhotonBeam<D>,
     t: f32,
-) -> Option<(Tip, Spectrum)> {
+) -> Option<(Tip<D>, Spectrum)> {
     let Context { world, plan } = *context;
     let segment = RaySegment {
         origin: beam.segment.origin,
@@ -94,24 +94,24 @@ fn transmitted(density: &EdgeDensity, extent: BeamExtent) -> Spectrum {
 }
 
 /// A query beam in one medium.
-struct Query<'a, 'b, S: Scene> {
+struct Query<'a, 'b, S: Scene, D> {
     context: &'a Context<'b, S>,
     look_ups: &'a LookUps,
     passage: &'a Passage<S::Bsdf>,
     span: &'a Span,
-    edge: &'a QueryEdge,
+    edge: &'a QueryEdge<D>,
     medium: MediumId,
 }
 
 /// The query beam's own end at a foot point.
-struct Foot {
+struct Foot<D> {
     position: Vec3,
-    tip: Tip,
+    tip: Tip<D>,
     throughput: Spectrum,
 }
 
-impl<S: Scene> Query<'_, '_, S> {
-    fn foot(&self, t: f32) -> Option<Foot> {
+impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
+    fn foot(&self, t: f32) -> Option<Foot<D>> {
         let Context { world, plan } = *self.context;
         let density = self.passage.density_to(world.scene, self.span, t);
         let edge = Edge::new(&density, f64::from(t), 1.0, self.edge.pending.in_medium, true);
@@ -127,9 +127,9 @@ impl<S: Scene> Query<'_, '_, S> {
     }
 
     /// PB2D.
-    fn merge_point<O: Observer<S::Bsdf>>(
+    fn merge_point<O: Observer<S::Bsdf, Densities = D>>(
         &self,
-        map: &LightMap<S::Bsdf>,
+        map: &LightMap<S::Bsdf, O::Densities>,
         index: u32,
         t: f32,
         distance2: f32,
@@ -160,9 +160,9 @@ impl<S: Scene> Query<'_, '_, S> {
     }
 
     /// BB1D.
-    fn merge_beam<O: Observer<S::Bsdf>>(
+    fn merge_beam<O: Observer<S::Bsdf, Densities = D>>(
         &self,
-        beam: &PhotonBeam,
+        beam: &PhotonBeam<D>,
         approach: &upbp_accel::ClosestApproach,
         out: &mut Output<'_, O>,
     ) {
@@ -190,10 +190,10 @@ impl<S: Scene> Query<'_, '_, S> {
         );
     }
 
-    fn merge<O: Observer<S::Bsdf>>(
+    fn merge<O: Observer<S::Bsdf, Densities = D>>(
         &self,
-        light: &Incoming,
-        foot: &Foot,
+        light: &Incoming<D>,
+        foot: &Foot<D>,
         kernel: f32,
         out: &mut Output<'_, O>,
     ) {
@@ -214,7 +214,7 @@ impl<S: Scene> Query<'_, '_, S> {
         let weight =
             mis.merge_weight(factor, factors.sum(), light.tip.before(mis, rho), foot.tip.before(mis, rho));
         let value = foot.throughput * light.throughput * medium.sigma_s(foot.position) * (phase * kernel);
-        if out.add(light.technique, value, weight) {
+        if out.add(light.technique, value, &weight) {
             out.observer.sample(&ObservedSample {
                 technique: light.technique,
                 camera_depth: self.edge.depth,
@@ -231,10 +231,10 @@ impl<S: Scene> Query<'_, '_, S> {
 }
 
 /// The light's side of a merge on a query beam.
-struct Incoming {
+struct Incoming<D> {
     technique: Technique,
     towards_light: Vec3,
-    tip: Tip,
+    tip: Tip<D>,
     throughput: Spectrum,
     position: Vec3,
     depth: u32,

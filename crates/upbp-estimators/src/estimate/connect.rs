@@ -14,8 +14,8 @@ use crate::walk::{Context, LightVertex, Output, QueryVertex, Site, Target, clear
 /// Connects `vertex` to as many light vertices as the plan says.
 pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf>,
-    vertex: &QueryVertex<S::Bsdf>,
+    map: &LightMap<S::Bsdf, O::Densities>,
+    vertex: &QueryVertex<S::Bsdf, O::Densities>,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -37,8 +37,8 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf>>(
 
 fn connect<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    vertex: &QueryVertex<S::Bsdf>,
-    light: &LightVertex<S::Bsdf>,
+    vertex: &QueryVertex<S::Bsdf, O::Densities>,
+    light: &LightVertex<S::Bsdf, O::Densities>,
     factor: f64,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -120,7 +120,7 @@ fn connect<S: Scene, O: Observer<S::Bsdf>>(
         * scattering
         * density.transmittance
         * (geometry * factor) as f32;
-    if out.add(Technique::Connect, value, weight) {
+    if out.add(Technique::Connect, value, &weight) {
         out.observer.sample(&ObservedSample {
             technique: Technique::Connect,
             camera_depth: vertex.depth,

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use upbp_media::{Medium, Spectrum};
 
-use crate::mis::Edge;
+use crate::mis::{Densities, Edge, Weight};
 use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
 use crate::scene::{Emitter, EmitterId, EmitterPoint, Hit, Scene, Walk};
 use crate::technique::Technique;
@@ -16,7 +16,7 @@ use crate::walk::{Output, Passage, QueryEdge};
 pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
-    edge: &QueryEdge,
+    edge: &QueryEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let Context { world, plan } = *context;
@@ -29,12 +29,13 @@ pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf>>(
         if medium.emits() {
             let emitted = medium.emitted(&passage.segment(span, span.end));
             let value = edge.throughput * span.before.transmittance * emitted;
-            if out.add(Technique::Hit, value, 1.0) {
+            let weight = Weight::<O::Densities>::alone(Technique::Hit);
+            if out.add(Technique::Hit, value, &weight) {
                 out.observer.sample(&ObservedSample {
                     technique: Technique::Hit,
                     camera_depth: edge.depth,
                     joint: Joint::Emission,
-                    weight: 1.0,
+                    weight,
                     value,
                 });
             }
@@ -51,7 +52,7 @@ pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf>>(
     receiver: Vec3,
     mis_edge: &Edge,
     throughput: Spectrum,
-    edge: &QueryEdge,
+    edge: &QueryEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     if let Some(emitter) = hit.emitter {
@@ -64,7 +65,7 @@ pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf>>(
 pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
-    edge: &QueryEdge,
+    edge: &QueryEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let world = context.world;
@@ -94,7 +95,7 @@ fn shine<S: Scene, O: Observer<S::Bsdf>>(
     receiver: Vec3,
     mis_edge: &Edge,
     throughput: Spectrum,
-    edge: &QueryEdge,
+    edge: &QueryEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let Context { world, plan } = *context;
@@ -106,10 +107,15 @@ fn shine<S: Scene, O: Observer<S::Bsdf>>(
     let Some(densities) = light.hit(&world.bounds, point, direction, receiver) else { return };
     let weight = if edge.depth == 1 {
         // Nothing else makes a path of one edge.
-        1.0
+        Weight::alone(Technique::Hit)
     } else {
         // On arrival at a light the vertex before is connected by next event estimation.
-        let tip = edge.pending.arrive(mis, Walk::Camera, mis_edge, mis.nee);
+        let tip = edge.pending.arrive(
+            mis,
+            Walk::Camera,
+            mis_edge,
+            O::Densities::of(Technique::Nee, mis.pow(mis.nee)),
+        );
         mis.hit_weight(
             &tip,
             f64::from(world.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
@@ -118,7 +124,7 @@ fn shine<S: Scene, O: Observer<S::Bsdf>>(
         )
     };
     let value = throughput * densities.radiance;
-    if out.add(Technique::Hit, value, weight) {
+    if out.add(Technique::Hit, value, &weight) {
         out.observer.sample(&ObservedSample {
             technique: Technique::Hit,
             camera_depth: edge.depth,

@@ -10,11 +10,11 @@ use crate::walk::{Context, LightChunk, LightVertex, Sides, Splat, Target, clear_
 /// Connects a light vertex to the camera; `sides` are the bodies around it.
 pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    vertex: &LightVertex<S::Bsdf>,
+    vertex: &LightVertex<S::Bsdf, O::Densities>,
     sides: &Sides,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
-    out: &mut LightChunk<S::Bsdf>,
+    out: &mut LightChunk<S::Bsdf, O::Densities>,
     observer: &mut O,
 ) {
     let Context { world, plan } = *context;
@@ -74,7 +74,7 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf>>(
         * scattering.value
         * density.transmittance
         * (ray_pdf / f64::from(plan.light_paths)) as f32;
-    if let Some(value_weighted) = out.counters.accept(Technique::LightTracing, value, weight) {
+    if let Some(value_weighted) = out.counters.accept(Technique::LightTracing, value, weight.value()) {
         out.splats.push(Splat { pixel, value: value_weighted });
         observer.sample(&ObservedSample {
             technique: Technique::LightTracing,

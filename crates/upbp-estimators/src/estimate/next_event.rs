@@ -10,7 +10,7 @@ use crate::walk::{Context, MIN_COSINE, Output, QueryVertex, Target, clear_edge, 
 /// Connects `vertex` to as many points on lights as the plan says.
 pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    vertex: &QueryVertex<S::Bsdf>,
+    vertex: &QueryVertex<S::Bsdf, O::Densities>,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -28,7 +28,7 @@ pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf>>(
 
 fn next_event<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    vertex: &QueryVertex<S::Bsdf>,
+    vertex: &QueryVertex<S::Bsdf, O::Densities>,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -100,7 +100,7 @@ fn next_event<S: Scene, O: Observer<S::Bsdf>>(
         * density.transmittance
         * incident.radiance
         * (geometry / (pdf * f64::from(plan.next_events))) as f32;
-    if out.add(Technique::Nee, value, weight) {
+    if out.add(Technique::Nee, value, &weight) {
         out.observer.sample(&ObservedSample {
             technique: Technique::Nee,
             camera_depth: vertex.depth,

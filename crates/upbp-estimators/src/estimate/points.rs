@@ -5,6 +5,7 @@ use upbp_media::{Medium, MediumId};
 use super::beams::beam_tip;
 use crate::light_map::LightMap;
 use crate::look_ups::LookUps;
+use crate::mis::Densities;
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::scene::{Scene, Walk};
 use crate::technique::Technique;
@@ -20,9 +21,9 @@ const MAX_PLANE_DISTANCE: f32 = 0.3;
 /// The merges at `vertex`.
 pub(crate) fn at_point<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf>,
+    map: &LightMap<S::Bsdf, O::Densities>,
     look_ups: &LookUps,
-    vertex: &QueryVertex<S::Bsdf>,
+    vertex: &QueryVertex<S::Bsdf, O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
@@ -75,10 +76,10 @@ pub(crate) fn at_point<S: Scene, O: Observer<S::Bsdf>>(
 }
 
 /// Keeps light from leaking around edges and through thin walls. What it cuts off the kernel vanishes with the radius.
-fn lies_on<B>(
+fn lies_on<B, D>(
     surface: &SurfaceSite<B>,
-    vertex: &QueryVertex<B>,
-    photon: &LightVertex<B>,
+    vertex: &QueryVertex<B, D>,
+    photon: &LightVertex<B, D>,
     radius: f32,
 ) -> bool {
     let Site::Surface(other) = &photon.site else { return false };
@@ -91,8 +92,8 @@ fn lies_on<B>(
 /// squared distance and with how often the look-up counts.
 fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    vertex: &QueryVertex<S::Bsdf>,
-    photon: &LightVertex<S::Bsdf>,
+    vertex: &QueryVertex<S::Bsdf, O::Densities>,
+    photon: &LightVertex<S::Bsdf, O::Densities>,
     [distance2, scale]: [f32; 2],
     technique: Technique,
     out: &mut Output<'_, O>,
@@ -115,7 +116,7 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
     let (kernel, factor, merges) = match &vertex.site {
         Site::Surface(_) => {
             let factor = mis.pow(mis.surf);
-            (&plan.kernels.surf, factor, factor)
+            (&plan.kernels.surf, factor, O::Densities::of(technique, factor))
         }
         Site::Medium(medium) => {
             let factors = mis.volume_factors(*medium, photon.tip.c, vertex.tip.c, scattering.sin_theta);
@@ -132,7 +133,7 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
         * photon.throughput
         * scattering.value
         * (kernel.value(distance2) * scale / plan.light_paths as f32);
-    if out.add(technique, value, weight) {
+    if out.add(technique, value, &weight) {
         out.observer.sample(&ObservedSample {
             technique,
             camera_depth: vertex.depth,
@@ -150,8 +151,8 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
 /// BP2D: photon beams around the query point, in its medium; `scale` is how often the look-up counts.
 fn beams_around<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf>,
-    vertex: &QueryVertex<S::Bsdf>,
+    map: &LightMap<S::Bsdf, O::Densities>,
+    vertex: &QueryVertex<S::Bsdf, O::Densities>,
     (medium_id, scale): (MediumId, f32),
     out: &mut Output<'_, O>,
 ) {
@@ -177,7 +178,7 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf>>(
             * light
             * medium.sigma_s(vertex.position)
             * (phase * kernel.value(distance2) * scale / plan.beam_paths as f32);
-        if out.add(Technique::Bp2d, value, weight) {
+        if out.add(Technique::Bp2d, value, &weight) {
             out.observer.sample(&ObservedSample {
                 technique: Technique::Bp2d,
                 camera_depth: vertex.depth,

@@ -4,8 +4,10 @@ use serde::{Deserialize, Serialize};
 use upbp_media::MediumId;
 
 use super::PARALLEL_SIN2;
+use super::densities::Densities;
 use super::recursion::MergeSite;
 use crate::scene::Walk;
+use crate::technique::Technique;
 
 /// How the densities of techniques are turned into weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -83,6 +85,13 @@ impl MisPlan {
         self.volume.get(medium.0 as usize).copied().unwrap_or_default()
     }
 
+    /// The count of connections, as the heuristic takes it.
+    #[inline]
+    #[must_use]
+    pub fn connections<D: Densities>(&self) -> D {
+        D::of(Technique::Connect, self.pow(self.connect))
+    }
+
     /// Extent of the beams of a walk: photon beams on the light's side, query beams on the camera's.
     #[inline]
     #[must_use]
@@ -126,10 +135,10 @@ impl MisPlan {
     /// `F_i`: the sum of the merge factors at a vertex (section 4.1).
     #[inline]
     #[must_use]
-    pub fn merge_sum(&self, site: MergeSite, walk: Walk, c_own: f64, c_opposite: f64) -> f64 {
+    pub fn merge_sum<D: Densities>(&self, site: MergeSite, walk: Walk, c_own: f64, c_opposite: f64) -> D {
         match site {
-            MergeSite::None => 0.0,
-            MergeSite::Surface => self.pow(self.surf),
+            MergeSite::None => D::ZERO,
+            MergeSite::Surface => D::of(Technique::Surf, self.pow(self.surf)),
             MergeSite::Medium { medium, sin_theta } => {
                 let (c_light, c_camera) = match walk {
                     Walk::Light => (c_own, c_opposite),
@@ -145,7 +154,10 @@ impl VolumeMerges {
     /// The sum of all four.
     #[inline]
     #[must_use]
-    pub fn sum(&self) -> f64 {
-        self.pp3d + self.pb2d + self.bp2d + self.bb1d
+    pub fn sum<D: Densities>(&self) -> D {
+        D::of(Technique::Pp3d, self.pp3d)
+            + D::of(Technique::Pb2d, self.pb2d)
+            + D::of(Technique::Bp2d, self.bp2d)
+            + D::of(Technique::Bb1d, self.bb1d)
     }
 }

@@ -7,27 +7,29 @@
 
 use upbp_media::{EdgeDensity, MediumId};
 
+use super::densities::Densities;
 use super::plan::{BeamExtent, MisPlan};
 use crate::scene::Walk;
+use crate::technique::Technique;
 
 /// What a sub-path knows of all its techniques on arrival at a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tip {
+pub struct Tip<D = f64> {
     /// `D_i`: connecting to this vertex from the one before.
-    pub connect: f64,
+    pub connect: D,
     /// `E_i`: everything below the vertex before, per opposite scattering density.
-    pub below: f64,
+    pub below: D,
     /// The distance factor of the arriving edge in a medium; 0 on surfaces.
     pub c: f64,
 }
 
-impl Tip {
+impl<D: Densities> Tip<D> {
     /// `B_i = D_i + ρ′ E_i` for the opposite scattering density `ρ′`, roulette included, sr⁻¹.
     #[inline]
     #[must_use]
-    pub fn before(&self, plan: &MisPlan, rho_opposite: f64) -> f64 {
+    pub fn before(&self, plan: &MisPlan, rho_opposite: f64) -> D {
         // A branch instead of 0 · ∞ where the other walk cannot scatter this way.
-        if rho_opposite > 0.0 { self.connect + plan.pow(rho_opposite) * self.below } else { self.connect }
+        if rho_opposite > 0.0 { self.connect + self.below * plan.pow(rho_opposite) } else { self.connect }
     }
 }
 
@@ -51,9 +53,9 @@ pub enum MergeSite {
 ///
 /// Kept as it is with photon and query beams, whose vertices appear anywhere along them (section 4.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pending {
+pub struct Pending<D = f64> {
     /// `B_i`, as the heuristic takes it.
-    pub before: f64,
+    pub before: D,
     /// Own scattering density towards the next vertex: sr⁻¹, a probability for a Dirac lobe, per area for infinite lights.
     pub rho: f64,
     /// The cosine factor of the outgoing direction; 1 in media and at points.
@@ -68,7 +70,7 @@ pub struct Pending {
     pub in_medium: bool,
 }
 
-impl Pending {
+impl<D: Densities> Pending<D> {
     /// The light end of a light sub-path (section 4.2). `hit` is the count of emission hits, 0 if the emitter
     /// cannot be hit; `pdf_position` and `pdf_direction` are `L_0` and `ρL_0`.
     #[must_use]
@@ -81,7 +83,7 @@ impl Pending {
     ) -> Self {
         let hit = if hittable { plan.hit } else { 0.0 };
         Self {
-            before: plan.pow(hit / pdf_position),
+            before: D::of(Technique::Hit, plan.pow(hit / pdf_position)),
             rho: pdf_direction,
             cos_out,
             site: MergeSite::None,
@@ -95,7 +97,7 @@ impl Pending {
     #[must_use]
     pub fn at_camera(pdf: f64) -> Self {
         Self {
-            before: 0.0,
+            before: D::ZERO,
             rho: pdf,
             cos_out: 1.0,
             site: MergeSite::None,
@@ -106,12 +108,12 @@ impl Pending {
     }
 
     /// One step (section 4.3): the tip of the next vertex. `connections` is the number of samples that connect the
-    /// two vertices: of connections in general, of next events (times `p_nee/L_0`) on a light sub-path's first edge or
+    /// two vertices, as the heuristic takes it: of connections in general, of next events (times `p_nee/L_0`) on a light sub-path's first edge or
     /// at a camera sub-path's vertex on a light, of light tracing on a camera sub-path's first edge; 0 if the new
     /// vertex cannot be connected.
     #[inline]
     #[must_use]
-    pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: f64) -> Tip {
+    pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: D) -> Tip<D> {
         let inverse = 1.0 / (self.rho * edge.cos_in * edge.forward);
         let below = if edge.backward > 0.0 {
             let c_opposite = if self.in_medium {
@@ -122,15 +124,15 @@ impl Pending {
             } else {
                 0.0
             };
-            let merges = plan.merge_sum(self.site, walk, self.c, c_opposite);
-            plan.pow(inverse * self.cos_out * edge.backward) * (merges + self.before)
+            let merges: D = plan.merge_sum(self.site, walk, self.c, c_opposite);
+            (merges + self.before) * plan.pow(inverse * self.cos_out * edge.backward)
         } else {
-            0.0
+            D::ZERO
         };
-        let connect = if self.connectible && connections > 0.0 {
-            plan.pow(connections * inverse * edge.distance_squared)
+        let connect = if self.connectible && connections.total() > 0.0 {
+            connections * plan.pow(inverse * edge.distance_squared)
         } else {
-            0.0
+            D::ZERO
         };
         let c = if edge.ends_in_medium { plan.distance_factor(walk, edge.reach, edge.forward) } else { 0.0 };
         Tip { connect, below, c }

@@ -6,7 +6,7 @@ use upbp_media::EdgeDensity;
 use super::context::Context;
 use super::passage::Passage;
 use super::site::{Scattered, Sides, Site};
-use crate::mis::{MergeSite, Pending, Tip};
+use crate::mis::{Densities, MergeSite, Pending, Tip};
 use crate::scene::Scene;
 
 /// The end of an edge.
@@ -68,13 +68,13 @@ pub(super) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival
 }
 
 /// What the weights of the next vertex need of one that has scattered.
-pub(super) fn pend<S: Scene>(
+pub(super) fn pend<S: Scene, D: Densities>(
     context: &Context<'_, S>,
-    tip: &Tip,
+    tip: &Tip<D>,
     site: &Site<S::Bsdf>,
     scattered: &Scattered,
-) -> Pending {
-    let smooth = if scattered.delta { Tip { connect: 0.0, ..*tip } } else { *tip };
+) -> Pending<D> {
+    let smooth = if scattered.delta { Tip { connect: D::ZERO, ..*tip } } else { *tip };
     Pending {
         before: smooth.before(&context.plan.mis, scattered.rho_opposite),
         rho: scattered.rho_own,

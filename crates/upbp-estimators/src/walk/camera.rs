@@ -11,7 +11,7 @@ use super::visibility::ray_origin;
 use crate::counters::Counters;
 use crate::estimate;
 use crate::light_map::LightMap;
-use crate::mis::{Edge, Pending, Tip};
+use crate::mis::{Densities, Edge, Pending, Tip, Weight};
 use crate::observer::{ObservedVertex, Observer};
 use crate::random::{Stream, StreamKind};
 use crate::scene::{Camera, Scene, Walk};
@@ -34,8 +34,13 @@ pub(crate) struct Output<'a, O> {
 impl<O> Output<'_, O> {
     /// Adds a weighted contribution; whether it was accepted.
     #[inline]
-    pub(crate) fn add(&mut self, technique: Technique, value: Spectrum, weight: f64) -> bool {
-        match self.counters.accept(technique, value, weight) {
+    pub(crate) fn add<D: Densities>(
+        &mut self,
+        technique: Technique,
+        value: Spectrum,
+        weight: &Weight<D>,
+    ) -> bool {
+        match self.counters.accept(technique, value, weight.value()) {
             Some(contribution) => {
                 self.layers[technique.layer() as usize] += contribution;
                 true
@@ -46,24 +51,24 @@ impl<O> Output<'_, O> {
 }
 
 /// A camera sub-path between two vertices.
-pub(crate) struct QueryEdge {
+pub(crate) struct QueryEdge<D> {
     /// Importance over density at the edge's first vertex, after scattering.
     pub(crate) throughput: Spectrum,
     /// What the weights need of the first vertex.
-    pub(crate) pending: Pending,
-    /// Samples that connect the first vertex to one on this edge.
-    pub(crate) connections: f64,
+    pub(crate) pending: Pending<D>,
+    /// Samples that connect the first vertex to one on this edge, as the heuristic takes them.
+    pub(crate) connections: D,
     /// Edges from the camera to a vertex on this edge.
     pub(crate) depth: u32,
 }
 
 /// A camera sub-path's end at a vertex.
-pub(crate) struct QueryVertex<B> {
+pub(crate) struct QueryVertex<B, D> {
     pub(crate) position: Vec3,
     /// Direction to the vertex before, towards the camera.
     pub(crate) towards_camera: Vec3,
     pub(crate) throughput: Spectrum,
-    pub(crate) tip: Tip,
+    pub(crate) tip: Tip<D>,
     pub(crate) depth: u32,
     pub(crate) site: Site<B>,
     pub(crate) sides: Sides,
@@ -73,7 +78,7 @@ pub(crate) struct QueryVertex<B> {
 #[expect(clippy::too_many_arguments, reason = "one call per sample, with the state of the pass")]
 pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf>,
+    map: &LightMap<S::Bsdf, O::Densities>,
     kind: StreamKind,
     pixel: [u32; 2],
     index: u64,
@@ -101,7 +106,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
     let mut edge = QueryEdge {
         throughput: Spectrum::ONE,
         pending: Pending::at_camera(f64::from(ray.pdf)),
-        connections: plan.mis.light_tracing,
+        connections: O::Densities::of(Technique::LightTracing, plan.mis.pow(plan.mis.light_tracing)),
         depth: 1,
     };
 
@@ -152,7 +157,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
             &plan.mis,
             Walk::Camera,
             &mis_edge,
-            if connectible { edge.connections } else { 0.0 },
+            if connectible { edge.connections } else { O::Densities::ZERO },
         );
         let vertex = QueryVertex {
             position: arrived.position,
@@ -186,7 +191,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
         edge = QueryEdge {
             throughput: throughput * scattered.weight,
             pending: pend(context, &vertex.tip, &vertex.site, &scattered),
-            connections: plan.mis.connect,
+            connections: plan.mis.connections(),
             depth,
         };
     }

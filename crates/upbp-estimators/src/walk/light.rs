@@ -10,7 +10,7 @@ use super::passage::{Extent, Passage, Span};
 use super::photon::{EdgeSource, LightChunk, LightVertex, PhotonBeam};
 use super::visibility::ray_origin;
 use crate::estimate::light_tracing;
-use crate::mis::{BeamExtent, Edge, Pending};
+use crate::mis::{BeamExtent, Densities, Edge, Pending};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::random::{Stream, StreamKind};
 use crate::scene::{Emitter, EmitterKind, Scene, Walk};
@@ -18,11 +18,11 @@ use crate::technique::Technique;
 use crate::world::World;
 
 /// The walk's state between two vertices.
-struct Flight {
+struct Flight<D> {
     origin: Vec3,
     direction: Vec3,
     stack: MediumStack,
-    pending: Pending,
+    pending: Pending<D>,
     source: EdgeSource,
     throughput: Spectrum,
     infinite: bool,
@@ -34,7 +34,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
     kind: StreamKind,
     index: u32,
     scratch: &mut Scratch<S::Bsdf>,
-    out: &mut LightChunk<S::Bsdf>,
+    out: &mut LightChunk<S::Bsdf, O::Densities>,
     observer: &mut O,
 ) {
     let Context { world, plan } = *context;
@@ -80,8 +80,11 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
             flight.pending.in_medium,
             in_medium,
         );
-        let connections =
-            if connectible { flight.source.connections(context, flight.direction, position) } else { 0.0 };
+        let connections = if connectible {
+            flight.source.connections(context, flight.direction, position)
+        } else {
+            O::Densities::ZERO
+        };
         let tip = flight.pending.arrive(&plan.mis, Walk::Light, &edge, connections);
         let vertex = LightVertex { position, towards_light: from, throughput, tip, depth, path: index, site };
         if connectible {
@@ -119,7 +122,7 @@ fn emit<S: Scene, O: Observer<S::Bsdf>>(
     index: u32,
     stream: &mut Stream,
     observer: &mut O,
-) -> Option<Flight> {
+) -> Option<Flight<O::Densities>> {
     let (emitter, probability) = world.choose_emission(stream.uniform())?;
     let light = &world.scene.emitters()[emitter.0 as usize];
     let emission = light.sample_emission(&world.bounds, stream.pair(), stream.pair())?;
@@ -167,13 +170,13 @@ fn emit<S: Scene, O: Observer<S::Bsdf>>(
     })
 }
 
-fn store_beams<S: Scene>(
+fn store_beams<S: Scene, D: Densities>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
-    flight: &Flight,
+    flight: &Flight<D>,
     depth: u32,
     path: u32,
-    out: &mut LightChunk<S::Bsdf>,
+    out: &mut LightChunk<S::Bsdf, D>,
 ) {
     let Context { world, plan } = *context;
     let stop = match plan.mis.photon_beams {

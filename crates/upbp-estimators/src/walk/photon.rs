@@ -7,12 +7,13 @@ use upbp_media::{EdgeDensity, MediumId, Spectrum};
 use super::context::Context;
 use super::site::Site;
 use crate::counters::Counters;
-use crate::mis::{Pending, Tip};
+use crate::mis::{Densities, Pending, Tip};
 use crate::scene::{Emitter, EmitterId, EmitterPoint, Scene};
+use crate::technique::Technique;
 
 /// A vertex of a light sub-path where camera sub-paths can be connected or merged.
 #[derive(Clone, Copy, Debug)]
-pub struct LightVertex<B> {
+pub struct LightVertex<B, D = f64> {
     /// Where it is.
     pub position: Vec3,
     /// Direction to the vertex before, towards the light.
@@ -20,7 +21,7 @@ pub struct LightVertex<B> {
     /// Flux over density on arrival, before scattering (`docs/theory.md`, section 1.5).
     pub throughput: Spectrum,
     /// What the weights need.
-    pub tip: Tip,
+    pub tip: Tip<D>,
     /// Edges from the light.
     pub depth: u32,
     /// Index of the sub-path.
@@ -46,16 +47,16 @@ pub enum EdgeSource {
 }
 
 impl EdgeSource {
-    /// The number of samples that connect the edge's start to `position` (section 4.2).
-    pub(crate) fn connections<S: Scene>(
+    /// The number of samples that connect the edge's start to `position`, as the heuristic takes it (section 4.2).
+    pub(crate) fn connections<S: Scene, D: Densities>(
         &self,
         context: &Context<'_, S>,
         direction: Vec3,
         position: Vec3,
-    ) -> f64 {
+    ) -> D {
         let mis = &context.plan.mis;
         match self {
-            Self::Vertex => mis.connect,
+            Self::Vertex => mis.connections(),
             Self::Emitter { emitter, point, pdf_position } => {
                 let world = context.world;
                 let pdf = world.scene.emitters()[emitter.0 as usize].pdf_incident(
@@ -67,7 +68,8 @@ impl EdgeSource {
                 );
                 let choice = f64::from(world.next_event_probability(*emitter))
                     / f64::from(world.emission_probability(*emitter));
-                mis.nee * choice * f64::from(pdf) / f64::from(*pdf_position)
+                let count = mis.nee * choice * f64::from(pdf) / f64::from(*pdf_position);
+                D::of(Technique::Nee, mis.pow(count))
             }
         }
     }
@@ -75,7 +77,7 @@ impl EdgeSource {
 
 /// The light that a sub-path carries through one medium along one edge.
 #[derive(Clone, Copy, Debug)]
-pub struct PhotonBeam {
+pub struct PhotonBeam<D = f64> {
     /// Where it runs; distances from the edge's first vertex.
     pub segment: Segment,
     /// The medium.
@@ -83,7 +85,7 @@ pub struct PhotonBeam {
     /// What the edge has accumulated up to the segment's start.
     pub before: EdgeDensity,
     /// What the weights need of the edge's first vertex.
-    pub pending: Pending,
+    pub pending: Pending<D>,
     /// Where the edge starts.
     pub source: EdgeSource,
     /// Flux over density at the edge's first vertex, after scattering.
@@ -107,18 +109,18 @@ pub struct Splat {
 
 /// What a number of light sub-paths leave.
 #[derive(Clone, Debug)]
-pub struct LightChunk<B> {
+pub struct LightChunk<B, D = f64> {
     /// Vertices, in the order of the paths.
-    pub vertices: Vec<LightVertex<B>>,
+    pub vertices: Vec<LightVertex<B, D>>,
     /// Photon beams, in the order of the paths.
-    pub beams: Vec<PhotonBeam>,
+    pub beams: Vec<PhotonBeam<D>>,
     /// Splats, in the order of the paths.
     pub splats: Vec<Splat>,
     /// What was done.
     pub counters: Counters,
 }
 
-impl<B> Default for LightChunk<B> {
+impl<B, D> Default for LightChunk<B, D> {
     fn default() -> Self {
         Self { vertices: Vec::new(), beams: Vec::new(), splats: Vec::new(), counters: Counters::default() }
     }

@@ -1,0 +1,48 @@
+//! The pixels that a trial looks at.
+
+use upbp_estimators::scene::PixelRect;
+
+/// The part of the picture that a trial looks at.
+pub(crate) struct Grid {
+    rect: PixelRect,
+    side: f64,
+    columns: u32,
+    rows: u32,
+}
+
+impl Grid {
+    /// About so many cells, or one per pixel.
+    pub(crate) fn new(rect: PixelRect, cells: u32) -> Self {
+        let [width, height] = [rect.width, rect.height].map(f64::from);
+        let side = (width * height / f64::from(cells)).sqrt().max(1.0);
+        let [columns, rows] = [width, height].map(|length| (length / side).ceil() as u32);
+        Self { rect, side, columns, rows }
+    }
+
+    pub(crate) const fn cells(&self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
+    /// Pixels of the picture.
+    pub(crate) fn pixels(&self) -> f64 {
+        f64::from(self.rect.width) * f64::from(self.rect.height)
+    }
+
+    pub(crate) const fn columns(&self) -> usize {
+        self.columns as usize
+    }
+
+    /// The pixel that stands for a cell.
+    pub(super) fn pixel(&self, cell: usize) -> [u32; 2] {
+        let place =
+            |index: usize, size: u32| ((index as f64 + 0.5) * self.side).min(f64::from(size - 1)) as u32;
+        let (column, row) = (cell % self.columns(), cell / self.columns());
+        [self.rect.x + place(column, self.rect.width), self.rect.y + place(row, self.rect.height)]
+    }
+
+    /// The cell of a pixel.
+    pub(super) fn cell(&self, [x, y]: [u32; 2]) -> u32 {
+        let index = |offset: u32, count: u32| ((f64::from(offset) / self.side) as u32).min(count - 1);
+        index(y - self.rect.y, self.rows) * self.columns + index(x - self.rect.x, self.columns)
+    }
+}

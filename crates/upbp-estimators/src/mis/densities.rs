@@ -1,0 +1,98 @@
+//! What weights are made of: sums of densities, as a whole or by technique.
+
+use std::ops::{Add, Mul};
+
+use crate::technique::Technique;
+
+/// A sum of densities of techniques, with their counts, as the heuristic takes them.
+///
+/// The recursion is linear in the counts, so it can carry the sum of all techniques (`f64`, what a render needs) or every
+/// technique for itself ([`ByTechnique`], from which the weights of any other counts follow).
+pub trait Densities: Copy + Send + Sync + Add<Output = Self> + Mul<f64, Output = Self> {
+    /// Of no technique.
+    const ZERO: Self;
+
+    /// Of one technique.
+    fn of(technique: Technique, density: f64) -> Self;
+
+    /// Of all together.
+    fn total(&self) -> f64;
+}
+
+impl Densities for f64 {
+    const ZERO: Self = 0.0;
+
+    #[inline]
+    fn of(_: Technique, density: f64) -> Self {
+        density
+    }
+
+    #[inline]
+    fn total(&self) -> f64 {
+        *self
+    }
+}
+
+/// Densities by technique.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByTechnique(pub [f64; Technique::ALL.len()]);
+
+impl Add for ByTechnique {
+    type Output = Self;
+
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
+    }
+}
+
+impl Mul<f64> for ByTechnique {
+    type Output = Self;
+
+    /// A technique that does not run does not, whatever the factor: zero times infinity is zero.
+    #[inline]
+    fn mul(self, factor: f64) -> Self {
+        Self(self.0.map(|density| if density == 0.0 { 0.0 } else { density * factor }))
+    }
+}
+
+impl Densities for ByTechnique {
+    const ZERO: Self = Self([0.0; Technique::ALL.len()]);
+
+    #[inline]
+    fn of(technique: Technique, density: f64) -> Self {
+        let mut densities = Self::ZERO;
+        densities.0[technique as usize] = density;
+        densities
+    }
+
+    #[inline]
+    fn total(&self) -> f64 {
+        self.0.iter().sum()
+    }
+}
+
+/// A technique's density among those of all that can make the same path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weight<D = f64> {
+    /// Its own.
+    pub own: f64,
+    /// All, its own among them.
+    pub all: D,
+}
+
+impl<D: Densities> Weight<D> {
+    /// Of a technique that is the only one.
+    #[inline]
+    #[must_use]
+    pub fn alone(technique: Technique) -> Self {
+        Self { own: 1.0, all: D::of(technique, 1.0) }
+    }
+
+    /// The weight of the sample.
+    #[inline]
+    #[must_use]
+    pub fn value(&self) -> f64 {
+        self.own / self.all.total()
+    }
+}
