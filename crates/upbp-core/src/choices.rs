@@ -4,7 +4,8 @@ use upbp_estimators::scene::Scene;
 use upbp_estimators::{PathLengths, Plan, PlanChoices, Technique, TechniqueSet, World};
 
 use crate::memory::LightCounts;
-use crate::pilot::{Neighbours, Pilot};
+use crate::neighbours::Neighbours;
+use crate::pilot::Pilot;
 use crate::radius::{Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
 use crate::stage::Stage;

@@ -8,6 +8,7 @@ mod error;
 mod film;
 mod iterations;
 mod memory;
+mod neighbours;
 mod output;
 mod passes;
 mod pilot;

@@ -7,27 +7,30 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 use rayon::prelude::*;
-use upbp_accel::{SegmentTree, SplitParams};
+use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{ObservedVertex, Observer};
 use upbp_estimators::scene::Scene;
-use upbp_estimators::walk::{Context, LightVertex, PhotonBeam, Scratch, Site, trace_camera_path};
+use upbp_estimators::walk::{Context, LightVertex, Scratch, Site, trace_camera_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, StreamKind, TechniqueSet,
-    World,
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, StreamKind, Technique,
+    TechniqueSet, World,
 };
 
 use crate::emitters::pixel;
 use crate::memory::LightCounts;
+use crate::neighbours::{Nearest, Neighbours};
 use crate::passes::{Lists, light_pass};
 use crate::settings::CheckedSettings;
 
-/// Light sub-paths of the pilot.
-const LIGHT_PATHS: u32 = 8192;
-/// Of them with beams.
-const BEAM_PATHS: u32 = 1024;
+/// Light sub-paths of the pilot: of a first, quick one, and of the one that counts.
+pub(crate) const LIGHT_PATHS: [u32; 2] = [1024, 8192];
+/// One of so many leaves beams.
+const PATHS_PER_BEAM_PATH: u32 = 8;
 /// Camera sub-paths.
 const CAMERA_PATHS: u64 = 1024;
+/// Of them in a piece of work.
+const CHUNK: u64 = 64;
 /// Queries of each kind that are measured.
 const QUERIES: usize = 256;
 /// Light vertices that distances are measured to: those of the first light sub-paths.
@@ -58,34 +61,12 @@ pub(crate) struct Pilot {
     pub(crate) bb1d: Option<Neighbours>,
 }
 
-/// How close the photons of the pilot are to a typical query.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Neighbours {
-    /// Median over queries of the distance to the `rank`-th nearest, scene units.
-    distance: f64,
-    rank: f64,
-    /// Sub-paths that the photons came from.
-    paths: f64,
-    dimension: f64,
-}
-
-impl Neighbours {
-    /// The number of sub-paths with which a query of some radius finds `count` photons on average.
-    pub(crate) fn paths(&self, count: f64, radius: f64) -> f64 {
-        count / self.rank * self.paths * (self.distance / radius).powf(self.dimension)
-    }
-
-    /// The radius within which a query finds `count` photons on average, if `paths` sub-paths are traced.
-    pub(crate) fn radius(&self, count: f64, paths: f64) -> f32 {
-        (self.distance * (count / self.rank * self.paths / paths).powf(1.0 / self.dimension)) as f32
-    }
-}
-
-/// Runs the pilot.
+/// Runs a pilot with so many light sub-paths.
 pub(crate) fn run<S: Scene>(
     world: &World<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
+    light_paths: u32,
 ) -> Pilot {
     let nominal = 1e-3 * world.bounds.radius;
     let plan = Plan::new(
@@ -94,9 +75,9 @@ pub(crate) fn run<S: Scene>(
             seed: settings.seed,
             iteration: 0,
             // Light tracing is of no use here.
-            techniques: techniques.without([upbp_estimators::Technique::LightTracing].into_iter().collect()),
-            light_paths: LIGHT_PATHS,
-            beam_paths: BEAM_PATHS,
+            techniques: techniques.without([Technique::LightTracing].into_iter().collect()),
+            light_paths,
+            beam_paths: light_paths / PATHS_PER_BEAM_PATH,
             connections: 1,
             next_events: 1,
             look_ups: LookUps::ALL,
@@ -133,30 +114,46 @@ pub(crate) fn run<S: Scene>(
         |keep: fn(&Site<S::Bsdf>) -> bool| light.vertices.iter().filter(|v| keep(&v.site)).count() as f64;
     let (on_surfaces, in_media) =
         (|site: &Site<_>| matches!(site, Site::Surface(_)), |site: &Site<_>| matches!(site, Site::Medium(_)));
-    let surface: Vec<_> = photons(near.0, on_surfaces);
-    let medium: Vec<_> = photons(near.0, in_media);
-    let around = |points: &[Vec3], photons: &[Vec3], paths, dimension| {
-        neighbours(points, photons.len(), 8, paths, dimension, |query: &Vec3, i| query.distance(photons[i]))
-    };
-    let segments = light.beams.iter().map(|beam| (beam.segment, ())).collect();
-    let pieces = SegmentTree::build(segments, SplitParams::default()).pieces();
+    let (surface, medium) = (photons(near.0, on_surfaces), photons(near.0, in_media));
+    let beams = SegmentTree::build(
+        light.beams.iter().map(|beam| (beam.segment, ())).collect(),
+        SplitParams::default(),
+    );
     let looked_up = |on: bool, keep| if on { all_photons(keep) / paths } else { 0.0 };
+    let near = Nearest { paths: near.1, scale: world.bounds.radius };
+    let near_beams = Nearest { paths: beam_paths, ..near };
+    let wanted = |technique, found: &dyn Fn() -> Option<Neighbours>| {
+        plan.techniques.has(technique).then(found).flatten()
+    };
     Pilot {
         vertices_per_path: light.vertices.len() as f64 / paths,
         surface_per_path: looked_up(plan.mis.surf > 0.0, on_surfaces),
         medium_per_path: looked_up(plan.stores_medium_photons(), in_media),
-        pieces_per_path: pieces as f64 / beam_paths,
+        pieces_per_path: beams.pieces() as f64 / beam_paths,
         beams_per_path: light.beams.len() as f64 / beam_paths,
-        surf: around(&queries.surfaces, &surface, near.1, 2.0),
-        pp3d: around(&queries.media, &medium, near.1, 3.0),
-        pb2d: neighbours(&queries.edges, medium.len(), 8, near.1, 2.0, |edge, i| {
-            edge.distance_to_point(medium[i])
+        surf: wanted(Technique::Surf, &|| {
+            near.of(&queries.surfaces, surface.len(), 2.0, |point, radius, found| {
+                surface.in_ball(*point, radius, |(), distance2| found(distance2.sqrt()));
+            })
         }),
-        bp2d: neighbours(&queries.media, light.beams.len(), 8, beam_paths, 2.0, |point, i| {
-            Edge::of_beam(&light.beams[i]).distance_to_point(*point)
+        pp3d: wanted(Technique::Pp3d, &|| {
+            near.of(&queries.media, medium.len(), 3.0, |point, radius, found| {
+                medium.in_ball(*point, radius, |(), distance2| found(distance2.sqrt()));
+            })
         }),
-        bb1d: neighbours(&queries.edges, light.beams.len(), 8, beam_paths, 1.0, |edge, i| {
-            edge.distance_to_edge(&Edge::of_beam(&light.beams[i]))
+        pb2d: wanted(Technique::Pb2d, &|| {
+            near.of(&queries.edges, medium.len(), 2.0, |edge, radius, found| {
+                medium.around_ray(edge, radius, |(), _, distance2| found(distance2.sqrt()));
+            })
+        }),
+        bp2d: wanted(Technique::Bp2d, &|| {
+            near_beams.of(&queries.media, light.beams.len(), 2.0, |point, radius, found| {
+                beams.around_point(*point, radius, |(), _, distance2| found(distance2.sqrt()));
+            })
+        }),
+        // Tells how many beams are enough, too.
+        bb1d: near_beams.of(&queries.edges, light.beams.len(), 1.0, |edge, radius, found| {
+            beams.around_ray(edge, radius, |(), approach| found(approach.distance));
         }),
     }
 }
@@ -169,38 +166,8 @@ fn first_paths<B>(vertices: &[LightVertex<B>], paths: f64) -> (&[LightVertex<B>]
     }
 }
 
-fn photons<B>(vertices: &[LightVertex<B>], keep: impl Fn(&Site<B>) -> bool) -> Vec<Vec3> {
-    vertices.iter().filter(|v| keep(&v.site)).map(|v| v.position).collect()
-}
-
-/// Median over the queries of the distance to the `rank`-th nearest of `count` elements, by looking at all of them.
-fn neighbours<Q: Sync>(
-    queries: &[Q],
-    count: usize,
-    rank: usize,
-    paths: f64,
-    dimension: f64,
-    distance: impl Fn(&Q, usize) -> f32 + Sync,
-) -> Option<Neighbours> {
-    // Enough elements that the rank-th is still near.
-    let rank = rank.min(count / 4).max(1);
-    if queries.is_empty() || count == 0 {
-        return None;
-    }
-    let mut nearest: Vec<f32> = queries
-        .par_iter()
-        .filter_map(|query| {
-            let mut all: Vec<f32> = (0..count).map(|i| distance(query, i)).collect();
-            let (_, value, _) = all.select_nth_unstable_by(rank - 1, f32::total_cmp);
-            (value.is_finite() && *value > 0.0).then_some(*value)
-        })
-        .collect();
-    if nearest.is_empty() {
-        return None;
-    }
-    let middle = nearest.len() / 2;
-    let (_, median, _) = nearest.select_nth_unstable_by(middle, f32::total_cmp);
-    Some(Neighbours { distance: f64::from(*median), rank: rank as f64, paths, dimension })
+fn photons<B>(vertices: &[LightVertex<B>], keep: impl Fn(&Site<B>) -> bool) -> PointTree<()> {
+    PointTree::build(vertices.iter().filter(|v| keep(&v.site)).map(|v| (v.position, ())).collect())
 }
 
 /// Where camera sub-paths look.
@@ -208,7 +175,7 @@ fn neighbours<Q: Sync>(
 struct Queries {
     surfaces: Vec<Vec3>,
     media: Vec<Vec3>,
-    edges: Vec<Edge>,
+    edges: Vec<Ray>,
     last: Vec3,
 }
 
@@ -228,7 +195,12 @@ impl<B> Observer<B> for Queries {
         let between = vertex.position - self.last;
         let length = between.length();
         if length > 0.0 && length.is_finite() {
-            self.edges.push(Edge { origin: self.last, direction: between / length, length });
+            self.edges.push(Ray {
+                origin: self.last,
+                direction: between / length,
+                t_min: 0.0,
+                t_max: length,
+            });
         }
         self.last = vertex.position;
     }
@@ -239,20 +211,23 @@ fn camera_queries<S: Scene>(world: &World<'_, S>, plan: &Plan) -> Queries {
     let crop = world.scene.camera().crop();
     let context = Context { world, plan };
     let map = LightMap::empty();
+    let pieces: Vec<Queries> = (0..CAMERA_PATHS.div_ceil(CHUNK))
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, chunk| {
+            let mut queries = Queries::default();
+            for index in chunk * CHUNK..(chunk + 1) * CHUNK {
+                let (kind, pixel) = (StreamKind::PilotCamera, pixel(crop, index));
+                let counters = &mut Counters::default();
+                trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, &mut queries);
+            }
+            queries
+        })
+        .collect();
     let mut queries = Queries::default();
-    let mut scratch = Scratch::default();
-    let mut counters = Counters::default();
-    for index in 0..CAMERA_PATHS {
-        trace_camera_path(
-            &context,
-            &map,
-            StreamKind::PilotCamera,
-            pixel(crop, index),
-            index,
-            &mut scratch,
-            &mut counters,
-            &mut queries,
-        );
+    for piece in pieces {
+        queries.surfaces.extend(piece.surfaces);
+        queries.media.extend(piece.media);
+        queries.edges.extend(piece.edges);
     }
     thin(&mut queries.surfaces);
     thin(&mut queries.media);
@@ -268,47 +243,4 @@ fn thin<T>(elements: &mut Vec<T>) {
         index += 1;
         (index - 1) % step == 0
     });
-}
-
-/// A straight piece of a sub-path.
-#[derive(Clone, Copy)]
-struct Edge {
-    origin: Vec3,
-    direction: Vec3,
-    length: f32,
-}
-
-impl Edge {
-    fn of_beam(beam: &PhotonBeam) -> Self {
-        let segment = &beam.segment;
-        Self {
-            origin: segment.origin + segment.start * segment.direction,
-            direction: segment.direction,
-            length: segment.end - segment.start,
-        }
-    }
-
-    /// Distance of a point whose foot lies on the edge, else infinite.
-    fn distance_to_point(&self, point: Vec3) -> f32 {
-        let offset = point - self.origin;
-        let t = offset.dot(self.direction);
-        if (0.0..self.length).contains(&t) { (offset - t * self.direction).length() } else { f32::INFINITY }
-    }
-
-    /// Distance of another edge if the closest points lie on both, else infinite.
-    fn distance_to_edge(&self, other: &Self) -> f32 {
-        let ray = upbp_accel::Ray {
-            origin: self.origin,
-            direction: self.direction,
-            t_min: 0.0,
-            t_max: self.length,
-        };
-        let segment = upbp_accel::Segment {
-            origin: other.origin,
-            direction: other.direction,
-            start: 0.0,
-            end: other.length,
-        };
-        upbp_accel::closest_approach(&ray, &segment, f32::MAX).map_or(f32::INFINITY, |a| a.distance)
-    }
 }

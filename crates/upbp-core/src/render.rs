@@ -94,23 +94,23 @@ impl<'a, S: Scene> Renderer<'a, S> {
         }
         let without_pilot: TechniqueSet =
             [Technique::Hit, Technique::Nee, Technique::LightTracing].into_iter().collect();
-        let look = |world: &World<'_, S>| {
+        let look = |world: &World<'_, S>, light_paths| {
             if techniques.without(without_pilot).is_empty() {
                 Pilot::default()
             } else {
-                pilot::run(world, &settings, techniques)
+                pilot::run(world, &settings, techniques, light_paths)
             }
         };
-        let mut pilot = look(&world);
+        let [few, many] = pilot::LIGHT_PATHS;
         if scene.emitters().len() > 1 {
+            let pilot = look(&world, few);
             let light_paths = emitters::light_paths(pilot.vertices_per_path);
             let paths = [light_paths, light_paths / 8];
             let plan = plan(&world, &settings, &stage(&world, &settings, techniques, &pilot, paths), 0);
             let (emission, next_event) = emitters::measure(&world, &plan);
             world.choose_emitters_by(&emission, &next_event);
-            // Other light sub-paths than before.
-            pilot = look(&world);
         }
+        let pilot = look(&world, many);
         let pixels = rect.width.saturating_mul(rect.height);
         for stage in frozen.iter().flat_map(RenderPlan::stages) {
             let counts = LightCounts::expected(&pilot, stage.light_paths, stage.beam_paths);
