@@ -3,9 +3,10 @@
 //! With the balance heuristic, the second moment of single samples is `∫ f²/S`, `S` the sum of the densities of all techniques
 //! with their counts; it can be estimated for every `S` by the samples of a trial (`docs/theory.md`, section 6(a)), and
 //! knows of paths that the techniques of a plan would find once in a million years. What samples of one camera sub-path have in
-//! common is added: photons that are merged with one vertex share its error.
+//! common is added: photons that are merged with one vertex share its error, and those of one light sub-path share that of their own.
 
 use glam::DVec3;
+use upbp_estimators::{Technique, TechniqueSet};
 
 use super::grid::Grid;
 use super::recorder::{Sample, TECHNIQUES};
@@ -29,6 +30,8 @@ const LEAST_EVENNESS: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Counts {
     pub(crate) relative: [f64; TECHNIQUES],
+    /// Light sub-paths that they come from, and those with beams, relative to the trial's plan.
+    pub(crate) paths: [f64; 2],
     pub(crate) look_ups: [f64; TECHNIQUES],
 }
 
@@ -128,34 +131,32 @@ impl<'a> Prediction<'a> {
         let trial = self.trial;
         let scale = &self.scale[cell];
         let passes = trial.passes as f64;
+        // As many pairs of photons of one light sub-path as the plan has, less those of the trial.
+        let more = [0, 1].map(|i| trial.thinning[i] / counts.paths[i] - 1.0).map(|more| more.min(1e6));
         let (mut single, mut common) = (0.0, DVec3::ZERO);
         let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
         for pass in 0..trial.passes {
             let range = trial.range(cell, pass);
-            let mut own = DVec3::ZERO;
-            let mut looked_up = [DVec3::ZERO; TECHNIQUES];
-            for (sample, damping) in trial.samples[range.clone()].iter().zip(&self.damping[range]) {
-                let share = share(sample, counts);
-                let damping = f64::from(*damping);
-                single +=
-                    square(sample, scale) * trial.thinning(sample.technique) * damping * damping / share;
-                let technique = sample.technique as usize;
-                let weight = counts.relative[technique] / share * damping;
-                if weight > 0.0 {
-                    let y = sample.value.as_dvec3() * weight;
-                    own += y;
-                    // Pairs of different samples; those of a look-up that is made with probability p count 1/p times.
-                    let p = counts.look_ups[technique];
-                    common -= y * y / p;
-                    if p < 1.0 {
-                        looked_up[technique] += y;
+            let mut all = Pairs::default();
+            for (samples, damping) in runs(&trial.samples[range.clone()], &self.damping[range]) {
+                let mut same = Pairs::default();
+                for (sample, damping) in samples.iter().zip(damping) {
+                    let share = share(sample, counts);
+                    let damping = f64::from(*damping);
+                    single +=
+                        square(sample, scale) * trial.thinning(sample.technique) * damping * damping / share;
+                    let weight = counts.relative[sample.technique as usize] / share * damping;
+                    if weight > 0.0 {
+                        same.add(sample.technique, sample.value.as_dvec3() * weight, counts);
                     }
                 }
+                if samples.len() > 1 {
+                    common += same.total(more, counts);
+                }
+                all.join(&same);
             }
-            for (sum, p) in looked_up.iter().zip(counts.look_ups) {
-                common += sum * sum * (1.0 / p - 1.0);
-            }
-            common += own * own;
+            common += all.total([1.0; 2], counts);
+            let own = all.sum();
             sum += own;
             squares += own * own;
         }
@@ -164,6 +165,73 @@ impl<'a> Prediction<'a> {
         let rest = (common / passes - mean_square).dot(*scale) / 3.0;
         [single / passes, single / passes + rest]
     }
+}
+
+/// Samples that merge photons of one light sub-path, and single ones of other kinds.
+fn runs<'a>(samples: &'a [Sample], damping: &'a [f32]) -> impl Iterator<Item = (&'a [Sample], &'a [f32])> {
+    let together = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
+    let mut start = 0;
+    samples.chunk_by(together).map(move |run| {
+        let range = start..start + run.len();
+        start = range.end;
+        (run, &damping[range])
+    })
+}
+
+/// Sums over pairs of different samples.
+#[derive(Default)]
+struct Pairs {
+    /// Of samples whose number goes with light sub-paths, and with those with beams.
+    sums: [DVec3; 2],
+    /// Pairs of a sample and itself.
+    squares: [DVec3; 2],
+    /// Of techniques that are looked up seldom.
+    seldom: [DVec3; TECHNIQUES],
+}
+
+impl Pairs {
+    fn add(&mut self, technique: Technique, y: DVec3, counts: &Counts) {
+        let p = counts.look_ups[technique as usize];
+        self.sums[class(technique)] += y;
+        self.squares[class(technique)] += y * y / p;
+        if p < 1.0 {
+            self.seldom[technique as usize] += y;
+        }
+    }
+
+    fn join(&mut self, other: &Self) {
+        for i in 0..2 {
+            self.sums[i] += other.sums[i];
+            self.squares[i] += other.squares[i];
+        }
+        for (sum, other) in self.seldom.iter_mut().zip(&other.seldom) {
+            *sum += other;
+        }
+    }
+
+    fn sum(&self) -> DVec3 {
+        self.sums[0] + self.sums[1]
+    }
+
+    /// The products of all pairs. Those of a look-up that is made with probability p count 1/p times; those of two beams count
+    /// `factors[1]` times, all others `factors[0]` times.
+    fn total(&self, factors: [f64; 2], counts: &Counts) -> DVec3 {
+        let [points, beams] = self.sums;
+        let mut total = factors[0] * (points * points + 2.0 * points * beams) + factors[1] * beams * beams;
+        for (squares, factor) in self.squares.iter().zip(factors) {
+            total -= factor * squares;
+        }
+        for technique in TechniqueSet::ALL.without(TechniqueSet::BPT).iter() {
+            let (sum, p) = (self.seldom[technique as usize], counts.look_ups[technique as usize]);
+            total += factors[class(technique)] * (1.0 / p - 1.0) * sum * sum;
+        }
+        total
+    }
+}
+
+/// Which sub-paths a technique's samples go with: 1 for those with beams.
+const fn class(technique: Technique) -> usize {
+    matches!(technique, Technique::Bp2d | Technique::Bb1d) as usize
 }
 
 /// Groups are spread over the picture.
@@ -250,7 +318,6 @@ fn largest(mut parts: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
-    use upbp_estimators::Technique;
     use upbp_estimators::scene::PixelRect;
 
     use super::super::trial::Work;
@@ -283,7 +350,7 @@ mod tests {
                 shares[Technique::Hit as usize] = (1.0 / (1.0 + 2.0 * x)) as f32;
                 shares[Technique::Connect as usize] = (2.0 * x / (1.0 + 2.0 * x)) as f32;
                 let value = Vec3::splat((3.0 * x * x / (1.0 + 2.0 * x)) as f32);
-                samples.push(Sample { technique, value, shares });
+                samples.push(Sample { technique, merged: None, value, shares });
             }
             ends.push(samples.len() as u32);
         }
@@ -317,7 +384,8 @@ mod tests {
         // The picture is 1 everywhere.
         let relative = 1.0 / (1.0 + DARKNESS);
         for (hit, connect) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-            let mut counts = Counts { relative: [0.0; TECHNIQUES], look_ups: [1.0; TECHNIQUES] };
+            let mut counts =
+                Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES] };
             counts.relative[Technique::Hit as usize] = hit;
             counts.relative[Technique::Connect as usize] = connect;
             // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n.
@@ -349,7 +417,7 @@ mod tests {
             &trial,
             &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE),
         );
-        let mut counts = Counts { relative: [0.0; TECHNIQUES], look_ups: [1.0; TECHNIQUES] };
+        let mut counts = Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES] };
         counts.relative[Technique::Hit as usize] = 1.0;
         assert!(prediction.relative_variance(&counts).iter().sum::<f64>().is_infinite());
     }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use upbp_estimators::Technique;
 use upbp_estimators::mis::ByTechnique;
-use upbp_estimators::observer::{ObservedSample, Observer};
+use upbp_estimators::observer::{Joint, ObservedSample, Observer};
 
 /// The number of techniques.
 pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
@@ -12,6 +12,8 @@ pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
     pub(crate) technique: Technique,
+    /// The light sub-path whose photon or beam was merged.
+    pub(crate) merged: Option<u32>,
     pub(crate) value: Vec3,
     /// Parts of all techniques in the weights of its path; they sum to one.
     pub(crate) shares: [f32; TECHNIQUES],
@@ -37,10 +39,11 @@ impl<B> Observer<B> for Recorder {
     }
 
     fn sample(&mut self, sample: &ObservedSample<B, ByTechnique>) {
-        let ObservedSample { technique, value, weight, .. } = *sample;
+        let ObservedSample { technique, ref joint, value, weight, .. } = *sample;
         let total = weight.all.0.iter().sum::<f64>();
         self.samples.push(Sample {
             technique,
+            merged: if let Joint::Merge { path, .. } = joint { Some(*path) } else { None },
             value: Vec3::from((value * weight.value() as f32).to_array()),
             shares: weight.all.0.map(|density| (density / total) as f32),
         });

@@ -53,7 +53,8 @@ impl Candidate {
     }
 
     fn counts(&self) -> Counts {
-        let mut counts = Counts { relative: [0.0; TECHNIQUES], look_ups: [1.0; TECHNIQUES] };
+        let paths = [self.light_paths, self.beam_paths];
+        let mut counts = Counts { relative: [0.0; TECHNIQUES], paths, look_ups: [1.0; TECHNIQUES] };
         // Camera sub-paths are never told apart by how they find the light.
         counts.relative[Technique::Hit as usize] = 1.0;
         counts.relative[Technique::Nee as usize] = 1.0;

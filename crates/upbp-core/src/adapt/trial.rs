@@ -19,7 +19,8 @@ pub(crate) struct Trial {
     /// Looks at each cell.
     pub(crate) passes: usize,
     pub(crate) cells: usize,
-    /// Samples of camera sub-paths, by cell, then by pass; `ends[cell * passes + pass]` is behind the last one of each.
+    /// Samples of camera sub-paths, by cell, then by pass, then by the light sub-path that was merged;
+    /// `ends[cell * passes + pass]` is behind the last one of each.
     pub(crate) samples: Vec<Sample>,
     pub(crate) ends: Vec<u32>,
     /// Splats by cell. Light sub-paths fill the whole picture.
@@ -109,7 +110,9 @@ pub(crate) fn run<S: Scene>(
     }
     for cell in 0..cells {
         for pass in &passes {
+            let start = trial.samples.len();
             trial.samples.extend_from_slice(pass.camera[cell / CHUNK].of_path(cell % CHUNK));
+            trial.samples[start..].sort_by_key(|sample| sample.merged);
             trial.ends.push(trial.samples.len() as u32);
         }
     }
