@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use glam::DVec3;
-use upbp_core::{LightPaths, RenderPlan, Renderer, Settings, Stop, TechniqueSet, Techniques, read_exr};
+use upbp_core::{
+    LightPaths, Radii, Radius, RenderPlan, Renderer, Settings, Stop, TechniqueSet, Techniques, read_exr,
+};
 use upbp_scene::ReadyScene;
 
 fn settings() -> Settings {
@@ -65,6 +67,9 @@ fn light_that_only_merges_find_is_not_lost() {
 }
 
 /// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.
+///
+/// Kernels have a fifth of their usual width: at first they blur 0.2 % of the light out of the medium of one of the scenes, whoever chose
+/// them, and this is about what choosing does.
 fn unbiased(name: &str, folder: &str) {
     const SEEDS: u64 = 20;
     const ITERATIONS: u64 = 16;
@@ -76,10 +81,12 @@ fn unbiased(name: &str, folder: &str) {
         sum / pixels.len() as f64
     };
     let expected = mean(&read_exr(&path).expect("a reference").pixels);
+    let narrow = Radius::Scene(6e-4);
+    let radii = Radii { surf: narrow, pp3d: narrow, pb2d: narrow, bp2d: narrow, bb1d: narrow };
     let mut plans = Vec::new();
     let means: Vec<DVec3> = (0..SEEDS)
         .map(|seed| {
-            let mut renderer = renderer(&scene, Settings { seed, ..settings() });
+            let mut renderer = renderer(&scene, Settings { seed, radii, ..settings() });
             renderer.render(&Stop { iterations: Some(ITERATIONS), ..Stop::default() }, |_| {
                 std::ops::ControlFlow::Continue(())
             });

@@ -83,9 +83,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut verdicts = Vec::new();
     for subject in &subjects {
         let mut curves = Vec::new();
-        let mut rendered = Vec::new();
-        for set in &sets {
-            let series = series(subject, set, &settings, &seeds, seconds, &mut rendered)?;
+        for (set, series) in sets.iter().zip(series(subject, &sets, &settings, &seeds, seconds)?) {
             let curve = Curve::new(set.name.clone(), series, subject.floor);
             say(&table::row(&subject.name, &curve, &options.errors));
             csv += &table::csv(&subject.name, &curve);
@@ -104,30 +102,35 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 /// Errors over time, by seed.
 type Series = Vec<(u64, Vec<ErrorPoint>)>;
 
-/// Renders a scene with one set and all seeds. A scene may not have what a set needs, so that two sets are the same in it:
-/// those are rendered once. The choice of the program costs time of its own and is always rendered.
+/// Renders a scene with all sets and seeds; a series for each set. A scene may not have what a set needs, so that two sets are the
+/// same in it: those are rendered once. The choice of the program costs time of its own and is always rendered.
 fn series(
     subject: &Subject,
-    set: &NamedSet,
+    sets: &[NamedSet],
     settings: &Settings,
     seeds: &[u64],
     seconds: f64,
-    rendered: &mut Vec<(TechniqueSet, Series)>,
-) -> Result<Series, Box<dyn Error>> {
-    let mut series = Series::new();
-    let mut techniques = TechniqueSet::default();
+) -> Result<Vec<Series>, Box<dyn Error>> {
+    let mut series = vec![Series::new(); sets.len()];
     for &seed in seeds {
-        let settings = Settings { techniques: set.techniques, seed, ..settings.clone() };
-        let renderer = measure::prepare(subject, settings)?;
-        techniques = renderer.census().techniques;
-        let same = rendered.iter().find(|(other, _)| *other == techniques);
-        if let (Some((_, same)), false) = (same, set.is_auto()) {
-            return Ok(same.clone());
+        let mut renderers = Vec::new();
+        // Which of them is that of each set.
+        let mut places: Vec<(Option<TechniqueSet>, usize)> = Vec::new();
+        for set in sets {
+            let settings = Settings { techniques: set.techniques, seed, ..settings.clone() };
+            let renderer = measure::prepare(subject, settings)?;
+            let fixed = (!set.is_auto()).then(|| renderer.census().techniques);
+            let same = places.iter().find(|(other, _)| fixed.is_some() && *other == fixed);
+            let place = same.map_or(renderers.len(), |(_, place)| *place);
+            if place == renderers.len() {
+                renderers.push(renderer);
+            }
+            places.push((fixed, place));
         }
-        series.push((seed, measure::measure(subject, renderer, seconds)));
-    }
-    if !set.is_auto() {
-        rendered.push((techniques, series.clone()));
+        let points = measure::measure(subject, renderers, seconds);
+        for (series, (_, place)) in series.iter_mut().zip(places) {
+            series.push((seed, points[place].clone()));
+        }
     }
     Ok(series)
 }

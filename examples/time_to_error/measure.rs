@@ -1,15 +1,16 @@
-//! One render: its error over time.
+//! Renders: their errors over time.
 
 use std::error::Error;
-use std::ops::ControlFlow;
 
-use upbp_core::{ErrorPoint, Film, Renderer, Settings, Stop};
+use upbp_core::{ErrorPoint, Renderer, Settings};
 use upbp_scene::ReadyScene;
 
 use crate::subject::Subject;
 
 /// Ratio of the numbers of iterations at which errors are taken.
 const SPACING: f64 = 1.1;
+/// Seconds of a turn.
+const TURN: f64 = 0.1;
 
 /// A render that has not begun: the census is taken, the pilot has run.
 pub(crate) fn prepare(
@@ -28,35 +29,71 @@ pub(crate) fn prepare(
     Ok(renderer)
 }
 
-/// Renders for some time and takes the error after iterations at geometric distances, and after the last one.
-/// Seconds are those of rendering, the pilot included; taking errors does not count.
+/// Renders each for some time and takes errors after iterations at geometric distances, and after the last one. Seconds are those of
+/// rendering, the pilot included; taking errors does not count.
+///
+/// They take turns: the speed of a machine that others use changes within seconds, and so it does for all of them alike.
 pub(crate) fn measure(
     subject: &Subject,
-    mut renderer: Renderer<'_, ReadyScene>,
+    renderers: Vec<Renderer<'_, ReadyScene>>,
     seconds: f64,
-) -> Vec<ErrorPoint> {
-    let reference = &subject.reference;
-    let point = |film: &Film, seconds| {
+) -> Vec<Vec<ErrorPoint>> {
+    let mut lines: Vec<Line<'_>> =
+        renderers.into_iter().map(|renderer| Line::new(subject, renderer)).collect();
+    let mut turn_ends = 0.0;
+    while lines.iter().any(|line| !line.done) {
+        turn_ends += TURN;
+        for line in lines.iter_mut().filter(|line| !line.done) {
+            line.go_on(turn_ends, seconds);
+        }
+    }
+    lines.into_iter().map(|line| line.points).collect()
+}
+
+/// A render with what was measured of it so far.
+struct Line<'a> {
+    subject: &'a Subject,
+    renderer: Renderer<'a, ReadyScene>,
+    points: Vec<ErrorPoint>,
+    /// The number of iterations at which the next error is taken.
+    next: u64,
+    pilot: f64,
+    done: bool,
+}
+
+impl<'a> Line<'a> {
+    fn new(subject: &'a Subject, renderer: Renderer<'a, ReadyScene>) -> Self {
+        let pilot = renderer.report().seconds.total();
+        Self { subject, renderer, points: Vec::new(), next: 1, pilot, done: false }
+    }
+
+    /// Goes on until it has taken so many seconds, of which there are `limit` in all.
+    fn go_on(&mut self, until: f64, limit: f64) {
+        loop {
+            let seconds = self.renderer.report().seconds.total();
+            let iterations = self.renderer.film().iterations();
+            // As near to the limit as whole iterations come.
+            let one = (seconds - self.pilot) / iterations.max(1) as f64;
+            self.done = iterations > 0 && seconds + 0.5 * one > limit;
+            if iterations >= self.next || self.done {
+                self.take_error(seconds);
+                self.next = ((iterations as f64 * SPACING) as u64).max(iterations + 1);
+            }
+            if self.done || seconds >= until && iterations > 0 {
+                return;
+            }
+            self.renderer.iterate();
+        }
+    }
+
+    fn take_error(&mut self, seconds: f64) {
+        let (film, reference) = (self.renderer.film(), &self.subject.reference);
         let image = film.image();
-        ErrorPoint {
+        self.points.push(ErrorPoint {
             seconds,
             iterations: film.iterations(),
             relative_mse: image.relative_mse(reference),
             rmse: image.rmse(reference),
-        }
-    };
-    let mut points: Vec<ErrorPoint> = Vec::new();
-    let mut next = 1;
-    renderer.render(&Stop { seconds: Some(seconds), ..Stop::default() }, |now| {
-        if now.iterations >= next {
-            points.push(point(now.film, now.seconds));
-            next = ((now.iterations as f64 * SPACING) as u64).max(now.iterations + 1);
-        }
-        ControlFlow::Continue(())
-    });
-    let film = renderer.film();
-    if points.last().is_none_or(|last| last.iterations < film.iterations()) {
-        points.push(point(film, renderer.report().seconds.total()));
+        });
     }
-    points
 }

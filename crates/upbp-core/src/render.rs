@@ -11,7 +11,7 @@ use upbp_estimators::{LightMap, Plan, StreamKind, Technique, TechniqueSet, World
 
 use crate::adapt;
 use crate::census::Census;
-use crate::choices::{everything, plan, stage};
+use crate::choices::{self, everything, stage};
 use crate::emitters;
 use crate::error::{RenderError, StateError};
 use crate::film::{Film, Pixel};
@@ -102,13 +102,16 @@ impl<'a, S: Scene> Renderer<'a, S> {
             }
         };
         let [few, many] = pilot::LIGHT_PATHS;
+        let mut emission = None;
         if scene.emitters().len() > 1 {
             let pilot = look(&world, few);
             let light_paths = emitters::light_paths(pilot.vertices_per_path);
             let paths = [light_paths, light_paths / 8];
-            let plan = plan(&world, &settings, &stage(&world, &settings, techniques, &pilot, paths), 0);
-            let (emission, next_event) = emitters::measure(&world, &plan);
-            world.choose_emitters_by(&emission, &next_event);
+            let plan =
+                choices::plan(&world, &settings, &stage(&world, &settings, techniques, &pilot, paths), 0);
+            let (by_paths, next_event) = emitters::measure(&world, &plan);
+            world.choose_emitters_by(&by_paths, &next_event);
+            emission = Some(by_paths);
         }
         let pilot = look(&world, many);
         let pixels = rect.width.saturating_mul(rect.height);
@@ -132,6 +135,15 @@ impl<'a, S: Scene> Renderer<'a, S> {
             }
             (None, Techniques::Set(_)) => (RenderPlan::new(planner.everything), None),
         };
+        if let Some(emission) = emission
+            && plan.stage(0).light_paths == 0
+            && !techniques.without(TechniqueSet::PT).is_empty()
+        {
+            // Next events now have to find what light sub-paths would have found.
+            let (_, next_event) =
+                emitters::measure(&world, &choices::plan(&world, &settings, plan.stage(0), 0));
+            world.choose_emitters_by(&emission, &next_event);
+        }
         let probabilities: Vec<u8> = (0..scene.emitters().len() as u32)
             .map(EmitterId)
             .flat_map(|emitter| [world.emission_probability(emitter), world.next_event_probability(emitter)])
@@ -212,7 +224,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
     #[must_use]
     pub fn plan(&self, iteration: u64) -> Plan {
         let Identity { settings, plan: stages, .. } = &self.state.identity;
-        plan(&self.world, settings, stages.stage(iteration), iteration)
+        choices::plan(&self.world, settings, stages.stage(iteration), iteration)
     }
 
     /// Makes the plan for all iterations up to this one.

@@ -149,7 +149,7 @@ impl Scene for ReadyScene {
     }
 
     fn has_specular_surfaces(&self) -> bool {
-        self.surfaces.iter().filter_map(|surface| surface.bsdf).any(|bsdf| !bsdf.is_connectible())
+        self.surfaces.iter().filter_map(|surface| surface.bsdf).any(|bsdf| bsdf.is_specular())
     }
 
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Material>> {

@@ -9,7 +9,7 @@ use upbp_estimators::Technique;
 
 use super::recorder::TECHNIQUES;
 use super::search::Candidate;
-use super::trial::Trial;
+use super::trial::{Trial, Work};
 use super::watch::WALK;
 
 /// Nanoseconds of one edge of a camera sub-path, and of a light sub-path.
@@ -29,6 +29,10 @@ const PIXEL: f64 = 40.0;
 /// How many times as long as in the model the parts of an iteration take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Costs {
+    work: Work,
+    pixels: f64,
+    /// Light sub-paths of the plan, and of them those with beams.
+    planned: [f64; 2],
     camera_walk: f64,
     light_walk: f64,
     techniques: [f64; TECHNIQUES],
@@ -40,7 +44,14 @@ impl Costs {
         /// Counts per sub-path below which there is nothing to measure.
         const LEAST: f64 = 0.01;
         let work = &trial.work;
-        let mut costs = Self { camera_walk: 1.0, light_walk: 1.0, techniques: [1.0; TECHNIQUES] };
+        let mut costs = Self {
+            work: *work,
+            pixels: trial.pixels,
+            planned: trial.planned,
+            camera_walk: 1.0,
+            light_walk: 1.0,
+            techniques: [1.0; TECHNIQUES],
+        };
         let ratio = |measured: f64, model: f64| (measured / model).clamp(0.1, 10.0);
         if let Some(time) = work.camera_time {
             costs.camera_walk = ratio(time[WALK], work.camera_edges * EDGE[0]);
@@ -66,8 +77,8 @@ impl Costs {
     }
 
     /// Nanoseconds of an iteration, on one thread.
-    pub(crate) fn iteration(&self, trial: &Trial, candidate: &Candidate) -> f64 {
-        let work = &trial.work;
+    pub(crate) fn iteration(&self, candidate: &Candidate) -> f64 {
+        let work = &self.work;
         let has = |technique| candidate.techniques.has(technique);
         let beams = has(Technique::Pb2d) || has(Technique::Bb1d);
         let walk = work.camera_edges * EDGE[0] * self.camera_walk * if beams { 1.0 } else { SHORT };
@@ -95,12 +106,11 @@ impl Costs {
             light += work.vertices * BUILD_POINT;
         }
         let beams = if has(Technique::Bb1d) || has(Technique::Bp2d) {
-            candidate.beam_paths * trial.planned[1] * work.beams * BUILD_BEAM
+            candidate.beam_paths * self.planned[1] * work.beams * BUILD_BEAM
         } else {
             0.0
         };
-        let light_paths =
-            if candidate.needs_light() { candidate.light_paths * trial.planned[0] } else { 0.0 };
-        trial.pixels * camera + light_paths * light + beams
+        let light_paths = if candidate.needs_light() { candidate.light_paths * self.planned[0] } else { 0.0 };
+        self.pixels * camera + light_paths * light + beams
     }
 }

@@ -28,10 +28,10 @@ pub(crate) const REVIEWS: [u64; 3] = [0, 512, 4096];
 /// The factor by which a change must make the product of variance and cost smaller.
 const GAINS: [f64; REVIEWS.len()] = [0.93, 0.96, 0.98];
 /// The first trial looks at one of so many pixels, more of them where no media make it slow, within bounds,
-const PIXELS_PER_CELL: [u32; 2] = [24, 6];
-const CELLS: [u32; 2] = [256, 2048];
+const PIXELS_PER_CELL: [u32; 2] = [12, 4];
+const CELLS: [u32; 2] = [400, 2048];
 /// and the next one at so many times as many.
-const GROWTH: u32 = 4;
+const GROWTH: u32 = 2;
 /// Light sub-paths per cell in a pass of the trial.
 const LIGHT_PATHS_PER_CELL: u32 = 2;
 
@@ -57,7 +57,7 @@ pub(crate) fn choose<S: Scene>(world: &World<'_, S>, choice: &Choice<'_>, review
     let grid = Grid::new(crop, cells);
     let paths = choice.most_paths.min(LIGHT_PATHS_PER_CELL * cells);
     let trial = trial::run(world, plan, &grid, paths, PASSES * review, choice.timed);
-    let prediction = Prediction::new(&trial, &grid);
     let costs = Costs::of(&trial);
-    search::best(&trial, &prediction, &costs, &choice.bounds, GAINS[review as usize])
+    let prediction = Prediction::new(trial, &grid);
+    search::best(&prediction, &costs, &choice.bounds, GAINS[review as usize])
 }

@@ -13,7 +13,7 @@ use super::recorder::{Sample, TECHNIQUES};
 use super::trial::{PASSES, Trial};
 
 /// No sample says more than this part of the whole.
-const LARGEST_PART: f64 = 0.01;
+const LARGEST_PART: f64 = 0.03;
 /// Of the squared mean of the picture, what is added to the squared radiance that errors are relative to: for a picture of mean
 /// 0.5 the 0.01 of relMSE.
 const DARKNESS: f64 = 0.04;
@@ -36,51 +36,43 @@ pub(crate) struct Counts {
 }
 
 /// A trial, made ready for predictions.
-pub(crate) struct Prediction<'a> {
-    trial: &'a Trial,
-    /// One over the squared radiance that errors are relative to, by cell.
+pub(crate) struct Prediction {
+    trial: Trial,
+    /// One over the squared radiance that errors are relative to, by cell: of what was seen around it, so that no bright sample makes
+    /// itself less important.
     scale: Vec<DVec3>,
-    /// Roots of the parts to which samples that say too much are reduced.
-    damping: Vec<f32>,
-    splat_damping: Vec<f32>,
     evenness: f64,
 }
 
-impl<'a> Prediction<'a> {
-    pub(crate) fn new(trial: &'a Trial, grid: &Grid) -> Self {
-        let mut prediction = Self {
-            trial,
-            scale: relative_to(&smooth(&means(trial), grid.columns())),
-            damping: Vec::new(),
-            splat_damping: Vec::new(),
-            evenness: 1.0,
+impl Prediction {
+    /// Takes a trial. Samples that say too much are made smaller, and so are those of camera sub-paths that do together.
+    pub(crate) fn new(mut trial: Trial, grid: &Grid) -> Self {
+        let scale = relative_to(&surroundings(&trial.means(), grid.columns()));
+        let per_look = 1.0 / (trial.cells * trial.passes) as f64;
+        let looks = (0..trial.cells).flat_map(|cell| (0..trial.passes).map(move |pass| (cell, pass)));
+        let mut parts = Vec::with_capacity(trial.samples.len() + trial.splats.len());
+        for (cell, pass) in looks.clone() {
+            let samples = &trial.samples[trial.range(cell, pass)];
+            parts.extend(samples.iter().map(|s| per_look * trial.second_moment(s, &scale[cell])));
+        }
+        for (pass, cell, splat) in trial.splats() {
+            parts.push(trial.per_splat() * trial.second_moment(splat, &scale[cell]));
+        }
+        let by_sample = reductions(&parts);
+        let splats = trial.splats.iter_mut().map(|(_, splat)| splat);
+        for (sample, reduction) in trial.samples.iter_mut().chain(splats).zip(by_sample) {
+            sample.value *= reduction;
+        }
+        let together = |(cell, pass)| {
+            let sum: DVec3 = trial.samples[trial.range(cell, pass)].iter().map(|s| s.value.as_dvec3()).sum();
+            (sum * sum).dot(scale[cell])
         };
-        let parts: Vec<f64> = (0..trial.cells)
-            .flat_map(|cell| {
-                let per_look = 1.0 / (trial.cells * trial.passes) as f64;
-                let scale = prediction.scale[cell];
-                trial
-                    .of_cell(cell)
-                    .iter()
-                    .map(move |sample| per_look * square(sample, &scale) * trial.thinning(sample.technique))
-            })
-            .collect();
-        let splats: Vec<f64> = trial
-            .splats
-            .iter()
-            .map(|(cell, sample)| {
-                let scale = &prediction.scale[*cell as usize];
-                trial.per_splat() * square(sample, scale) * trial.thinning(sample.technique)
-            })
-            .collect();
-        let most = largest(parts.iter().chain(&splats).copied().collect());
-        let damp = |parts: Vec<f64>| {
-            parts
-                .into_iter()
-                .map(|part| if part > most { (most / part).sqrt() as f32 } else { 1.0 })
-                .collect()
-        };
-        (prediction.damping, prediction.splat_damping) = (damp(parts), damp(splats));
+        let parts: Vec<f64> = looks.clone().map(together).collect();
+        for ((cell, pass), reduction) in looks.zip(reductions(&parts)) {
+            let range = trial.range(cell, pass);
+            trial.samples[range].iter_mut().for_each(|sample| sample.value *= reduction);
+        }
+        let mut prediction = Self { trial, scale, evenness: 1.0 };
         prediction.evenness = prediction.splat_evenness();
         prediction
     }
@@ -88,7 +80,7 @@ impl<'a> Prediction<'a> {
     /// The relative variance of an iteration of a plan with these counts, mean over pixels and channels, in parts due to groups of
     /// cells. Infinite if a path that the trial found is one that the plan cannot find.
     pub(crate) fn relative_variance(&self, counts: &Counts) -> [f64; GROUPS] {
-        let trial = self.trial;
+        let trial = &self.trial;
         let mut single = [0.0; GROUPS];
         let mut all = [0.0; GROUPS];
         for cell in 0..trial.cells {
@@ -98,11 +90,10 @@ impl<'a> Prediction<'a> {
         }
         // The difference of two noisy numbers may be anything.
         let mut variance = std::array::from_fn(|group| f64::max(all[group], LEAST_PART * single[group]));
-        for ((cell, sample), damping) in trial.splats.iter().zip(&self.splat_damping) {
-            let cell = *cell as usize;
-            let part = square(sample, &self.scale[cell]) * trial.thinning(sample.technique);
-            variance[group(cell)] += self.evenness * trial.per_splat() * part * f64::from(damping * damping)
-                / share(sample, counts);
+        let relative = counts.relative.map(|count| count as f32);
+        for (pass, cell, splat) in trial.splats() {
+            let moment = trial.second_moment(splat, &self.scale[cell]) / share(splat, &relative);
+            variance[group(cell)] += self.evenness * trial.per_splat() * moment;
         }
         variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
     }
@@ -110,50 +101,49 @@ impl<'a> Prediction<'a> {
     /// The variance of the light that splats bring to a cell between passes, relative to what it would be if light sub-paths were
     /// independent: they are stratified among each other, and a cell gets as many splats of a pass as a pixel of an iteration.
     fn splat_evenness(&self) -> f64 {
-        let trial = self.trial;
+        let trial = &self.trial;
         let mut sums = vec![[DVec3::ZERO; PASSES as usize]; trial.cells];
         let mut independent = 0.0;
-        for (i, ((cell, sample), damping)) in trial.splats.iter().zip(&self.splat_damping).enumerate() {
-            let (cell, damping) = (*cell as usize, f64::from(*damping));
-            let pass = trial.splat_passes.partition_point(|end| *end <= i);
-            sums[cell][pass] += sample.value.as_dvec3() * damping;
-            independent += square(sample, &self.scale[cell]) * damping * damping;
+        for (pass, cell, splat) in trial.splats() {
+            sums[cell][pass] += splat.value.as_dvec3();
+            independent += square(splat, &self.scale[cell]);
         }
         // Two passes: the squared difference is twice the variance of one, and the sum of squares over both is twice its own.
-        let apart =
-            |([first, second], scale): (&[DVec3; 2], &DVec3)| (first - second).powf(2.0).dot(*scale) / 3.0;
-        let apart: f64 = sums.iter().zip(&self.scale).map(apart).sum();
+        let apart = |(cell, [first, second]): (usize, &[DVec3; 2])| {
+            (first - second).powf(2.0).dot(self.scale[cell]) / 3.0
+        };
+        let apart: f64 = sums.iter().enumerate().map(apart).sum();
         if independent > 0.0 { (apart / independent).clamp(LEAST_EVENNESS, 1.0) } else { 1.0 }
     }
 
     /// Its second moments of single samples, and all of its variance.
     fn of_cell(&self, cell: usize, counts: &Counts) -> [f64; 2] {
-        let trial = self.trial;
-        let scale = &self.scale[cell];
+        let Self { trial, scale, .. } = self;
+        let scale = &scale[cell];
         let passes = trial.passes as f64;
+        let relative = counts.relative.map(|count| count as f32);
         // As many pairs of photons of one light sub-path as the plan has, less those of the trial.
-        let more = [0, 1].map(|i| trial.thinning[i] / counts.paths[i] - 1.0).map(|more| more.min(1e6));
+        let more = [0, 1].map(|i| (trial.thinning[i] / counts.paths[i] - 1.0).min(1e6));
         let (mut single, mut common) = (0.0, DVec3::ZERO);
         let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
         for pass in 0..trial.passes {
-            let range = trial.range(cell, pass);
             let mut all = Pairs::default();
-            for (samples, damping) in runs(&trial.samples[range.clone()], &self.damping[range]) {
+            let together = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
+            for run in trial.samples[trial.range(cell, pass)].chunk_by(together) {
                 let mut same = Pairs::default();
-                for (sample, damping) in samples.iter().zip(damping) {
-                    let share = share(sample, counts);
-                    let damping = f64::from(*damping);
-                    single +=
-                        square(sample, scale) * trial.thinning(sample.technique) * damping * damping / share;
-                    let weight = counts.relative[sample.technique as usize] / share * damping;
+                for sample in run {
+                    let share = share(sample, &relative);
+                    single += trial.second_moment(sample, scale) / share;
+                    let weight = counts.relative[sample.technique as usize] / share;
                     if weight > 0.0 {
-                        same.add(sample.technique, sample.value.as_dvec3() * weight, counts);
+                        let into = if run.len() > 1 { &mut same } else { &mut all };
+                        into.add(sample.technique, sample.value.as_dvec3() * weight, counts);
                     }
                 }
-                if samples.len() > 1 {
+                if run.len() > 1 {
                     common += same.total(more, counts);
+                    all.join(&same);
                 }
-                all.join(&same);
             }
             common += all.total([1.0; 2], counts);
             let own = all.sum();
@@ -165,17 +155,6 @@ impl<'a> Prediction<'a> {
         let rest = (common / passes - mean_square).dot(*scale) / 3.0;
         [single / passes, single / passes + rest]
     }
-}
-
-/// Samples that merge photons of one light sub-path, and single ones of other kinds.
-fn runs<'a>(samples: &'a [Sample], damping: &'a [f32]) -> impl Iterator<Item = (&'a [Sample], &'a [f32])> {
-    let together = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
-    let mut start = 0;
-    samples.chunk_by(together).map(move |run| {
-        let range = start..start + run.len();
-        start = range.end;
-        (run, &damping[range])
-    })
 }
 
 /// Sums over pairs of different samples.
@@ -240,8 +219,8 @@ const fn group(cell: usize) -> usize {
 }
 
 /// The densities of a plan at a sample's path, relative to the trial's.
-fn share(sample: &Sample, counts: &Counts) -> f64 {
-    sample.shares.iter().zip(counts.relative).map(|(share, count)| f64::from(*share) * count).sum()
+fn share(sample: &Sample, relative: &[f32; TECHNIQUES]) -> f64 {
+    f64::from(sample.shares.iter().zip(relative).map(|(share, count)| share * count).sum::<f32>())
 }
 
 /// The squared value of a sample, relative, mean over channels.
@@ -257,8 +236,29 @@ impl Trial {
         start as usize..self.ends[group] as usize
     }
 
-    fn of_cell(&self, cell: usize) -> &[Sample] {
-        &self.samples[self.range(cell, 0).start..self.range(cell, self.passes - 1).end]
+    /// Splats with their passes and cells.
+    fn splats(&self) -> impl Iterator<Item = (usize, usize, &Sample)> {
+        let pass = |i| self.splat_passes.partition_point(|end| *end <= i);
+        self.splats.iter().enumerate().map(move |(i, (cell, splat))| (pass(i), *cell as usize, splat))
+    }
+
+    /// The mean radiance of each cell.
+    fn means(&self) -> Vec<DVec3> {
+        let passes = self.passes as f64;
+        let of_cell = |cell| {
+            let samples = (0..self.passes).flat_map(|pass| &self.samples[self.range(cell, pass)]);
+            samples.map(|sample| sample.value.as_dvec3()).sum::<DVec3>() / passes
+        };
+        let mut means: Vec<DVec3> = (0..self.cells).map(of_cell).collect();
+        for (_, cell, splat) in self.splats() {
+            means[cell] += splat.value.as_dvec3() * self.per_splat() * self.cells as f64;
+        }
+        means
+    }
+
+    /// The square of a sample, relative, as much of it as all samples of the plan would have.
+    fn second_moment(&self, sample: &Sample, scale: &DVec3) -> f64 {
+        square(sample, scale) * self.thinning(sample.technique)
     }
 
     /// The part of a splat in a mean over pixels.
@@ -267,37 +267,30 @@ impl Trial {
     }
 }
 
-/// The mean radiance of each cell.
-fn means(trial: &Trial) -> Vec<DVec3> {
-    let passes = trial.passes as f64;
-    let of_cell =
-        |cell| trial.of_cell(cell).iter().map(|sample| sample.value.as_dvec3()).sum::<DVec3>() / passes;
-    let mut means: Vec<DVec3> = (0..trial.cells).map(of_cell).collect();
-    let pixels_per_cell = trial.pixels / trial.cells as f64;
-    for (cell, sample) in &trial.splats {
-        means[*cell as usize] += sample.value.as_dvec3() / (pixels_per_cell * passes);
-    }
-    means
-}
-
-/// Means over squares of three by three cells.
-fn smooth(cells: &[DVec3], columns: usize) -> Vec<DVec3> {
+/// Means over squares of five by five cells, without the one in the middle.
+fn surroundings(cells: &[DVec3], columns: usize) -> Vec<DVec3> {
     let rows = cells.len() / columns;
-    let around = |i: usize, count: usize| i.saturating_sub(1)..(i + 2).min(count);
-    let mean = |cell: usize| {
+    let around = |i: usize, count: usize| i.saturating_sub(2)..(i + 3).min(count);
+    let mean = |(cell, own): (usize, &DVec3)| {
         let (near_rows, near_columns) = (around(cell / columns, rows), around(cell % columns, columns));
-        let count = near_rows.len() * near_columns.len();
-        let row_sum =
+        let others = near_rows.len() * near_columns.len() - 1;
+        let row =
             |row: usize| near_columns.clone().map(|column| cells[row * columns + column]).sum::<DVec3>();
-        near_rows.map(row_sum).sum::<DVec3>() / count as f64
+        (near_rows.map(row).sum::<DVec3>() - own).max(DVec3::ZERO) / others.max(1) as f64
     };
-    (0..cells.len()).map(mean).collect()
+    cells.iter().enumerate().map(mean).collect()
 }
 
 fn relative_to(means: &[DVec3]) -> Vec<DVec3> {
     let overall = means.iter().map(|mean| mean.element_sum()).sum::<f64>() / (3 * means.len()) as f64;
     let dark = (DARKNESS * overall * overall).max(f64::MIN_POSITIVE);
     means.iter().map(|mean| (mean * mean + dark).recip()).collect()
+}
+
+/// Factors of values, by the parts that their squares have: none is to be more than [`LARGEST_PART`] of the whole.
+fn reductions(parts: &[f64]) -> Vec<f32> {
+    let most = largest(parts.to_vec());
+    parts.iter().map(|part| if *part > most { (most / part).sqrt() as f32 } else { 1.0 }).collect()
 }
 
 /// The limit of parts such that none is more than [`LARGEST_PART`] of the sum of all that are so limited.
@@ -377,7 +370,7 @@ mod tests {
     fn variances_are_those_of_the_estimators() {
         let trial = trial();
         let prediction = Prediction::new(
-            &trial,
+            trial,
             &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE),
         );
         let f = |x: f64| 3.0 * x * x;
@@ -404,6 +397,46 @@ mod tests {
         }
     }
 
+    /// Photons of one light sub-path that are merged together share its error; those of different ones do not.
+    #[test]
+    fn variances_know_which_photons_are_of_one_light_sub_path() {
+        const PLANNED: f64 = 16_000.0;
+        const TRACED: usize = 8000;
+        const PHOTONS: usize = 3;
+        /// One light sub-path out of so many comes by.
+        const RARE: f64 = 400.0;
+        let cells = (SIDE * SIDE) as usize;
+        let mut shares = [0.0; TECHNIQUES];
+        shares[Technique::Pb2d as usize] = 1.0;
+        let value = Vec3::splat((RARE / (TRACED * PHOTONS) as f64) as f32);
+        let (mut samples, mut ends, mut drawn) = (Vec::new(), Vec::new(), 0);
+        for _ in 0..cells * PASSES as usize {
+            let mut path = 0.0;
+            loop {
+                path += 1.0 + (uniform(drawn, 2).ln() / (1.0 - 1.0 / RARE).ln()).floor();
+                drawn += 1;
+                if path > TRACED as f64 {
+                    break;
+                }
+                let merged = Some(path as u32);
+                samples.extend([Sample { technique: Technique::Pb2d, merged, value, shares }; PHOTONS]);
+            }
+            ends.push(samples.len() as u32);
+        }
+        let trial =
+            Trial { samples, ends, thinning: [TRACED as f64 / PLANNED; 2], planned: [PLANNED; 2], ..trial() };
+        let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
+        let prediction = Prediction::new(trial, &grid);
+        for paths in [0.25, 1.0, 4.0] {
+            let mut counts =
+                Counts { relative: [0.0; TECHNIQUES], paths: [paths; 2], look_ups: [1.0; TECHNIQUES] };
+            counts.relative[Technique::Pb2d as usize] = paths;
+            let found: f64 = prediction.relative_variance(&counts).iter().sum();
+            let expected = (RARE - 1.0) / (paths * PLANNED) / (1.0 + DARKNESS);
+            assert!((found / expected - 1.0).abs() < 0.1, "{paths}: {found}, expected {expected}");
+        }
+    }
+
     #[test]
     fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
         let mut trial = trial();
@@ -414,7 +447,7 @@ mod tests {
             }
         }
         let prediction = Prediction::new(
-            &trial,
+            trial,
             &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE),
         );
         let mut counts = Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES] };

@@ -6,7 +6,6 @@ use upbp_estimators::{Technique, TechniqueSet};
 use super::cost::Costs;
 use super::prediction::{Counts, GROUPS, Prediction};
 use super::recorder::TECHNIQUES;
-use super::trial::Trial;
 
 /// A plan that may be chosen. Numbers of sub-paths are relative to the trial's plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,8 +103,7 @@ impl Judged {
 
 /// Judges candidates, each once.
 struct Judge<'a> {
-    trial: &'a Trial,
-    prediction: &'a Prediction<'a>,
+    prediction: &'a Prediction,
     costs: &'a Costs,
     known: Vec<Judged>,
 }
@@ -121,7 +119,7 @@ impl Judge<'_> {
             .map(|&candidate| Judged {
                 candidate,
                 variance: self.prediction.relative_variance(&candidate.counts()),
-                cost: self.costs.iteration(self.trial, &candidate),
+                cost: self.costs.iteration(&candidate),
             })
             .collect();
         self.known.extend(new);
@@ -131,14 +129,8 @@ impl Judge<'_> {
 
 /// The best candidate that small steps from some sensible ones lead to. A step must make the product smaller by the factor
 /// `gain`: predictions are noisy, and the least of many is so by chance.
-pub(crate) fn best(
-    trial: &Trial,
-    prediction: &Prediction<'_>,
-    costs: &Costs,
-    bounds: &Bounds,
-    gain: f64,
-) -> Candidate {
-    let mut judge = Judge { trial, prediction, costs, known: Vec::new() };
+pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
+    let mut judge = Judge { prediction, costs, known: Vec::new() };
     let everything = Candidate {
         techniques: bounds.techniques,
         light_paths: 1.0,
@@ -160,12 +152,24 @@ pub(crate) fn best(
             best = Some(at);
         }
     }
-    let best = best.map_or(everything, |best| best.candidate);
-    let missing = bounds.careful.without(best.techniques);
-    if best.needs_light() {
-        Candidate { techniques: best.techniques.union(missing), seldom: best.seldom.union(missing), ..best }
+    insured(best.map_or(everything, |best| best.candidate), costs, bounds)
+}
+
+/// A candidate with what may find light that the trial missed, if it has light sub-paths: on all camera sub-paths where this costs
+/// little, else on some.
+fn insured(best: Candidate, costs: &Costs, bounds: &Bounds) -> Candidate {
+    /// The factor by which an iteration may take longer.
+    const PREMIUM: f64 = 1.05;
+    if !best.needs_light() {
+        return best;
+    }
+    let techniques = best.techniques.union(bounds.careful);
+    let missing = bounds.careful.without(best.techniques).union(best.seldom.intersection(bounds.careful));
+    let always = Candidate { techniques, seldom: best.seldom.without(missing), ..best };
+    if costs.iteration(&always) <= PREMIUM * costs.iteration(&best) {
+        always
     } else {
-        best
+        Candidate { techniques, seldom: best.seldom.union(missing), ..best }
     }
 }
 

@@ -36,7 +36,7 @@ pub(crate) struct Trial {
 }
 
 /// What sub-paths had to do, on average.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Work {
     pub(crate) camera_edges: f64,
     /// Turns to each technique per camera sub-path; of light tracing per light sub-path.

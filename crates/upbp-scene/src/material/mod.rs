@@ -50,6 +50,12 @@ impl Material {
     pub const fn is_refracting(&self) -> bool {
         matches!(self, Self::Dielectric(_) | Self::RoughDielectric(_))
     }
+
+    /// Whether light goes in single directions.
+    #[must_use]
+    pub const fn is_specular(&self) -> bool {
+        matches!(self, Self::Mirror(_) | Self::Dielectric(_))
+    }
 }
 
 macro_rules! dispatch {
