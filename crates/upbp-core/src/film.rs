@@ -241,6 +241,10 @@ fn add_pixel(layers: &[Layer], sums: &mut [Sum3], square: &mut Sum3, pixel: &Pix
     let mut dropped = 0;
     let mut total = [0.0_f64; 3];
     for (sum, layer) in sums.iter_mut().zip(layers) {
+        // A plan rarely has all techniques.
+        if pixel[*layer as usize].is_black() {
+            continue;
+        }
         let values = pixel[*layer as usize].to_array().map(|value| {
             let usable = value >= 0.0 && value.is_finite();
             dropped += u64::from(!usable);

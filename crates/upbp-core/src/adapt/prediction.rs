@@ -392,7 +392,6 @@ mod tests {
             };
             let expected = relative * (part(hit, |_| 1.0) + part(connect, |x| 2.0 * x));
             let found: f64 = prediction.relative_variance(&counts).iter().sum();
-            // Samples that make the local mean brighter count a little less.
             assert!((found / expected - 1.0).abs() < 0.1, "{hit}, {connect}: {found}, expected {expected}");
         }
     }
@@ -456,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn no_part_is_more_than_a_hundredth() {
+    fn no_part_is_more_than_the_largest() {
         let mut parts = vec![1.0; 1000];
         parts.extend([1e6, 1e3]);
         let most = largest(parts.clone());
