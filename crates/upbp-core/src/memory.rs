@@ -40,8 +40,8 @@ impl LightCounts {
     pub(crate) fn peak_bytes<B>(&self) -> f64 {
         /// The boxes of a tree, per item: those of leaves, rounded for points, and the nodes above them.
         const NODES: f64 = 256.0 / 512.0 * 8.0 / 7.0;
-        const POINT_BOXES: f64 = 64.0 / 64.0 + NODES;
-        const PIECE_BOXES: f64 = 192.0 / 64.0 + NODES;
+        const POINT_BOXES: f64 = 1.0 + NODES;
+        const PIECE_BOXES: f64 = 3.0 + NODES;
         /// A position with its payload: given to be sorted, sorted into buckets, and in its place in the tree.
         const POINT: f64 = 16.0;
         /// A segment with its payload.

@@ -168,15 +168,12 @@ impl<'a, D: Densities> Recursion<'a, D> {
     fn merge(&self, i: usize, factor: impl Fn(&VolumeMerges) -> f64) -> Weight<D> {
         let vertex = &self.path.vertices[i];
         let (light, camera) = (&self.light[i], &self.camera[i]);
-        let (factor, merges) = match vertex.kind {
-            VertexKind::Medium(medium) => {
-                let factors = self.plan.volume_factors(medium, light.c, camera.c, vertex.sin_theta);
-                (factor(&factors), factors.sum())
-            }
-            _ => {
-                let factor = self.plan.pow(self.plan.surf);
-                (factor, D::of(Technique::Surf, factor))
-            }
+        let (factor, merges) = if let VertexKind::Medium(medium) = vertex.kind {
+            let factors = self.plan.volume_factors(medium, light.c, camera.c, vertex.sin_theta);
+            (factor(&factors), factors.sum())
+        } else {
+            let factor = self.plan.pow(self.plan.surf);
+            (factor, D::of(Technique::Surf, factor))
         };
         let before_light = light.before(self.plan, vertex.rho_camera);
         let before_camera = camera.before(self.plan, vertex.rho_light);

@@ -55,7 +55,7 @@ impl Prediction {
             let samples = &trial.samples[trial.range(cell, pass)];
             parts.extend(samples.iter().map(|s| per_look * trial.second_moment(s, &scale[cell])));
         }
-        for (pass, cell, splat) in trial.splats() {
+        for (_, cell, splat) in trial.splats() {
             parts.push(trial.per_splat() * trial.second_moment(splat, &scale[cell]));
         }
         let by_sample = reductions(&parts);
@@ -91,7 +91,7 @@ impl Prediction {
         // The difference of two noisy numbers may be anything.
         let mut variance = std::array::from_fn(|group| f64::max(all[group], LEAST_PART * single[group]));
         let relative = counts.relative.map(|count| count as f32);
-        for (pass, cell, splat) in trial.splats() {
+        for (_, cell, splat) in trial.splats() {
             let moment = trial.second_moment(splat, &self.scale[cell]) / share(splat, &relative);
             variance[group(cell)] += self.evenness * trial.per_splat() * moment;
         }
