@@ -147,6 +147,34 @@ fn a_frozen_plan_makes_the_same_iterations() {
     assert_eq!(resumed.report().plan, plan);
 }
 
+/// Time that was measured may choose otherwise when a render is taken up again: what its state says counts, whatever that is. The
+/// scene has two lights, whose shares depend on whether there are light sub-paths.
+#[test]
+fn a_state_is_taken_up_whatever_was_chosen_since() {
+    let scene = shipped("reference/chromatic_sphere");
+    let auto = || Settings::default().validate().expect("valid settings");
+    for names in ["hit+nee", "bpt", "bpt+surf+pb2d"] {
+        let techniques = names.parse::<TechniqueSet>().expect("names").into();
+        let mut plan = renderer(&scene, Settings { techniques, ..settings() }).report().plan;
+        if names == "hit+nee" {
+            // A later stage has light sub-paths.
+            let bpt = Settings { techniques: TechniqueSet::BPT.into(), ..settings() };
+            let later = renderer(&scene, bpt).report().plan.to_string().replace("from: 0", "from: 3");
+            let both = format!("{}{}", plan.to_string().trim_end_matches(']'), later.trim_start_matches('['));
+            plan = RenderPlan::from_ron(&both).expect("two stages");
+        }
+        let run = |iterations| {
+            let mut renderer = Renderer::with_plan(&scene, auto(), plan.clone()).expect("a plan for it");
+            (0..iterations).for_each(|_| assert!(renderer.iterate()));
+            renderer
+        };
+        let mut resumed = Renderer::new(&scene, auto()).expect("a valid render");
+        resumed.resume(run(2).state().clone()).expect("the same render");
+        (0..3).for_each(|_| assert!(resumed.iterate()));
+        assert_eq!(resumed.film().fingerprint(), run(5).film().fingerprint(), "{names}");
+    }
+}
+
 #[test]
 fn a_plan_that_does_not_fit_is_refused() {
     let fog = shipped("reference/mirror_fog");

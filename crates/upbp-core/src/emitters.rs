@@ -28,8 +28,31 @@ pub(crate) fn light_paths(vertices: f64) -> u32 {
     (LIGHT_VERTICES / vertices.max(1.0)).clamp(64.0, f64::from(LIGHT_PATHS)) as u32
 }
 
+/// How emitters are chosen in the iterations of a render.
+pub(crate) struct EmitterChoices {
+    by_light_paths: EmitterShares,
+    next_event: EmitterShares,
+    /// Of stages without light sub-paths: next events have to find what those would have found.
+    next_event_alone: EmitterShares,
+}
+
+impl EmitterChoices {
+    /// Measured under a plan, and under one without light sub-paths if there may be such stages.
+    pub(crate) fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan, alone: Option<&Plan>) -> Self {
+        let (by_light_paths, next_event) = measure(world, plan);
+        let next_event_alone = alone.map_or_else(|| next_event.clone(), |plan| measure(world, plan).1);
+        Self { by_light_paths, next_event, next_event_alone }
+    }
+
+    /// Chooses emitters as a stage with or without light sub-paths does.
+    pub(crate) fn apply<S: Scene>(&self, world: &mut World<'_, S>, has_light_paths: bool) {
+        let next_event = if has_light_paths { &self.next_event } else { &self.next_event_alone };
+        world.choose_emitters_by(&self.by_light_paths, next_event);
+    }
+}
+
 /// What every emitter brings under `plan`: by light sub-paths, by next events.
-pub(crate) fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, EmitterShares) {
+fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, EmitterShares) {
     let context = Context { world, plan };
     // The whole film: a crop shows the same camera samples.
     let (width, height) = world.scene.camera().resolution();

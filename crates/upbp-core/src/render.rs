@@ -12,7 +12,7 @@ use upbp_estimators::{LightMap, Plan, StreamKind, Technique, TechniqueSet, World
 use crate::adapt;
 use crate::census::Census;
 use crate::choices::{self, everything, stage};
-use crate::emitters;
+use crate::emitters::{self, EmitterChoices};
 use crate::error::{RenderError, StateError};
 use crate::film::{Film, Pixel};
 use crate::iterations::MAX_ITERATIONS;
@@ -33,6 +33,8 @@ use crate::techniques::Techniques;
 /// methods are called does the work.
 pub struct Renderer<'a, S: Scene> {
     world: World<'a, S>,
+    /// None if there is no choice.
+    emitters: Option<EmitterChoices>,
     pilot: Pilot,
     /// Chooses the plan, unless it is given.
     planner: Option<Planner>,
@@ -102,16 +104,28 @@ impl<'a, S: Scene> Renderer<'a, S> {
             }
         };
         let [few, many] = pilot::LIGHT_PATHS;
-        let mut emission = None;
-        if scene.emitters().len() > 1 {
+        let emitters = (scene.emitters().len() > 1).then(|| {
             let pilot = look(&world, few);
             let light_paths = emitters::light_paths(pilot.vertices_per_path);
-            let paths = [light_paths, light_paths / 8];
-            let plan =
-                choices::plan(&world, &settings, &stage(&world, &settings, techniques, &pilot, paths), 0);
-            let (by_paths, next_event) = emitters::measure(&world, &plan);
-            world.choose_emitters_by(&by_paths, &next_event);
-            emission = Some(by_paths);
+            let plan = |techniques| {
+                let stage = stage(&world, &settings, techniques, &pilot, [light_paths, light_paths / 8]);
+                choices::plan(&world, &settings, &stage, 0)
+            };
+            let camera = techniques.intersection(TechniqueSet::PT);
+            let may_be_alone = matches!(settings.techniques, Techniques::Auto) && camera != techniques;
+            let alone = may_be_alone.then(|| plan(camera));
+            EmitterChoices::measure(&world, &plan(techniques), alone.as_ref())
+        });
+        let mut probabilities = Vec::new();
+        // With light sub-paths last: the pilot and trials have some.
+        for has_light_paths in [false, true] {
+            if let Some(emitters) = &emitters {
+                emitters.apply(&mut world, has_light_paths);
+            }
+            for emitter in (0..scene.emitters().len() as u32).map(EmitterId) {
+                let chosen = [world.emission_probability(emitter), world.next_event_probability(emitter)];
+                probabilities.extend(chosen.map(f32::to_le_bytes).as_flattened());
+            }
         }
         let pilot = look(&world, many);
         let pixels = rect.width.saturating_mul(rect.height);
@@ -135,20 +149,6 @@ impl<'a, S: Scene> Renderer<'a, S> {
             }
             (None, Techniques::Set(_)) => (RenderPlan::new(planner.everything), None),
         };
-        if let Some(emission) = emission
-            && plan.stage(0).light_paths == 0
-            && !techniques.without(TechniqueSet::PT).is_empty()
-        {
-            // Next events now have to find what light sub-paths would have found.
-            let (_, next_event) =
-                emitters::measure(&world, &choices::plan(&world, &settings, plan.stage(0), 0));
-            world.choose_emitters_by(&emission, &next_event);
-        }
-        let probabilities: Vec<u8> = (0..scene.emitters().len() as u32)
-            .map(EmitterId)
-            .flat_map(|emitter| [world.emission_probability(emitter), world.next_event_probability(emitter)])
-            .flat_map(f32::to_le_bytes)
-            .collect();
         let identity = Identity {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             scene: String::new(),
@@ -171,6 +171,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
         record.expected_bytes = film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>() as u64);
         Ok(Self {
             world,
+            emitters,
             pilot,
             planner,
             state: State { identity, record, film },
@@ -233,6 +234,9 @@ impl<'a, S: Scene> Renderer<'a, S> {
         let Identity { census, plan, .. } = &mut self.state.identity;
         let start = Instant::now();
         while let Some(from) = adapt::REVIEWS.get(plan.stages().len()).filter(|from| **from <= iteration) {
+            if let Some(emitters) = &self.emitters {
+                emitters.apply(&mut self.world, true);
+            }
             let review = plan.stages().len() as u32;
             plan.push(Stage { from: *from, ..planner.stage(&self.world, census, &self.pilot, review) });
         }
@@ -245,6 +249,9 @@ impl<'a, S: Scene> Renderer<'a, S> {
         let Some(iteration) = self.next_iteration() else { return false };
         self.plan_up_to(iteration);
         let plan = self.plan(iteration);
+        if let Some(emitters) = &self.emitters {
+            emitters.apply(&mut self.world, plan.light_paths > 0);
+        }
         let context = Context { world: &self.world, plan: &plan };
         let (rect, pixels) = (self.state.film.rect(), &mut self.pixels);
         let mut times = PassTimes::default();
