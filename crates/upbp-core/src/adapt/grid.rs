@@ -19,8 +19,8 @@ impl Grid {
         Self { rect, side, columns, rows }
     }
 
-    pub(crate) const fn cells(&self) -> usize {
-        self.columns as usize * self.rows as usize
+    pub(crate) const fn cells(&self) -> u32 {
+        self.columns * self.rows
     }
 
     /// Pixels of the picture.
@@ -33,10 +33,10 @@ impl Grid {
     }
 
     /// The pixel that stands for a cell.
-    pub(super) fn pixel(&self, cell: usize) -> [u32; 2] {
+    pub(super) fn pixel(&self, cell: u32) -> [u32; 2] {
         let place =
-            |index: usize, size: u32| ((index as f64 + 0.5) * self.side).min(f64::from(size - 1)) as u32;
-        let (column, row) = (cell % self.columns(), cell / self.columns());
+            |index: u32, size: u32| ((f64::from(index) + 0.5) * self.side).min(f64::from(size - 1)) as u32;
+        let (column, row) = (cell % self.columns, cell / self.columns);
         [self.rect.x + place(column, self.rect.width), self.rect.y + place(row, self.rect.height)]
     }
 

@@ -32,6 +32,10 @@ const PIXELS_PER_CELL: [u32; 2] = [12, 4];
 const CELLS: [u32; 2] = [400, 2048];
 /// and the next one at so many times as many.
 const GROWTH: u32 = 2;
+/// A trial that has too many samples is made again with so many times less,
+const SMALLER: u32 = 4;
+/// but not with less than so many, which would tell nothing.
+const LEAST_CELLS: u32 = 25;
 /// Light sub-paths per cell in a pass of the trial.
 const LIGHT_PATHS_PER_CELL: u32 = 2;
 
@@ -53,11 +57,17 @@ pub(crate) fn choose<S: Scene>(world: &World<'_, S>, choice: &Choice<'_>, review
     let media = plan.techniques.intersects(TechniqueSet::VOLUME_MERGES);
     let pixels_per_cell = PIXELS_PER_CELL[usize::from(!media)];
     let first = (crop.width.saturating_mul(crop.height) / pixels_per_cell).clamp(CELLS[0], CELLS[1]);
-    let cells = (first * GROWTH.pow(review)).min(choice.most_paths);
-    let grid = Grid::new(crop, cells);
-    let paths = choice.most_paths.min(LIGHT_PATHS_PER_CELL * cells);
-    let trial = trial::run(world, plan, &grid, paths, PASSES * review, choice.timed);
-    let costs = Costs::of(&trial);
-    let prediction = Prediction::new(trial, &grid);
-    search::best(&prediction, &costs, &choice.bounds, GAINS[review as usize])
+    let mut cells = (first * GROWTH.pow(review)).min(choice.most_paths);
+    while cells >= LEAST_CELLS {
+        let grid = Grid::new(crop, cells);
+        let paths = choice.most_paths.min(LIGHT_PATHS_PER_CELL * cells);
+        if let Some(trial) = trial::run(world, plan, &grid, paths, PASSES * review, choice.timed) {
+            let costs = Costs::of(&trial);
+            let prediction = Prediction::new(trial, &grid);
+            return search::best(&prediction, &costs, &choice.bounds, GAINS[review as usize]);
+        }
+        // As many photons are looked up less often and by less sub-paths.
+        cells /= SMALLER;
+    }
+    Candidate::everything(&choice.bounds)
 }

@@ -8,6 +8,9 @@ use upbp_estimators::observer::{Joint, ObservedSample, Observer};
 /// The number of techniques.
 pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
 
+/// Samples that a trial may have, of 64 bytes each.
+pub(super) const MOST_SAMPLES: usize = 1 << 20;
+
 /// A sample, weighted as when everything runs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
@@ -25,6 +28,8 @@ pub(crate) struct Recorder {
     /// Samples; `ends[i]` is behind the last one of the i-th sub-path.
     pub(crate) samples: Vec<Sample>,
     pub(crate) ends: Vec<u32>,
+    /// Samples, those included that would have been [too many](MOST_SAMPLES).
+    pub(super) seen: usize,
     /// How often a technique was turned to.
     pub(crate) calls: [u64; TECHNIQUES],
 }
@@ -40,6 +45,10 @@ impl<B> Observer<B> for Recorder {
 
     fn sample(&mut self, sample: &ObservedSample<B, ByTechnique>) {
         let ObservedSample { technique, ref joint, value, weight, .. } = *sample;
+        self.seen += 1;
+        if self.seen > MOST_SAMPLES {
+            return;
+        }
         let total = weight.all.0.iter().sum::<f64>();
         self.samples.push(Sample {
             technique,

@@ -36,6 +36,11 @@ pub(crate) struct Bounds {
 const SELDOM: f32 = 0.25;
 
 impl Candidate {
+    /// All that is possible, as much of it as there may be.
+    pub(crate) fn everything(bounds: &Bounds) -> Self {
+        Self { techniques: bounds.techniques, light_paths: 1.0, beam_paths: 1.0, seldom: TechniqueSet::EMPTY }
+    }
+
     pub(crate) fn look_up(&self, technique: Technique) -> f64 {
         if self.seldom.has(technique) { f64::from(SELDOM) } else { 1.0 }
     }
@@ -131,12 +136,7 @@ impl Judge<'_> {
 /// `gain`: predictions are noisy, and the least of many is so by chance.
 pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
     let mut judge = Judge { prediction, costs, known: Vec::new() };
-    let everything = Candidate {
-        techniques: bounds.techniques,
-        light_paths: 1.0,
-        beam_paths: 1.0,
-        seldom: TechniqueSet::EMPTY,
-    };
+    let everything = Candidate::everything(bounds);
     let mut best: Option<Judged> = None;
     for start in starts(bounds, everything) {
         let mut at = judge.judge(&[start])[0];

@@ -1,5 +1,8 @@
 //! The sub-paths of a trial, under the eyes of any observer.
 
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use rayon::prelude::*;
 use upbp_estimators::observer::Observer;
 use upbp_estimators::scene::Scene;
@@ -16,6 +19,44 @@ pub(super) const CHUNK: usize = 16;
 pub(super) trait Piece<B>: Observer<B> + Default + Send {
     /// A sub-path has ended.
     fn path_ended(&mut self);
+
+    /// Samples that were written down.
+    fn written(&self) -> usize;
+}
+
+/// Room for samples, common to all pieces of a trial. Whether it suffices does not depend on the order of the pieces.
+pub(super) struct Room {
+    taken: AtomicUsize,
+    most: usize,
+}
+
+impl Room {
+    pub(super) const fn new(most: usize) -> Self {
+        Self { taken: AtomicUsize::new(0), most }
+    }
+
+    /// Takes room for more samples; whether there was enough.
+    fn take(&self, samples: usize) -> bool {
+        samples <= self.most && self.taken.fetch_add(samples, Ordering::Relaxed) + samples <= self.most
+    }
+}
+
+/// Lets `observer` see sub-paths one after the other, as long as there is room for what it writes down.
+fn watch<O: Piece<B>, B>(
+    observer: &mut O,
+    room: &Room,
+    paths: impl IntoIterator<Item = u32>,
+    mut trace: impl FnMut(u32, &mut O),
+) -> Option<()> {
+    for path in paths {
+        let before = observer.written();
+        trace(path, observer);
+        observer.path_ended();
+        if !room.take(observer.written() - before) {
+            return None;
+        }
+    }
+    Some(())
 }
 
 /// A pass, by pieces: light sub-paths with their splats, and one camera sub-path for each cell.
@@ -26,26 +67,30 @@ pub(super) struct Pass<O> {
 }
 
 impl<O> Pass<O> {
-    /// Traces the sub-paths of a pass, which numbers them.
-    pub(super) fn trace<S: Scene>(world: &World<'_, S>, plan: &Plan, grid: &Grid, pass: u32) -> Self
+    /// Traces the sub-paths of a pass, which numbers them; `None` if there is not enough room.
+    pub(super) fn trace<S: Scene>(
+        world: &World<'_, S>,
+        plan: &Plan,
+        grid: &Grid,
+        pass: u32,
+        room: &Room,
+    ) -> Option<Self>
     where
         O: Piece<S::Bsdf>,
     {
         let context = Context { world, plan };
         let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
-        let chunks: Vec<_> = (0..paths.div_ceil(CHUNK as u32))
+        let chunks: Vec<_> = pieces(paths)
             .into_par_iter()
-            .map_init(Scratch::default, |scratch, chunk| {
+            .map_init(Scratch::default, |scratch, paths| {
                 let mut observer = O::default();
                 let mut out = LightChunk::default();
-                for index in chunk * CHUNK as u32..((chunk + 1) * CHUNK as u32).min(paths) {
-                    let kind = StreamKind::PilotLight;
-                    trace_light_path(&context, kind, index, scratch, &mut out, &mut observer);
-                    observer.path_ended();
-                }
-                (out, observer)
+                watch(&mut observer, room, paths, |index, observer| {
+                    trace_light_path(&context, StreamKind::PilotLight, index, scratch, &mut out, observer);
+                })?;
+                Some((out, observer))
             })
-            .collect();
+            .collect::<Option<_>>()?;
         let mut counters = Counters::default();
         let mut light = Vec::with_capacity(chunks.len());
         let mut vertices: Vec<LightVertex<S::Bsdf, O::Densities>> = Vec::new();
@@ -61,29 +106,32 @@ impl<O> Pass<O> {
         } else {
             LightMap::empty()
         };
-        let cells = grid.cells();
-        let pieces: Vec<_> = (0..cells.div_ceil(CHUNK))
+        let chunks: Vec<_> = pieces(grid.cells())
             .into_par_iter()
-            .map_init(Scratch::default, |scratch, chunk| {
+            .map_init(Scratch::default, |scratch, cells| {
                 let mut observer = O::default();
                 let mut counters = Counters::default();
-                for cell in chunk * CHUNK..((chunk + 1) * CHUNK).min(cells) {
+                watch(&mut observer, room, cells, |cell, observer| {
                     // A number of its own for every sub-path: those of a pixel are not to be stratified among each other, so
                     // that their variance can be taken.
-                    let index = u64::from(pass) << 32 | cell as u64;
+                    let index = u64::from(pass) << 32 | u64::from(cell);
                     let (kind, pixel) = (StreamKind::PilotCamera, grid.pixel(cell));
                     let counters = &mut counters;
-                    trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, &mut observer);
-                    observer.path_ended();
-                }
-                (observer, counters)
+                    trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);
+                })?;
+                Some((observer, counters))
             })
-            .collect();
-        let mut camera = Vec::with_capacity(pieces.len());
-        for (observer, own) in pieces {
+            .collect::<Option<_>>()?;
+        let mut camera = Vec::with_capacity(chunks.len());
+        for (observer, own) in chunks {
             counters.add(&own);
             camera.push(observer);
         }
-        Self { light, camera, counters }
+        Some(Self { light, camera, counters })
     }
+}
+
+/// Numbers of sub-paths, by piece.
+fn pieces(paths: u32) -> Vec<Range<u32>> {
+    (0..paths).step_by(CHUNK).map(|first| first..(first + CHUNK as u32).min(paths)).collect()
 }

@@ -7,8 +7,8 @@ use upbp_estimators::scene::Scene;
 use upbp_estimators::{Counters, Plan, Technique, TechniqueSet, World};
 
 use super::grid::Grid;
-use super::recorder::{Recorder, Sample, TECHNIQUES};
-use super::trace::{CHUNK, Pass, Piece};
+use super::recorder::{MOST_SAMPLES, Recorder, Sample, TECHNIQUES};
+use super::trace::{CHUNK, Pass, Piece, Room};
 use super::watch::{PARTS, WALK, Watch};
 
 /// Looks at each cell: enough to tell what they have in common.
@@ -65,7 +65,7 @@ impl Trial {
 }
 
 /// Runs a trial of `plan`, with `paths` of its light sub-paths per pass. `first_pass` numbers the passes of all trials of a render;
-/// `timed` says whether to measure time.
+/// `timed` says whether to measure time. `None` if there were [too many samples](MOST_SAMPLES).
 pub(crate) fn run<S: Scene>(
     world: &World<'_, S>,
     plan: &Plan,
@@ -73,8 +73,8 @@ pub(crate) fn run<S: Scene>(
     paths: u32,
     first_pass: u32,
     timed: bool,
-) -> Trial {
-    let cells = grid.cells();
+) -> Option<Trial> {
+    let cells = grid.cells() as usize;
     let part = |traced: u32, planned: u32| f64::from(traced) / f64::from(planned.max(1));
     let paths = paths.min(plan.light_paths);
     let beam_paths = plan.beam_paths.min(paths);
@@ -93,13 +93,14 @@ pub(crate) fn run<S: Scene>(
     let mut plan = plan.clone();
     // Fewer light sub-paths, each of which counts for more; weights as in the plan.
     (plan.light_paths, plan.beam_paths) = (paths, beam_paths);
-    let passes: Vec<Pass<Recorder>> = (first_pass..first_pass + PASSES)
+    let room = Room::new(MOST_SAMPLES);
+    let mut passes = (first_pass..first_pass + PASSES)
         .map(|pass| {
             // Not the iterations of other pilots.
             plan.iteration = u64::from(pass) + 1;
-            Pass::trace(world, &plan, grid, pass)
+            Pass::<Recorder>::trace(world, &plan, grid, pass, &room)
         })
-        .collect();
+        .collect::<Option<Vec<_>>>()?;
     for pass in &passes {
         for (recorder, splats) in &pass.light {
             // A splat goes with each sample.
@@ -108,31 +109,39 @@ pub(crate) fn run<S: Scene>(
         }
         trial.splat_passes.push(trial.splats.len());
     }
-    for cell in 0..cells {
-        for pass in &passes {
-            let start = trial.samples.len();
-            trial.samples.extend_from_slice(pass.camera[cell / CHUNK].of_path(cell % CHUNK));
-            trial.samples[start..].sort_by_key(|sample| sample.merged);
-            trial.ends.push(trial.samples.len() as u32);
-        }
-    }
     let per_path = |pass_paths: u32| f64::from(pass_paths * PASSES);
     trial.work = work(&passes, (cells * PASSES as usize) as f64, [paths, beam_paths].map(per_path), &trial);
+    for chunk in 0..cells.div_ceil(CHUNK) {
+        // Taken, so that all samples are not there twice.
+        let pieces: Vec<_> = passes.iter_mut().map(|pass| std::mem::take(&mut pass.camera[chunk])).collect();
+        for path in 0..CHUNK.min(cells - chunk * CHUNK) {
+            for piece in &pieces {
+                let start = trial.samples.len();
+                trial.samples.extend_from_slice(piece.of_path(path));
+                trial.samples[start..].sort_by_key(|sample| sample.merged);
+                trial.ends.push(trial.samples.len() as u32);
+            }
+        }
+    }
     if timed {
         // The first pass again, with weights as the render has them.
         plan.iteration = u64::from(first_pass) + 1;
-        let pass = Pass::<Watch>::trace(world, &plan, grid, first_pass);
+        let pass = Pass::<Watch>::trace(world, &plan, grid, first_pass, &room)?;
         trial.work.camera_time = Some(time(&pass.camera).map(|t| t / cells as f64));
         let light = time(pass.light.iter().map(|(watch, _)| watch));
         let of = |part: usize| light[part] / f64::from(paths.max(1));
         trial.work.light_time = Some([of(WALK), of(Technique::LightTracing as usize)]);
     }
-    trial
+    Some(trial)
 }
 
 impl<B> Piece<B> for Recorder {
     fn path_ended(&mut self) {
         self.ends.push(self.samples.len() as u32);
+    }
+
+    fn written(&self) -> usize {
+        self.seen
     }
 }
 
@@ -147,6 +156,10 @@ impl Recorder {
 impl<B> Piece<B> for Watch {
     fn path_ended(&mut self) {
         Observer::<B>::turns_to(self, None);
+    }
+
+    fn written(&self) -> usize {
+        0
     }
 }
 
