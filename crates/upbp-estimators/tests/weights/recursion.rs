@@ -1,0 +1,199 @@
+//! Weights by the recursion, for abstract paths.
+
+use upbp_estimators::Technique;
+use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
+use upbp_estimators::mis::{Densities, Edge, End, MergeSite, MisPlan, Pending, Tip, VolumeMerges, Weight};
+use upbp_estimators::scene::Walk;
+
+/// Weights by the recursion, with exactly the calls that the walks make.
+pub(crate) struct Recursion<'a, D> {
+    plan: &'a MisPlan,
+    path: &'a Path,
+    /// By vertex; those that a walk does not arrive at stay empty.
+    pub(crate) light: Vec<Tip<D>>,
+    pub(crate) camera: Vec<Tip<D>>,
+    /// On arrival of the camera walk at the light, with next events as connections.
+    pub(crate) at_light: Tip<D>,
+}
+
+pub(crate) fn is_ok(vertex: &PathVertex) -> bool {
+    matches!(vertex.kind, VertexKind::Surface | VertexKind::Medium(_))
+}
+
+fn in_medium(vertex: &PathVertex) -> bool {
+    matches!(vertex.kind, VertexKind::Medium(_))
+}
+
+fn site(vertex: &PathVertex) -> MergeSite {
+    match vertex.kind {
+        VertexKind::Surface => MergeSite::Surface,
+        VertexKind::Medium(medium) => MergeSite::Medium { medium, sin_theta: vertex.sin_theta },
+        VertexKind::End | VertexKind::Delta => MergeSite::None,
+    }
+}
+
+fn distance_squared(edge: &PathEdge) -> f64 {
+    if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 }
+}
+
+/// What a vertex passes on after it has scattered.
+fn pend<D: Densities>(
+    plan: &MisPlan,
+    vertex: &PathVertex,
+    tip: &Tip<D>,
+    rho: f64,
+    rho_opposite: f64,
+    cos_out: f64,
+) -> Pending<D> {
+    let tip = if is_ok(vertex) { *tip } else { Tip { connect: D::ZERO, ..*tip } };
+    Pending {
+        before: tip.before(plan, rho_opposite),
+        rho,
+        cos_out,
+        site: site(vertex),
+        c: tip.c,
+        connectible: is_ok(vertex),
+        in_medium: in_medium(vertex),
+    }
+}
+
+impl<'a, D: Densities> Recursion<'a, D> {
+    pub(crate) fn new(plan: &'a MisPlan, path: &'a Path) -> Self {
+        let (k, v) = (path.length(), &path.vertices);
+        let nowhere = Tip { connect: D::ZERO, below: D::ZERO, c: 0.0 };
+        let mut light = vec![nowhere; k + 1];
+        let mut pending =
+            Pending::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
+        for i in 1..k {
+            let e = &path.edges[i - 1];
+            let edge = Edge {
+                distance_squared: distance_squared(e),
+                cos_in: v[i].cos_light,
+                forward: e.t_light,
+                backward: e.t_camera,
+                reach: e.reach,
+                ends_in_medium: in_medium(&v[i]),
+            };
+            let connections = if !is_ok(&v[i]) {
+                D::ZERO
+            } else if i == 1 {
+                D::of(Technique::Nee, plan.pow(plan.nee * path.pdf_incident / path.pdf_position))
+            } else {
+                plan.connections()
+            };
+            light[i] = pending.arrive(plan, Walk::Light, &edge, connections);
+            pending = pend(plan, &v[i], &light[i], v[i].rho_light, v[i].rho_camera, v[i].cos_camera);
+        }
+        let mut camera = vec![nowhere; k + 1];
+        let mut at_light = nowhere;
+        let mut pending = Pending::at_camera(v[k].rho_camera);
+        for i in (0..k).rev() {
+            let e = &path.edges[i];
+            let edge = Edge {
+                distance_squared: distance_squared(e),
+                cos_in: v[i].cos_camera,
+                forward: e.t_camera,
+                backward: e.t_light,
+                reach: e.reach,
+                ends_in_medium: in_medium(&v[i]),
+            };
+            if i == 0 {
+                let next_events = D::of(Technique::Nee, plan.pow(plan.nee));
+                at_light = pending.arrive(plan, Walk::Camera, &edge, next_events);
+                break;
+            }
+            let connections = if !is_ok(&v[i]) {
+                D::ZERO
+            } else if i + 1 == k {
+                D::of(Technique::LightTracing, plan.pow(plan.light_tracing))
+            } else {
+                plan.connections()
+            };
+            camera[i] = pending.arrive(plan, Walk::Camera, &edge, connections);
+            pending = pend(plan, &v[i], &camera[i], v[i].rho_camera, v[i].rho_light, v[i].cos_light);
+        }
+        Self { plan, path, light, camera, at_light }
+    }
+
+    /// The end of the light sub-path at vertex `i`, with the edge that the camera's side would arrive by.
+    fn light_end(&self, i: usize) -> End<D> {
+        let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i]);
+        let c = match vertex.kind {
+            VertexKind::Medium(_) => self.plan.distance_factor(Walk::Camera, edge.reach, edge.t_camera),
+            _ => 0.0,
+        };
+        End {
+            merges: self.plan.merge_sum(site(vertex), Walk::Light, self.light[i].c, c),
+            before: self.light[i].before(self.plan, vertex.rho_camera),
+        }
+    }
+
+    /// The end of the camera sub-path at vertex `i`, with the edge that the light's side would arrive by.
+    fn camera_end(&self, i: usize) -> End<D> {
+        let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i - 1]);
+        let c = match vertex.kind {
+            VertexKind::Medium(_) => self.plan.distance_factor(Walk::Light, edge.reach, edge.t_light),
+            _ => 0.0,
+        };
+        End {
+            merges: self.plan.merge_sum(site(vertex), Walk::Camera, self.camera[i].c, c),
+            before: self.camera[i].before(self.plan, vertex.rho_light),
+        }
+    }
+
+    /// `L_i`, given that vertex `i − 1` scatters towards it.
+    pub(crate) fn light_density(&self, i: usize) -> f64 {
+        let (edge, v) = (&self.path.edges[i - 1], &self.path.vertices);
+        v[i - 1].rho_light * v[i].cos_light / distance_squared(edge) * edge.t_light
+    }
+
+    /// `C_i`, given that vertex `i + 1` scatters towards it.
+    pub(crate) fn camera_density(&self, i: usize) -> f64 {
+        let (edge, v) = (&self.path.edges[i], &self.path.vertices);
+        v[i + 1].rho_camera * v[i].cos_camera / distance_squared(edge) * edge.t_camera
+    }
+
+    fn merge(&self, i: usize, factor: impl Fn(&VolumeMerges) -> f64) -> Weight<D> {
+        let vertex = &self.path.vertices[i];
+        let (light, camera) = (&self.light[i], &self.camera[i]);
+        let (factor, merges) = if let VertexKind::Medium(medium) = vertex.kind {
+            let factors = self.plan.volume_factors(medium, light.c, camera.c, vertex.sin_theta);
+            (factor(&factors), factors.sum())
+        } else {
+            let factor = self.plan.pow(self.plan.surf);
+            (factor, D::of(Technique::Surf, factor))
+        };
+        let before_light = light.before(self.plan, vertex.rho_camera);
+        let before_camera = camera.before(self.plan, vertex.rho_light);
+        self.plan.merge_weight(factor, merges, before_light, before_camera)
+    }
+
+    pub(crate) fn weight(&self, way: Way) -> Weight<D> {
+        let Self { plan, path, .. } = *self;
+        let k = path.length();
+        let rho_light = path.vertices[0].rho_light;
+        match way {
+            Way::Hit if k == 1 => Weight::alone(Technique::Hit),
+            Way::Hit => plan.hit_weight(&self.at_light, path.pdf_incident, path.pdf_position, rho_light),
+            Way::Nee => plan.nee_weight(
+                path.pdf_incident,
+                path.pdf_position,
+                if path.hittable { self.camera_density(0) } else { 0.0 },
+                self.camera_end(1),
+                self.light_density(1),
+            ),
+            Way::Connect(s) => plan.connect_weight(
+                self.light_end(s - 1),
+                self.camera_density(s - 1),
+                self.camera_end(s),
+                self.light_density(s),
+            ),
+            Way::LightTracing => plan.light_tracing_weight(self.light_end(k - 1), self.camera_density(k - 1)),
+            Way::Surf(i) => self.merge(i, |_| 0.0),
+            Way::Pp3d(i) => self.merge(i, |v| v.pp3d),
+            Way::Pb2d(i) => self.merge(i, |v| v.pb2d),
+            Way::Bp2d(i) => self.merge(i, |v| v.bp2d),
+            Way::Bb1d(i) => self.merge(i, |v| v.bb1d),
+        }
+    }
+}
