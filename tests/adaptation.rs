@@ -39,8 +39,9 @@ const MATT: &str = r#"(
 fn camera_sub_paths_alone_where_they_suffice() {
     let scene = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
     let mut auto = renderer(&scene, settings());
-    let mut paths =
-        renderer(&scene, Settings { techniques: Techniques::Set(TechniqueSet::PT), ..settings() });
+    let roulette = Some(auto.report().plan.stages()[0].roulette);
+    let techniques = Techniques::Set(TechniqueSet::PT);
+    let mut paths = renderer(&scene, Settings { techniques, roulette, ..settings() });
     for _ in 0..8 {
         assert!(auto.iterate() && paths.iterate());
     }

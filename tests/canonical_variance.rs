@@ -32,8 +32,8 @@ use upbp_estimators::scene::{
 };
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, MediumId, PathLengths, Plan, PlanChoices, Ray, Spectrum,
-    StreamKind, TechniqueSet, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, MediumId, PathLengths, Plan, PlanChoices, Ray, Roulette,
+    Spectrum, StreamKind, TechniqueSet, World,
 };
 
 /// There are no surfaces.
@@ -251,7 +251,7 @@ impl Setup {
                 look_ups: LookUps::ALL,
                 vertices_per_light_path: 1.0,
                 lengths: PathLengths { min: 2, max: 2 },
-                roulette: false,
+                roulette: Roulette::Off,
                 kernels: Kernels {
                     surf: Kernel::NONE,
                     pp3d: kernel,

@@ -13,7 +13,7 @@ use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, StreamKind, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, StreamKind, World,
 };
 
 const SIZE: u32 = 48;
@@ -33,7 +33,7 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> PlanChoices {
         look_ups: LookUps::ALL,
         vertices_per_light_path: 2.3,
         lengths,
-        roulette: true,
+        roulette: Roulette::Below(0.6),
         kernels: Kernels {
             surf: Kernel::disc(radius),
             pp3d: Kernel::ball(2.0 * radius),

@@ -20,8 +20,8 @@ use upbp_estimators::walk::{
     Context, Extent, LightChunk, Passage, Scratch, Site, trace_camera_path, trace_light_path,
 };
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Stream, StreamKind,
-    Technique, TechniqueSet, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Stream,
+    StreamKind, Technique, TechniqueSet, World,
 };
 
 /// Weights below this are compared with nothing: they are rounding of others.
@@ -223,7 +223,7 @@ fn choices() -> PlanChoices {
         look_ups: LookUps::ALL,
         vertices_per_light_path: 2.3,
         lengths: PathLengths { min: 1, max: 8 },
-        roulette: true,
+        roulette: Roulette::Below(0.6),
         kernels: kernels(1.0),
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
@@ -354,7 +354,7 @@ fn subsets_of_techniques() {
 
 #[test]
 fn walks_without_roulette() {
-    audit("no roulette", CAMERAS[0], 48, &PlanChoices { roulette: false, ..choices() }, 500);
+    audit("no roulette", CAMERAS[0], 48, &PlanChoices { roulette: Roulette::Off, ..choices() }, 500);
 }
 
 /// Samples with their weights.

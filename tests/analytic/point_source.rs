@@ -5,7 +5,9 @@
 use upbp_core::TechniqueSet;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_light_path};
-use upbp_estimators::{Kernel, Kernels, LookUps, PathLengths, Plan, PlanChoices, StreamKind, World};
+use upbp_estimators::{
+    Kernel, Kernels, LookUps, PathLengths, Plan, PlanChoices, Roulette, StreamKind, World,
+};
 
 use crate::cases::{Case, Table, cases, medium, narrow_camera, scene};
 use crate::support::Estimate;
@@ -34,7 +36,7 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             look_ups: LookUps::ALL,
             vertices_per_light_path: 1.0,
             lengths: PathLengths { min: 1, max: 1_000_000 },
-            roulette: true,
+            roulette: Roulette::Below(1.0),
             kernels: Kernels { pp3d: Kernel::ball(0.1), ..Kernels::NONE },
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
 use upbp_estimators::observer::LightEnd;
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{Interior, MediumId};
+use upbp_estimators::{Interior, MediumId, Roulette};
 
 use crate::closed_form::{ClosedForm, Fog, Material, Source};
 
@@ -133,7 +133,7 @@ fn index_beside(scene: &ClosedForm, point: DVec3, normal: DVec3, direction: DVec
 
 fn at_surface(
     scene: &ClosedForm,
-    roulette: bool,
+    roulette: Roulette,
     vertex: &Vertex,
     to_light: DVec3,
     to_camera: DVec3,
@@ -144,7 +144,7 @@ fn at_surface(
     let normal = object.shape.normal(vertex.camera);
     let shading = object.shading_normal(vertex.camera);
     let (light, camera) = (to_light.dot(shading), to_camera.dot(shading));
-    let survival = |cos| if roulette { Material::continuation(material, cos) } else { 1.0 };
+    let survival = |cos| if roulette.is_on() { Material::continuation(material, cos) } else { 1.0 };
     let (rho_light, rho_camera) = if vertex.delta {
         let reflects = light * camera > 0.0;
         let index = |direction| index_beside(scene, vertex.camera, normal, direction);
@@ -174,13 +174,13 @@ fn at_surface(
 
 fn in_medium(
     scene: &ClosedForm,
-    roulette: bool,
+    roulette: Roulette,
     medium: MediumId,
     to_light: DVec3,
     to_camera: DVec3,
 ) -> Scattering {
     let fog = &scene.media[medium.0 as usize];
-    let survival = if roulette { Fog::CONTINUATION } else { 1.0 };
+    let survival = if roulette.is_on() { Fog::CONTINUATION } else { 1.0 };
     let rho = henyey_greenstein(f64::from(fog.g), -to_light.dot(to_camera)) * survival;
     Scattering {
         kind: VertexKind::Medium(medium),
@@ -207,7 +207,7 @@ impl Trace {
     pub(crate) fn sensitivity(
         &self,
         scene: &ClosedForm,
-        roulette: bool,
+        roulette: Roulette,
         weight: impl Fn(&Path) -> f64,
         expected: f64,
     ) -> f64 {
@@ -240,7 +240,7 @@ impl Trace {
     }
 
     /// All densities of the path.
-    pub(crate) fn rebuild(&self, scene: &ClosedForm, roulette: bool) -> Result<Path, Doubt> {
+    pub(crate) fn rebuild(&self, scene: &ClosedForm, roulette: Roulette) -> Result<Path, Doubt> {
         let k = self.length();
         let lens = self.lens.as_dvec3();
         if self.interior.iter().any(|vertex| vertex.is_at_boundary(scene)) {

@@ -1,7 +1,7 @@
 //! What follows from the pilot and the budget: counts and radii of all iterations.
 
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{PathLengths, Plan, PlanChoices, Technique, TechniqueSet, World};
+use upbp_estimators::{PathLengths, Plan, PlanChoices, Roulette, Technique, TechniqueSet, World};
 
 use crate::memory::LightCounts;
 use crate::neighbours::Neighbours;
@@ -57,10 +57,17 @@ pub(crate) fn stage<S: Scene>(
         beam_paths: uses(BEAMS, beam_paths),
         connections: settings.connections.unwrap_or(1),
         next_events: settings.next_events.unwrap_or(1),
+        roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
         look_ups: [1.0; 5],
         vertices_per_light_path: pilot.vertices_per_path,
         radii: first_radii(world, settings, techniques, pilot, [light_paths, beam_paths]),
     }
+}
+
+/// The roulette that did best, in geometric mean over many scenes. Where light sub-paths come to meet them, long camera sub-paths tell
+/// less.
+pub(crate) const fn usual_roulette(techniques: TechniqueSet) -> Roulette {
+    Roulette::Below(if techniques.without(TechniqueSet::PT).is_empty() { 0.5 } else { 0.7 })
 }
 
 /// Light sub-paths with beams such that a query beam meets a few of them. More cost more than they tell: their look-ups
@@ -131,7 +138,7 @@ pub(crate) fn plan<S: Scene>(
             next_events: stage.next_events,
             vertices_per_light_path: stage.vertices_per_light_path,
             lengths: PathLengths { min: settings.min_length, max: settings.max_length },
-            roulette: settings.roulette,
+            roulette: stage.roulette,
             kernels: stage.radii.kernels(iteration),
             look_ups: stage.look_ups(),
             heuristic: settings.heuristic,

@@ -42,6 +42,6 @@ pub use stop::{Canceller, Outcome, Progress, Stop, StopReason};
 pub use techniques::{Techniques, UnknownTechniques};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic};
 pub use upbp_estimators::{
-    BodyId, Counters, Interior, Layer, MediumId, MediumStack, Ray, Spectrum, Technique, TechniqueSet, check,
-    offset_origin, scene,
+    BodyId, Counters, Interior, Layer, MediumId, MediumStack, Ray, Roulette, Spectrum, Technique,
+    TechniqueSet, check, offset_origin, scene,
 };

@@ -17,6 +17,7 @@ use upbp_estimators::{
     TechniqueSet, World,
 };
 
+use crate::choices::usual_roulette;
 use crate::emitters::pixel;
 use crate::memory::LightCounts;
 use crate::neighbours::{Nearest, Neighbours};
@@ -83,7 +84,7 @@ pub(crate) fn run<S: Scene>(
             look_ups: LookUps::ALL,
             vertices_per_light_path: 1.0,
             lengths: PathLengths { min: settings.min_length, max: settings.max_length },
-            roulette: settings.roulette,
+            roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
             kernels: Kernels {
                 surf: Kernel::disc(nominal),
                 pp3d: Kernel::ball(nominal),

@@ -3,7 +3,7 @@
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Technique, TechniqueSet, World};
 
-use crate::adapt;
+use crate::adapt::{self, roulette};
 use crate::census::Census;
 use crate::choices::{BEAMS, plan};
 use crate::emitters;
@@ -37,7 +37,9 @@ impl Planner {
         if everything.techniques.without(TechniqueSet::PT).is_empty() {
             return everything.clone();
         }
-        let plan = plan(world, settings, everything, adapt::REVIEWS[review as usize]);
+        let of_trial = settings.roulette.unwrap_or(roulette::OF_TRIAL);
+        let trial = Stage { roulette: of_trial, ..everything.clone() };
+        let plan = plan(world, settings, &trial, adapt::REVIEWS[review as usize]);
         let fits = |factor: &f64| {
             let beams = f64::from(everything.beam_paths) * factor;
             let counts = LightCounts::expected(pilot, everything.light_paths, beams as u32);
@@ -63,6 +65,7 @@ impl Planner {
                         None => BEAM_PATHS.into_iter().filter(fits).collect(),
                         Some(_) => vec![1.0],
                     },
+                    roulettes: 0..if settings.roulette.is_some() { 1 } else { roulette::COUNT },
                 },
                 most_paths: emitters::light_paths(pilot.vertices_per_path),
                 timed: !settings.deterministic,
@@ -82,6 +85,7 @@ impl Planner {
             techniques: candidate.techniques,
             light_paths,
             beam_paths,
+            roulette: roulette::numbered(candidate.roulette, of_trial),
             look_ups: candidate.look_ups(),
             ..everything.clone()
         }

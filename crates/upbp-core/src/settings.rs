@@ -1,6 +1,7 @@
 //! What a user may choose, and its validation.
 
 use serde::{Deserialize, Serialize};
+use upbp_estimators::Roulette;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 
 use crate::error::SettingsError;
@@ -41,8 +42,8 @@ pub struct Settings {
     /// Most edges of a path, at least `min_length`. Thick media that hardly absorb need many: walks that are cut are counted
     /// in the report.
     pub max_length: u32,
-    /// End walks by local Russian roulette: by the albedo of surfaces and media.
-    pub roulette: bool,
+    /// When walks end by Russian roulette; `None` for what is chosen with the techniques, or usual for them.
+    pub roulette: Option<Roulette>,
     /// Balance or power heuristic.
     pub heuristic: Heuristic,
     /// Extent of photon beams.
@@ -69,7 +70,7 @@ impl Default for Settings {
             next_events: None,
             min_length: 1,
             max_length: 1000,
-            roulette: true,
+            roulette: None,
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
@@ -120,6 +121,11 @@ impl Settings {
             {
                 return refuse(name, "1 to 1000", count.to_string());
             }
+        }
+        if let Some(Roulette::Below(least)) = self.roulette
+            && !(least > 0.0 && least <= 1.0)
+        {
+            return refuse("roulette", "Off, or Below a number in (0, 1]", least.to_string());
         }
         if self.min_length == 0 {
             return refuse("min_length", "at least 1", "0".into());

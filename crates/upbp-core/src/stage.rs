@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use upbp_estimators::{LookUps, TechniqueSet};
+use upbp_estimators::{LookUps, Roulette, TechniqueSet};
 
 use crate::radius::RadiusSchedule;
 
@@ -23,6 +23,8 @@ pub struct Stage {
     pub connections: u32,
     /// Points on lights that every camera vertex is connected to.
     pub next_events: u32,
+    /// When walks end by Russian roulette.
+    pub roulette: Roulette,
     /// Parts of the camera sub-paths that look photons up: `surf`, `pp3d`, `pb2d`, `bp2d`, `bb1d`, in `(0, 1]`.
     pub look_ups: [f32; 5],
     /// Connectible vertices per light sub-path, as the pilot found.
@@ -52,6 +54,8 @@ impl Stage {
             ))
         } else if self.connections > 1000 || self.next_events > 1000 {
             Err("connections, next_events: expected at most 1000".into())
+        } else if matches!(self.roulette, Roulette::Below(least) if !(least > 0.0 && least <= 1.0)) {
+            Err(format!("roulette: expected Off, or Below a number in (0, 1], found {:?}", self.roulette))
         } else if !self.look_ups.iter().all(|p| *p > 0.0 && *p <= 1.0) {
             Err(format!("look_ups: expected probabilities in (0, 1], found {:?}", self.look_ups))
         } else if !(0.0..f64::INFINITY).contains(&self.vertices_per_light_path) {
@@ -78,6 +82,10 @@ impl fmt::Display for Stage {
         }
         if self.next_events > 1 {
             write!(f, ", {} next events", self.next_events)?;
+        }
+        match self.roulette {
+            Roulette::Off => write!(f, ", no roulette")?,
+            Roulette::Below(least) => write!(f, ", roulette below {least}")?,
         }
         for (name, p) in ["surf", "pp3d", "pb2d", "bp2d", "bb1d"].iter().zip(self.look_ups) {
             if p < 1.0 {
@@ -173,6 +181,7 @@ mod tests {
             beam_paths: 0,
             connections: 1,
             next_events: 2,
+            roulette: Roulette::Below(0.5),
             look_ups: [0.25, 1.0, 1.0, 1.0, 1.0],
             vertices_per_light_path: 3.1,
             radii: RadiusSchedule {
@@ -195,7 +204,7 @@ mod tests {
         assert_eq!([0, 511, 512, 9999].map(|i| plan.stage(i).from), [0, 0, 512, 512]);
         assert_eq!(
             plan.stages()[1].to_string(),
-            "from iteration 512: hit+nee+surf, 1000 light sub-paths, 2 next events, surf on 25 % of camera sub-paths"
+            "from iteration 512: hit+nee+surf, 1000 light sub-paths, 2 next events, roulette below 0.5, surf on 25 % of camera sub-paths"
         );
     }
 
@@ -211,6 +220,7 @@ mod tests {
             refused(vec![stage(0), second])
         };
         assert!(wrong(|s| s.look_ups[2] = 0.0).contains("stage 1: look_ups"));
+        assert!(wrong(|s| s.roulette = Roulette::Below(0.0)).contains("roulette"));
         assert!(wrong(|s| s.light_paths = 0).contains("light_paths"));
         assert!(wrong(|s| s.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|s| s.radii.pb2d = f32::NAN).contains("radii"));

@@ -30,6 +30,8 @@ pub struct ObservedVertex<B> {
     pub site: Site<B>,
     /// Whether it scattered by a Dirac lobe.
     pub delta: bool,
+    /// Its own probability to continue the walk, 1 without roulette.
+    pub albedo: f32,
 }
 
 /// What joins the two sub-paths of a sample.

@@ -5,6 +5,7 @@ use upbp_media::Medium;
 use crate::kernel::Kernel;
 use crate::look_ups::LookUps;
 use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
+use crate::roulette::Roulette;
 use crate::scene::Scene;
 use crate::technique::{Technique, TechniqueSet};
 
@@ -71,8 +72,8 @@ pub struct Plan {
     pub next_events: u32,
     /// Limits of the path length.
     pub lengths: PathLengths,
-    /// Whether walks end by local Russian roulette.
-    pub roulette: bool,
+    /// When walks end by Russian roulette.
+    pub roulette: Roulette,
     /// Kernels with the radii of this iteration.
     pub kernels: Kernels,
     /// How many camera sub-paths look photons up.
@@ -103,8 +104,8 @@ pub struct PlanChoices {
     pub vertices_per_light_path: f64,
     /// Limits of the path length.
     pub lengths: PathLengths,
-    /// Whether walks end by local Russian roulette.
-    pub roulette: bool,
+    /// When walks end by Russian roulette.
+    pub roulette: Roulette,
     /// Kernels.
     pub kernels: Kernels,
     /// How many camera sub-paths look photons up.

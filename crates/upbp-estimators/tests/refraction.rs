@@ -7,7 +7,7 @@ use upbp_estimators::scene::{
     EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
 use upbp_estimators::walk::{Scattered, Site, SurfaceSite};
-use upbp_estimators::{Ray, Spectrum, Stream, StreamKind};
+use upbp_estimators::{Ray, Roulette, Spectrum, Stream, StreamKind, Survival};
 use upbp_media::Homogeneous;
 
 /// Reflects or refracts with fixed probabilities that differ on the two sides.
@@ -147,7 +147,8 @@ fn jacobian(direction: DVec3, normal: DVec3, ratio: f64) -> f64 {
 fn transmitted(site: &Site<Glass>, walk: Walk, from: Vec3) -> Option<Scattered> {
     (0..64).find_map(|index| {
         let mut stream = Stream::new(1, 0, StreamKind::Light, index);
-        let scattered = site.scatter(&Nothing, true, walk, Vec3::ZERO, from, &mut stream);
+        let mut survival = Survival::of_light(Roulette::Below(1.0));
+        let scattered = site.scatter(&Nothing, &mut survival, walk, Vec3::ZERO, from, &mut stream);
         scattered.filter(|scattered| scattered.transmitted)
     })
 }

@@ -54,13 +54,14 @@ impl Costs {
         };
         let ratio = |measured: f64, model: f64| (measured / model).clamp(0.1, 10.0);
         if let Some(time) = work.camera_time {
-            costs.camera_walk = ratio(time[WALK], work.camera_edges * EDGE[0]);
+            costs.camera_walk = ratio(time[WALK], work.camera_edges[0] * EDGE[0]);
             for technique in Technique::ALL {
                 let i = technique as usize;
                 // The trial has fewer photons than the plan.
-                let seen = work.samples[i] * trial.thinning(technique);
-                if technique != Technique::LightTracing && work.calls[i] > LEAST && TURN[i] > 0.0 {
-                    costs.techniques[i] = ratio(time[i], work.calls[i] * TURN[i] + seen * SAMPLE[i]);
+                let calls = work.calls[i][0];
+                let seen = work.samples[i][0] * trial.thinning(technique);
+                if technique != Technique::LightTracing && calls > LEAST && TURN[i] > 0.0 {
+                    costs.techniques[i] = ratio(time[i], calls * TURN[i] + seen * SAMPLE[i]);
                 }
             }
         }
@@ -69,8 +70,9 @@ impl Costs {
         {
             costs.light_walk = ratio(walk, work.light_edges * EDGE[1] + work.vertices * STORE);
             let i = Technique::LightTracing as usize;
-            if work.calls[i] > LEAST {
-                costs.techniques[i] = ratio(splats, work.calls[i] * TURN[i]);
+            let calls = work.calls[i][0];
+            if calls > LEAST {
+                costs.techniques[i] = ratio(splats, calls * TURN[i]);
             }
         }
         costs
@@ -81,7 +83,8 @@ impl Costs {
         let work = &self.work;
         let has = |technique| candidate.techniques.has(technique);
         let beams = has(Technique::Pb2d) || has(Technique::Bb1d);
-        let walk = work.camera_edges * EDGE[0] * self.camera_walk * if beams { 1.0 } else { SHORT };
+        let roulette = candidate.roulette;
+        let walk = work.camera_edges[roulette] * EDGE[0] * self.camera_walk * if beams { 1.0 } else { SHORT };
         let mut camera = PIXEL + walk;
         for technique in candidate.techniques.iter() {
             let i = technique as usize;
@@ -90,13 +93,13 @@ impl Costs {
                 Technique::Bp2d | Technique::Bb1d => candidate.beam_paths,
                 _ => candidate.light_paths,
             };
-            let each = work.calls[i] * TURN[i] + photons * work.samples[i] * SAMPLE[i];
+            let each = work.calls[i][roulette] * TURN[i] + photons * work.samples[i][roulette] * SAMPLE[i];
             camera += self.techniques[i] * candidate.look_up(technique) * each;
         }
         let mut light = work.light_edges * EDGE[1] * self.light_walk;
         if has(Technique::LightTracing) {
             let i = Technique::LightTracing as usize;
-            light += work.calls[i] * TURN[i] * self.techniques[i];
+            light += work.calls[i][roulette] * TURN[i] * self.techniques[i];
         }
         let merges = has(Technique::Surf) || has(Technique::Pp3d) || has(Technique::Pb2d);
         if merges || has(Technique::Connect) {

@@ -8,6 +8,7 @@ mod cost;
 mod grid;
 mod prediction;
 mod recorder;
+pub(crate) mod roulette;
 mod search;
 mod trace;
 mod trial;

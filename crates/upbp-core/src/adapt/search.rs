@@ -1,5 +1,7 @@
 //! The plan with the least product of variance and cost.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use upbp_estimators::{Technique, TechniqueSet};
 
@@ -15,6 +17,8 @@ pub(crate) struct Candidate {
     pub(crate) beam_paths: f64,
     /// Merges whose photons only a part of the camera sub-paths look up.
     pub(crate) seldom: TechniqueSet,
+    /// The number of a roulette.
+    pub(crate) roulette: usize,
 }
 
 /// What a candidate may be.
@@ -30,6 +34,8 @@ pub(crate) struct Bounds {
     pub(crate) light_paths: Vec<f64>,
     /// The same of those with photon beams.
     pub(crate) beam_paths: Vec<f64>,
+    /// Numbers of roulettes.
+    pub(crate) roulettes: Range<usize>,
 }
 
 /// What part of the camera sub-paths look up what is looked up seldom.
@@ -38,7 +44,13 @@ const SELDOM: f32 = 0.25;
 impl Candidate {
     /// All that is possible, as much of it as there may be.
     pub(crate) fn everything(bounds: &Bounds) -> Self {
-        Self { techniques: bounds.techniques, light_paths: 1.0, beam_paths: 1.0, seldom: TechniqueSet::EMPTY }
+        Self {
+            techniques: bounds.techniques,
+            light_paths: 1.0,
+            beam_paths: 1.0,
+            seldom: TechniqueSet::EMPTY,
+            roulette: 0,
+        }
     }
 
     pub(crate) fn look_up(&self, technique: Technique) -> f64 {
@@ -58,7 +70,12 @@ impl Candidate {
 
     fn counts(&self) -> Counts {
         let paths = [self.light_paths, self.beam_paths];
-        let mut counts = Counts { relative: [0.0; TECHNIQUES], paths, look_ups: [1.0; TECHNIQUES] };
+        let mut counts = Counts {
+            relative: [0.0; TECHNIQUES],
+            paths,
+            look_ups: [1.0; TECHNIQUES],
+            roulette: self.roulette,
+        };
         // Camera sub-paths are never told apart by how they find the light.
         counts.relative[Technique::Hit as usize] = 1.0;
         counts.relative[Technique::Nee as usize] = 1.0;
@@ -148,6 +165,10 @@ pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain
                 None => break,
             }
         }
+        // After all else: each roulette takes several times as long to predict as the trial's own.
+        let roulettes = bounds.roulettes.clone().map(|roulette| Candidate { roulette, ..at.candidate });
+        let all = judge.judge(&roulettes.collect::<Vec<_>>());
+        at = all.into_iter().min_by(|a, b| a.product().total_cmp(&b.product())).unwrap_or(at);
         if best.is_none_or(|best| at.product() < gain * best.product()) {
             best = Some(at);
         }

@@ -7,7 +7,7 @@ use upbp_estimators::scene::Scene;
 use upbp_estimators::{Counters, Plan, Technique, TechniqueSet, World};
 
 use super::grid::Grid;
-use super::recorder::{MOST_SAMPLES, Recorder, Sample, TECHNIQUES};
+use super::recorder::{ByRoulette, MOST_SAMPLES, Recorder, Sample, TECHNIQUES, add, reach};
 use super::trace::{CHUNK, Pass, Piece, Room};
 use super::watch::{PARTS, WALK, Watch};
 
@@ -38,11 +38,12 @@ pub(crate) struct Trial {
 /// What sub-paths had to do, on average.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Work {
-    pub(crate) camera_edges: f64,
+    /// Edges per camera sub-path, by roulette.
+    pub(crate) camera_edges: ByRoulette,
     /// Turns to each technique per camera sub-path; of light tracing per light sub-path.
-    pub(crate) calls: [f64; TECHNIQUES],
+    pub(crate) calls: [ByRoulette; TECHNIQUES],
     /// Samples, likewise; of merges for as many photons as the plan has.
-    pub(crate) samples: [f64; TECHNIQUES],
+    pub(crate) samples: [ByRoulette; TECHNIQUES],
     pub(crate) light_edges: f64,
     /// Light vertices and beams per light sub-path (with beams).
     pub(crate) vertices: f64,
@@ -171,36 +172,36 @@ fn work(
     trial: &Trial,
 ) -> Work {
     let mut counters = Counters::default();
-    let (mut calls, mut counts) = ([0_u64; TECHNIQUES], [0_u64; TECHNIQUES]);
+    let mut edges = ByRoulette::default();
+    let (mut calls, mut samples) = ([edges; TECHNIQUES], [edges; TECHNIQUES]);
     for pass in passes {
         counters.add(&pass.counters);
         for recorder in pass.camera.iter().chain(pass.light.iter().map(|(recorder, _)| recorder)) {
-            for (sum, own) in calls.iter_mut().zip(recorder.calls) {
-                *sum += own;
+            add(&mut edges, &recorder.edges);
+            for (sum, own) in calls.iter_mut().zip(&recorder.calls) {
+                add(sum, own);
             }
             for sample in &recorder.samples {
-                counts[sample.technique as usize] += 1;
+                add(&mut samples[sample.technique as usize], &reach(sample.albedos));
             }
         }
     }
-    let per = |count: u64, paths: f64| if paths > 0.0 { count as f64 / paths } else { 0.0 };
-    let by_technique = |counts: &[u64; TECHNIQUES]| {
-        Technique::ALL.map(|technique| {
-            let splats = technique == Technique::LightTracing;
-            per(counts[technique as usize], if splats { light_paths } else { camera_paths })
-        })
-    };
-    let mut samples = by_technique(&counts);
-    for technique in TechniqueSet::ALL.without(TechniqueSet::BPT).iter() {
-        samples[technique as usize] /= trial.thinning(technique);
+    let per = |count: f64, paths: f64| if paths > 0.0 { count / paths } else { 0.0 };
+    for technique in Technique::ALL {
+        let i = technique as usize;
+        let paths = if technique == Technique::LightTracing { light_paths } else { camera_paths };
+        calls[i] = calls[i].map(|count| per(count, paths));
+        let merges = !TechniqueSet::BPT.has(technique);
+        let thinning = if merges { trial.thinning(technique) } else { 1.0 };
+        samples[i] = samples[i].map(|count| per(count, paths) / thinning);
     }
     Work {
-        camera_edges: per(counters.camera_edges, camera_paths),
-        calls: by_technique(&calls),
+        camera_edges: edges.map(|count| per(count, camera_paths)),
+        calls,
         samples,
-        light_edges: per(counters.light_edges, light_paths),
-        vertices: per(counters.light_vertices, light_paths),
-        beams: per(counters.photon_beams, beam_paths),
+        light_edges: per(counters.light_edges as f64, light_paths),
+        vertices: per(counters.light_vertices as f64, light_paths),
+        beams: per(counters.photon_beams as f64, beam_paths),
         camera_time: None,
         light_time: None,
     }

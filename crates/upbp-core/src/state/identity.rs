@@ -62,7 +62,7 @@ impl Identity {
     }
 
     /// All that counts beside the plan, as text: the shortest decimals of two different numbers differ.
-    fn fields(&self) -> [(&'static str, String); 12] {
+    fn fields(&self) -> [(&'static str, String); 11] {
         let s = &self.settings;
         let (width, height) = self.film;
         let (x, y, columns, rows) = self.part;
@@ -74,7 +74,6 @@ impl Identity {
             ("seed", s.seed.to_string()),
             ("min_length", s.min_length.to_string()),
             ("max_length", s.max_length.to_string()),
-            ("roulette", s.roulette.to_string()),
             ("heuristic", format!("{:?}", s.heuristic)),
             ("photon_beams", format!("{:?}", s.photon_beams)),
             ("query_beams", format!("{:?}", s.query_beams)),
@@ -83,7 +82,7 @@ impl Identity {
     }
 }
 
-fn stage_fields(stage: &Stage) -> [(&'static str, String); 15] {
+fn stage_fields(stage: &Stage) -> [(&'static str, String); 16] {
     let r = &stage.radii;
     [
         ("first iteration of a stage", stage.from.to_string()),
@@ -92,6 +91,7 @@ fn stage_fields(stage: &Stage) -> [(&'static str, String); 15] {
         ("beams", stage.beam_paths.to_string()),
         ("connections", stage.connections.to_string()),
         ("next_events", stage.next_events.to_string()),
+        ("roulette", format!("{:?}", stage.roulette)),
         ("look_ups", format!("{:?}", stage.look_ups)),
         ("vertices per light sub-path", stage.vertices_per_light_path.to_string()),
         ("radii.surf", r.surf.to_string()),

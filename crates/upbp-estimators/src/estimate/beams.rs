@@ -203,7 +203,7 @@ impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
         let towards_camera = -self.passage.direction;
         // Propagation of the light: along the photon's path, then towards the camera.
         let phase = medium.phase().eval(-light.towards_light, towards_camera);
-        let survival = if plan.roulette { medium.continuation(foot.position) } else { 1.0 };
+        let survival = if plan.roulette.is_on() { medium.continuation(foot.position) } else { 1.0 };
         let rho = f64::from(phase) * f64::from(survival);
         let sin = f64::from(light.towards_light.cross(towards_camera).length()).min(1.0);
         let factors = mis.volume_factors(self.medium, light.tip.c, foot.tip.c, sin);

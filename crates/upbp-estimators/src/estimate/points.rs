@@ -167,7 +167,7 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf>>(
         let towards_light = -beam.segment.direction;
         let medium = &scene.media()[medium_id.0 as usize];
         let phase = medium.phase().eval(beam.segment.direction, vertex.towards_camera);
-        let survival = if plan.roulette { medium.continuation(vertex.position) } else { 1.0 };
+        let survival = if plan.roulette.is_on() { medium.continuation(vertex.position) } else { 1.0 };
         let rho = f64::from(phase) * f64::from(survival);
         let sin = f64::from(towards_light.cross(vertex.towards_camera).length()).min(1.0);
         let Some((tip, light)) = beam_tip(context, beam, t) else { return };

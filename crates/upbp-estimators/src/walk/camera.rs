@@ -14,6 +14,7 @@ use crate::light_map::LightMap;
 use crate::mis::{Densities, Edge, Pending, Tip, Weight};
 use crate::observer::{ObservedVertex, Observer};
 use crate::random::{Stream, StreamKind};
+use crate::roulette::Survival;
 use crate::scene::{Camera, Scene, Walk};
 use crate::technique::{Layer, Technique};
 
@@ -110,6 +111,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
         depth: 1,
     };
 
+    let mut survival = Survival::of_camera(plan.roulette);
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
         edge.depth = depth;
@@ -175,7 +177,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
         }
 
         let Some(scattered) =
-            vertex.site.scatter(scene, plan.roulette, Walk::Camera, vertex.position, from, &mut stream)
+            vertex.site.scatter(scene, &mut survival, Walk::Camera, vertex.position, from, &mut stream)
         else {
             break;
         };
@@ -184,6 +186,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
             position: vertex.position,
             site: vertex.site,
             delta: scattered.delta,
+            albedo: scattered.albedo,
         });
         origin = ray_origin(&vertex.site, vertex.position, scattered.direction);
         direction = scattered.direction;

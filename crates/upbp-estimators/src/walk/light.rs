@@ -13,6 +13,7 @@ use crate::estimate::light_tracing;
 use crate::mis::{BeamExtent, Densities, Edge, Pending};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::random::{Stream, StreamKind};
+use crate::roulette::Survival;
 use crate::scene::{Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
 use crate::world::World;
@@ -41,6 +42,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
     let Some(mut flight) = emit(world, context, index, &mut stream, observer) else { return };
     let scene = world.scene;
+    let mut survival = Survival::of_light(plan.roulette);
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
     let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
@@ -99,11 +101,14 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
             }
         }
 
-        let Some(scattered) = site.scatter(scene, plan.roulette, Walk::Light, position, from, &mut stream)
+        let Some(scattered) = site.scatter(scene, &mut survival, Walk::Light, position, from, &mut stream)
         else {
             return;
         };
-        observer.light_vertex(index, &ObservedVertex { depth, position, site, delta: scattered.delta });
+        observer.light_vertex(
+            index,
+            &ObservedVertex { depth, position, site, delta: scattered.delta, albedo: scattered.albedo },
+        );
         flight = Flight {
             origin: ray_origin(&site, position, scattered.direction),
             direction: scattered.direction,

@@ -6,6 +6,7 @@ use upbp_media::{Interior, Medium, MediumId, MediumStack, PhaseFunction, Spectru
 use super::MIN_COSINE;
 use crate::mis::MergeSite;
 use crate::random::Stream;
+use crate::roulette::{Roulette, Survival};
 use crate::scene::{Bsdf, Hit, Interface, Scene, Walk};
 
 /// Where a path scatters.
@@ -65,7 +66,7 @@ impl Sides {
 pub struct Evaluation {
     /// The scattering function `s`: BSDF times the shading-normal correction, or `σ_s ρ`.
     pub value: Spectrum,
-    /// Density of the own walk choosing this direction, roulette included, sr⁻¹.
+    /// Density of the own walk choosing this direction, times the albedo if there is roulette, sr⁻¹.
     pub rho_own: f64,
     /// Density of the opposite walk, which comes from there and leaves to where this walk came from.
     pub rho_opposite: f64,
@@ -82,6 +83,8 @@ pub struct Scattered {
     pub direction: Vec3,
     /// Factor of the throughput, roulette included.
     pub weight: Spectrum,
+    /// The vertex's own probability to continue the walk, 1 without roulette.
+    pub albedo: f32,
     /// As [`Evaluation::rho_own`]; for a Dirac lobe its probability.
     pub rho_own: f64,
     /// As [`Evaluation::rho_opposite`]; for a Dirac lobe as in (4.6).
@@ -172,7 +175,7 @@ impl<B: Bsdf> Site<B> {
     pub fn evaluate<S: Scene<Bsdf = B>>(
         &self,
         scene: &S,
-        roulette: bool,
+        roulette: Roulette,
         walk: Walk,
         position: Vec3,
         from: Vec3,
@@ -199,7 +202,7 @@ impl<B: Bsdf> Site<B> {
     pub fn scatter<S: Scene<Bsdf = B>>(
         &self,
         scene: &S,
-        roulette: bool,
+        survival: &mut Survival,
         walk: Walk,
         position: Vec3,
         from: Vec3,
@@ -208,21 +211,23 @@ impl<B: Bsdf> Site<B> {
         let u_continue = stream.uniform();
         match self {
             Self::Surface(surface) => {
-                surface.scatter(roulette, walk, from, u_continue, stream.uniform(), stream.pair())
+                surface.scatter(survival, walk, from, u_continue, stream.uniform(), stream.pair())
             }
             Self::Medium(medium) => {
                 let u = stream.pair();
                 let medium = &scene.media()[medium.0 as usize];
-                let survival = continuation(medium, position, roulette);
-                if u_continue >= survival {
+                let albedo = continuation(medium, position, survival.roulette());
+                let probability = survival.probability(albedo);
+                if u_continue >= probability {
                     return None;
                 }
                 let sample = PhaseFunction::sample(medium.phase(), -from, u);
-                let rho = f64::from(sample.pdf) * f64::from(survival);
+                let rho = f64::from(sample.pdf) * f64::from(albedo);
                 Some(Scattered {
                     direction: sample.after,
                     // The phase function is sampled perfectly: its value over its density is one.
-                    weight: medium.sigma_s(position) / survival,
+                    weight: medium.sigma_s(position) / probability,
+                    albedo,
                     rho_own: rho,
                     rho_opposite: rho,
                     cos: 1.0,
@@ -235,8 +240,8 @@ impl<B: Bsdf> Site<B> {
     }
 }
 
-fn continuation<M: Medium>(medium: &M, position: Vec3, roulette: bool) -> f32 {
-    if roulette { medium.continuation(position) } else { 1.0 }
+fn continuation<M: Medium>(medium: &M, position: Vec3, roulette: Roulette) -> f32 {
+    if roulette.is_on() { medium.continuation(position) } else { 1.0 }
 }
 
 impl<B: Bsdf> SurfaceSite<B> {
@@ -251,8 +256,8 @@ impl<B: Bsdf> SurfaceSite<B> {
         local.x * s + local.y * t + local.z * self.shading_normal
     }
 
-    fn continuation(&self, from: Vec3, roulette: bool) -> f32 {
-        if roulette { self.bsdf.continuation(from).clamp(0.0, 1.0) } else { 1.0 }
+    fn continuation(&self, from: Vec3, roulette: Roulette) -> f32 {
+        if roulette.is_on() { self.bsdf.continuation(from).clamp(0.0, 1.0) } else { 1.0 }
     }
 
     /// Cosine with the geometric normal if both normals agree on the side of `direction`, local `z` given.
@@ -261,7 +266,7 @@ impl<B: Bsdf> SurfaceSite<B> {
         (cos * shading_cosine > 0.0 && cos.abs() >= MIN_COSINE).then_some(cos)
     }
 
-    fn evaluate(&self, roulette: bool, walk: Walk, from: Vec3, to: Vec3) -> Option<Evaluation> {
+    fn evaluate(&self, roulette: Roulette, walk: Walk, from: Vec3, to: Vec3) -> Option<Evaluation> {
         let (local_from, local_to) = (self.local(from), self.local(to));
         let cos_from = self.agreeing_cosine(from, local_from.z)?;
         let cos_to = self.agreeing_cosine(to, local_to.z)?;
@@ -286,7 +291,7 @@ impl<B: Bsdf> SurfaceSite<B> {
 
     fn scatter(
         &self,
-        roulette: bool,
+        survival: &mut Survival,
         walk: Walk,
         from: Vec3,
         u_continue: f32,
@@ -295,19 +300,21 @@ impl<B: Bsdf> SurfaceSite<B> {
     ) -> Option<Scattered> {
         let local_from = self.local(from);
         let cos_from = self.agreeing_cosine(from, local_from.z)?;
-        let survival = self.continuation(local_from, roulette);
-        if u_continue >= survival {
+        let roulette = survival.roulette();
+        let albedo = self.continuation(local_from, roulette);
+        let probability = survival.probability(albedo);
+        if u_continue >= probability {
             return None;
         }
         let sample = self.bsdf.sample(local_from, walk, self.interface, u_lobe, u)?;
         let direction = self.world(sample.to).normalize();
         let cos_to = self.agreeing_cosine(direction, sample.to.z)?;
-        let mut weight = sample.weight / survival;
+        let mut weight = sample.weight / probability;
         if walk == Walk::Light {
             // Adjoint of the shading normal (section 1.6).
             weight *= ((local_from.z * cos_to) / (cos_from * sample.to.z)).abs();
         }
-        let own = f64::from(sample.pdf) * f64::from(survival);
+        let own = f64::from(sample.pdf) * f64::from(albedo);
         let mut opposite = f64::from(sample.pdf_reverse) * f64::from(self.continuation(sample.to, roulette));
         let transmitted = cos_from * cos_to < 0.0;
         if sample.delta && transmitted {
@@ -324,6 +331,7 @@ impl<B: Bsdf> SurfaceSite<B> {
         Some(Scattered {
             direction,
             weight,
+            albedo,
             rho_own: own,
             rho_opposite: opposite,
             cos: f64::from(cos_to.abs()),

@@ -1,0 +1,204 @@
+//! The variance that a plan would have, predicted from a trial of another one.
+//!
+//! With the balance heuristic, the second moment of single samples is `∫ f²/S`, `S` the sum of the densities of all techniques
+//! with their counts; it can be estimated for every `S` by the samples of a trial (`docs/theory.md`, section 6(a)), and
+//! knows of paths that the techniques of a plan would find once in a million years. What samples of one camera sub-path have in
+//! common is added: photons that are merged with one vertex share its error, and those of one light sub-path share that of their own.
+
+mod limits;
+mod pairs;
+#[cfg(test)]
+mod tests;
+
+use glam::DVec3;
+
+use super::grid::Grid;
+use super::recorder::{Sample, TECHNIQUES};
+use super::trial::{PASSES, Trial};
+use limits::{reductions, relative_to, surroundings};
+use pairs::Looks;
+
+/// The least variance, relative to the second moments of single samples.
+const LEAST_PART: f64 = 0.05;
+
+/// Parts that a variance is given in, so that its own error can be told.
+pub(crate) const GROUPS: usize = 8;
+/// Light sub-paths are at least so uneven.
+const LEAST_EVENNESS: f64 = 0.1;
+
+/// How many samples of each technique a plan has, relative to the trial's plan; and what part of the camera sub-paths look
+/// photons up, which those numbers contain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Counts {
+    pub(crate) relative: [f64; TECHNIQUES],
+    /// Light sub-paths that they come from, and those with beams, relative to the trial's plan.
+    pub(crate) paths: [f64; 2],
+    pub(crate) look_ups: [f64; TECHNIQUES],
+    /// The number of the roulette.
+    pub(crate) roulette: usize,
+}
+
+/// A trial, made ready for predictions.
+pub(crate) struct Prediction {
+    /// Samples are relative to the radiance around them.
+    trial: Trial,
+    evenness: f64,
+    /// The albedos of a look's samples, descending; `level_ends` as the trial's ends.
+    levels: Vec<f32>,
+    level_ends: Vec<u32>,
+}
+
+impl Prediction {
+    /// Takes a trial. Samples that say too much are made smaller, and so are those of camera sub-paths that do together.
+    pub(crate) fn new(mut trial: Trial, grid: &Grid) -> Self {
+        trial.make_relative(&relative_to(&surroundings(&trial.means(), grid.columns())));
+        let per_look = 1.0 / (trial.cells * trial.passes) as f64;
+        let mut parts: Vec<f64> = trial.samples.iter().map(|s| per_look * trial.second_moment(s)).collect();
+        parts.extend(trial.splats().map(|(_, _, splat)| trial.per_splat() * trial.second_moment(splat)));
+        let by_sample = reductions(&parts);
+        let splats = trial.splats.iter_mut().map(|(_, splat)| splat);
+        for (sample, reduction) in trial.samples.iter_mut().chain(splats).zip(by_sample) {
+            sample.value *= reduction;
+        }
+        let looks = (0..trial.cells).flat_map(|cell| (0..trial.passes).map(move |pass| (cell, pass)));
+        let together = |(cell, pass)| {
+            let sum: DVec3 = trial.look(cell, pass).iter().map(|s| s.value.as_dvec3()).sum();
+            sum.length_squared()
+        };
+        let parts: Vec<f64> = looks.clone().map(together).collect();
+        for ((cell, pass), reduction) in looks.clone().zip(reductions(&parts)) {
+            let range = trial.range(cell, pass);
+            trial.samples[range].iter_mut().for_each(|sample| sample.value *= reduction);
+        }
+        let (mut levels, mut level_ends) = (Vec::new(), Vec::with_capacity(trial.ends.len()));
+        for (cell, pass) in looks {
+            let mut own: Vec<f32> = trial.look(cell, pass).iter().map(|sample| sample.albedos).collect();
+            own.sort_unstable_by(|a, b| b.total_cmp(a));
+            own.dedup();
+            levels.extend(own);
+            level_ends.push(levels.len() as u32);
+        }
+        let evenness = splat_evenness(&trial);
+        Self { trial, evenness, levels, level_ends }
+    }
+
+    /// The relative variance of an iteration of a plan with these counts, mean over pixels and channels, in parts due to groups of
+    /// cells. Infinite if a path that the trial found is one that the plan cannot find.
+    pub(crate) fn relative_variance(&self, counts: &Counts) -> [f64; GROUPS] {
+        let trial = &self.trial;
+        let looks = Looks::new(trial, counts);
+        let mut single = [0.0; GROUPS];
+        let mut all = [0.0; GROUPS];
+        for cell in 0..trial.cells {
+            let sums = self.of_cell(cell, &looks);
+            single[group(cell)] += sums[0] / trial.cells as f64;
+            all[group(cell)] += sums[1] / trial.cells as f64;
+        }
+        // The difference of two noisy numbers may be anything.
+        let mut variance = std::array::from_fn(|group| f64::max(all[group], LEAST_PART * single[group]));
+        for (_, cell, splat) in trial.splats() {
+            variance[group(cell)] += self.evenness * trial.per_splat() * looks.second_moment(splat);
+        }
+        variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
+    }
+
+    /// The albedos that samples of a look come after, descending.
+    fn levels(&self, cell: usize, pass: usize) -> &[f32] {
+        let look = cell * self.trial.passes + pass;
+        let start = if look == 0 { 0 } else { self.level_ends[look - 1] };
+        &self.levels[start as usize..self.level_ends[look] as usize]
+    }
+
+    /// Its second moments of single samples, and all of its variance.
+    fn of_cell(&self, cell: usize, looks: &Looks<'_>) -> [f64; 2] {
+        let passes = self.trial.passes as f64;
+        let (mut single, mut products) = (0.0, 0.0);
+        let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
+        for pass in 0..self.trial.passes {
+            let look = looks.look(self.trial.look(cell, pass), self.levels(cell, pass));
+            single += look.single;
+            products += look.products;
+            sum += look.sum;
+            squares += look.sum.length_squared();
+        }
+        // The square of the mean from products of different passes, which have no part of their own variance.
+        let mean_square = (sum.length_squared() - squares) / (passes * (passes - 1.0));
+        [single / passes, (single + products) / passes - mean_square]
+    }
+}
+
+/// The variance of the light that splats bring to a cell between passes, relative to what it would be if light sub-paths were
+/// independent: they are stratified among each other, and a cell gets as many splats of a pass as a pixel of an iteration.
+fn splat_evenness(trial: &Trial) -> f64 {
+    let mut sums = vec![[DVec3::ZERO; PASSES as usize]; trial.cells];
+    let mut independent = 0.0;
+    for (pass, cell, splat) in trial.splats() {
+        sums[cell][pass] += splat.value.as_dvec3();
+        independent += f64::from(splat.value.length_squared());
+    }
+    // Two passes: the squared difference is twice the variance of one, and the sum of squares over both is twice its own.
+    let apart: f64 = sums.iter().map(|[first, second]| first.distance_squared(*second)).sum();
+    if independent > 0.0 { (apart / independent).clamp(LEAST_EVENNESS, 1.0) } else { 1.0 }
+}
+
+/// Groups are spread over the picture.
+const fn group(cell: usize) -> usize {
+    ((cell as u32).wrapping_mul(2_654_435_761) >> 29) as usize % GROUPS
+}
+
+impl Trial {
+    fn range(&self, cell: usize, pass: usize) -> std::ops::Range<usize> {
+        let group = cell * self.passes + pass;
+        let start = if group == 0 { 0 } else { self.ends[group - 1] };
+        start as usize..self.ends[group] as usize
+    }
+
+    /// Splats with their passes and cells.
+    fn splats(&self) -> impl Iterator<Item = (usize, usize, &Sample)> {
+        let pass = |i| self.splat_passes.partition_point(|end| *end <= i);
+        self.splats.iter().enumerate().map(move |(i, (cell, splat))| (pass(i), *cell as usize, splat))
+    }
+
+    /// The mean radiance of each cell.
+    fn means(&self) -> Vec<DVec3> {
+        let passes = self.passes as f64;
+        let of_cell = |cell| {
+            let samples = (0..self.passes).flat_map(|pass| self.look(cell, pass));
+            samples.map(|sample| sample.value.as_dvec3()).sum::<DVec3>() / passes
+        };
+        let mut means: Vec<DVec3> = (0..self.cells).map(of_cell).collect();
+        for (_, cell, splat) in self.splats() {
+            means[cell] += splat.value.as_dvec3() * self.per_splat() * self.cells as f64;
+        }
+        means
+    }
+
+    /// Multiplies samples by a factor of their cell.
+    fn make_relative(&mut self, factors: &[DVec3]) {
+        let times = |sample: &mut Sample, factor: DVec3| {
+            sample.value = (sample.value.as_dvec3() * factor).as_vec3();
+        };
+        for (cell, factor) in factors.iter().enumerate() {
+            let range = self.range(cell, 0).start..self.range(cell, self.passes - 1).end;
+            self.samples[range].iter_mut().for_each(|sample| times(sample, *factor));
+        }
+        for (cell, splat) in &mut self.splats {
+            times(splat, factors[*cell as usize]);
+        }
+    }
+
+    /// The samples of a look.
+    fn look(&self, cell: usize, pass: usize) -> &[Sample] {
+        &self.samples[self.range(cell, pass)]
+    }
+
+    /// The square of a sample, as much of it as all samples of the plan would have.
+    fn second_moment(&self, sample: &Sample) -> f64 {
+        f64::from(sample.value.length_squared()) * self.thinning(sample.technique)
+    }
+
+    /// The part of a splat in a mean over pixels.
+    fn per_splat(&self) -> f64 {
+        1.0 / (self.pixels * self.passes as f64)
+    }
+}

@@ -1,0 +1,193 @@
+//! Predictions of what can be computed otherwise.
+
+use glam::Vec3;
+use upbp_estimators::Technique;
+use upbp_estimators::scene::PixelRect;
+
+use super::super::roulette::{COUNT, OF_TRIAL, numbered};
+use super::super::trial::Work;
+use super::limits::{DARKNESS, LARGEST_PART, largest};
+use super::*;
+
+const SIDE: u32 = 128;
+
+/// Uniform numbers that fill the unit interval evenly enough, and independently in two sequences.
+fn uniform(i: usize, sequence: u32) -> f64 {
+    let mut x = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (u64::from(sequence) << 32);
+    for _ in 0..3 {
+        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x ^= x >> 27;
+    }
+    (x >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// `∫ 3x² dx = 1` over the unit interval, by one sample of density 1 and one of density `2x`, as if they were an emission
+/// hit and a connection.
+fn trial() -> Trial {
+    let cells = (SIDE * SIDE) as usize;
+    let passes = PASSES as usize;
+    let mut samples = Vec::new();
+    let mut ends = Vec::new();
+    for i in 0..cells * passes {
+        for (technique, x) in [(Technique::Hit, uniform(i, 0)), (Technique::Connect, uniform(i, 1).sqrt())] {
+            let mut shares = [0.0; TECHNIQUES];
+            shares[Technique::Hit as usize] = (1.0 / (1.0 + 2.0 * x)) as f32;
+            shares[Technique::Connect as usize] = (2.0 * x / (1.0 + 2.0 * x)) as f32;
+            let value = Vec3::splat((3.0 * x * x / (1.0 + 2.0 * x)) as f32);
+            samples.push(Sample { technique, merged: None, albedos: 1.0, value, shares });
+        }
+        ends.push(samples.len() as u32);
+    }
+    Trial {
+        passes,
+        cells,
+        samples,
+        ends,
+        splats: Vec::new(),
+        splat_passes: vec![0; passes],
+        thinning: [1.0; 2],
+        planned: [1.0; 2],
+        pixels: cells as f64,
+        work: Work::default(),
+    }
+}
+
+fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
+    let n = 100_000;
+    (0..n).map(|i| f((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)
+}
+
+#[test]
+fn variances_are_those_of_the_estimators() {
+    let trial = trial();
+    let prediction =
+        Prediction::new(trial, &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE));
+    let f = |x: f64| 3.0 * x * x;
+    // The picture is 1 everywhere.
+    let relative = 1.0 / (1.0 + DARKNESS);
+    for (hit, connect) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+        let mut counts =
+            Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES], roulette: 0 };
+        counts.relative[Technique::Hit as usize] = hit;
+        counts.relative[Technique::Connect as usize] = connect;
+        // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n.
+        let sum = |x: f64| hit + connect * 2.0 * x;
+        let part = |n: f64, p: fn(f64) -> f64| {
+            if n == 0.0 {
+                return 0.0;
+            }
+            let mean = quadrature(|x| n * p(x) * f(x) / sum(x));
+            quadrature(|x| n * p(x) * (f(x) / sum(x)).powi(2)) - mean * mean / n
+        };
+        let expected = relative * (part(hit, |_| 1.0) + part(connect, |x| 2.0 * x));
+        let found: f64 = prediction.relative_variance(&counts).iter().sum();
+        assert!((found / expected - 1.0).abs() < 0.1, "{hit}, {connect}: {found}, expected {expected}");
+    }
+}
+
+/// Photons of one light sub-path that are merged together share its error; those of different ones do not.
+#[test]
+fn variances_know_which_photons_are_of_one_light_sub_path() {
+    const PLANNED: f64 = 16_000.0;
+    const TRACED: usize = 8000;
+    const PHOTONS: usize = 3;
+    /// One light sub-path out of so many comes by.
+    const RARE: f64 = 400.0;
+    let cells = (SIDE * SIDE) as usize;
+    let mut shares = [0.0; TECHNIQUES];
+    shares[Technique::Pb2d as usize] = 1.0;
+    let value = Vec3::splat((RARE / (TRACED * PHOTONS) as f64) as f32);
+    let (mut samples, mut ends, mut drawn) = (Vec::new(), Vec::new(), 0);
+    for _ in 0..cells * PASSES as usize {
+        let mut path = 0.0;
+        loop {
+            path += 1.0 + (uniform(drawn, 2).ln() / (1.0 - 1.0 / RARE).ln()).floor();
+            drawn += 1;
+            if path > TRACED as f64 {
+                break;
+            }
+            let merged = Some(path as u32);
+            samples.extend(
+                [Sample { technique: Technique::Pb2d, merged, albedos: 1.0, value, shares }; PHOTONS],
+            );
+        }
+        ends.push(samples.len() as u32);
+    }
+    let trial =
+        Trial { samples, ends, thinning: [TRACED as f64 / PLANNED; 2], planned: [PLANNED; 2], ..trial() };
+    let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
+    let prediction = Prediction::new(trial, &grid);
+    for paths in [0.25, 1.0, 4.0] {
+        let mut counts = Counts {
+            relative: [0.0; TECHNIQUES],
+            paths: [paths; 2],
+            look_ups: [1.0; TECHNIQUES],
+            roulette: 0,
+        };
+        counts.relative[Technique::Pb2d as usize] = paths;
+        let found: f64 = prediction.relative_variance(&counts).iter().sum();
+        let expected = (RARE - 1.0) / (paths * PLANNED) / (1.0 + DARKNESS);
+        assert!((found / expected - 1.0).abs() < 0.1, "{paths}: {found}, expected {expected}");
+    }
+}
+
+/// A vertex that always finds 1, and past an albedo of 0.3 another that finds as much.
+#[test]
+fn variances_know_where_walks_end() {
+    const ALBEDO: f32 = 0.3;
+    let reached = numbered(0, OF_TRIAL).reach(ALBEDO);
+    let mut shares = [0.0; TECHNIQUES];
+    shares[Technique::Hit as usize] = 1.0;
+    let (mut samples, mut ends) = (Vec::new(), Vec::new());
+    for i in 0..(SIDE * SIDE * PASSES) as usize {
+        let mut find = |albedos, value| {
+            let value = Vec3::splat(value);
+            samples.push(Sample { technique: Technique::Hit, merged: None, albedos, value, shares });
+        };
+        find(1.0, 1.0);
+        if uniform(i, 4) < f64::from(reached) {
+            find(ALBEDO, 1.0 / reached);
+        }
+        ends.push(samples.len() as u32);
+    }
+    let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
+    let prediction = Prediction::new(Trial { samples, ends, ..trial() }, &grid);
+    for roulette in 0..COUNT {
+        let mut counts =
+            Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES], roulette };
+        counts.relative[Technique::Hit as usize] = 1.0;
+        let found: f64 = prediction.relative_variance(&counts).iter().sum();
+        let reach = f64::from(numbered(roulette, OF_TRIAL).reach(ALBEDO));
+        let squares = 1.0 + 1.0 / reach;
+        let expected = (1.0 / reach - 1.0).max(LEAST_PART * squares) / (4.0 * (1.0 + DARKNESS));
+        assert!((found / expected - 1.0).abs() < 0.1, "{roulette}: {found}, expected {expected}");
+    }
+}
+
+#[test]
+fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
+    let mut trial = trial();
+    for sample in &mut trial.samples {
+        if sample.technique == Technique::Connect {
+            sample.shares = [0.0; TECHNIQUES];
+            sample.shares[Technique::Connect as usize] = 1.0;
+        }
+    }
+    let prediction =
+        Prediction::new(trial, &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE));
+    let mut counts =
+        Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES], roulette: 0 };
+    counts.relative[Technique::Hit as usize] = 1.0;
+    assert!(prediction.relative_variance(&counts).iter().sum::<f64>().is_infinite());
+}
+
+#[test]
+fn no_part_is_more_than_the_largest() {
+    let mut parts = vec![1.0; 1000];
+    parts.extend([1e6, 1e3]);
+    let most = largest(parts.clone());
+    let sum: f64 = parts.iter().map(|part: &f64| part.min(most)).sum();
+    assert!((most / sum - LARGEST_PART).abs() < 1e-9, "{most} of {sum}");
+    // Nothing to limit.
+    assert!(largest(vec![1.0; 1000]) >= 1.0);
+}

@@ -1,0 +1,113 @@
+//! Russian roulette: which walks end before they leave the scene.
+
+use serde::{Deserialize, Serialize};
+
+/// When sub-paths end (`docs/theory.md`, section 6(l)).
+///
+/// Every vertex tells a probability to [continue](crate::scene::Bsdf::continuation), its albedo. Light sub-paths go on with just that
+/// probability, so that all photons carry the same power. What a camera vertex finds differs by more than its albedo anyway, and first
+/// vertices matter most; so camera sub-paths go on with certainty until the product of their albedos falls below a threshold,
+/// and hold it from then on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Roulette {
+    /// Walks end where they leave the scene, or at the greatest length.
+    Off,
+    /// A camera sub-path is cut so that no less of its throughput is left by albedos than this, in `(0, 1]`.
+    Below(f32),
+}
+
+impl Roulette {
+    /// Whether walks end at all. If so, their densities in weights contain the albedo of every vertex: the threshold depends on
+    /// what a walk went through, which the walk of the other side cannot know.
+    #[inline]
+    #[must_use]
+    pub const fn is_on(self) -> bool {
+        matches!(self, Self::Below(_))
+    }
+
+    /// The probability that a camera sub-path goes on past vertices with this product of albedos.
+    #[must_use]
+    pub fn reach(self, albedos: f32) -> f32 {
+        match self {
+            Self::Off => 1.0,
+            Self::Below(least) => (albedos / least).min(1.0),
+        }
+    }
+}
+
+/// The roulette of one walk.
+#[derive(Clone, Copy, Debug)]
+pub struct Survival {
+    roulette: Roulette,
+    /// What albedos left of the throughput.
+    left: f32,
+}
+
+impl Survival {
+    /// Of a camera sub-path that starts.
+    #[must_use]
+    pub const fn of_camera(roulette: Roulette) -> Self {
+        Self { roulette, left: 1.0 }
+    }
+
+    /// Of a light sub-path that starts.
+    #[must_use]
+    pub const fn of_light(roulette: Roulette) -> Self {
+        let roulette = match roulette {
+            Roulette::Off => Roulette::Off,
+            Roulette::Below(_) => Roulette::Below(1.0),
+        };
+        Self { roulette, left: 1.0 }
+    }
+
+    pub(crate) const fn roulette(&self) -> Roulette {
+        self.roulette
+    }
+
+    /// The probability to go on at a vertex of this albedo. The walk is taken to do so.
+    #[inline]
+    pub(crate) fn probability(&mut self, albedo: f32) -> f32 {
+        let probability = self.roulette.reach(self.left * albedo);
+        self.left *= albedo / probability;
+        probability
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// The probability to get past some vertices depends on the product of their albedos alone, in whatever order.
+        #[test]
+        fn what_is_reached_does_not_depend_on_the_order(
+            albedos in prop::collection::vec(0.05_f32..1.0, 1..12), least in 0.01_f32..1.0,
+        ) {
+            let roulette = Roulette::Below(least);
+            let mut survival = Survival::of_camera(roulette);
+            let (mut product, mut reached) = (1.0, 1.0);
+            for albedo in albedos {
+                product *= albedo;
+                reached *= survival.probability(albedo);
+                prop_assert!((reached / roulette.reach(product) - 1.0).abs() < 1e-5);
+                prop_assert!(survival.left >= least * (1.0 - 1e-5));
+            }
+        }
+
+        #[test]
+        fn photons_keep_their_power(albedos in prop::collection::vec(0.05_f32..1.0, 1..40)) {
+            let mut survival = Survival::of_light(Roulette::Below(0.3));
+            for albedo in albedos {
+                prop_assert_eq!(survival.probability(albedo), albedo);
+            }
+        }
+
+        #[test]
+        fn without_roulette_walks_go_on(albedo in 0.0_f32..1.0) {
+            prop_assert_eq!(Survival::of_camera(Roulette::Off).probability(albedo), 1.0);
+            prop_assert_eq!(Survival::of_light(Roulette::Off).probability(albedo), 1.0);
+        }
+    }
+}
