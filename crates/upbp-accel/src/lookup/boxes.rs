@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::packed::WIDTH;
-use super::wide::Wide;
+use super::wide::{Task, Wide, run};
 
 /// The box around some items: least and greatest corner.
 pub(super) type Bounds = (Vec3, Vec3);
@@ -88,21 +88,7 @@ impl Boxes for Rounded {
         while (0..3).any(|axis| rounded.at(axis, u8::MAX) < high[axis]) {
             rounded.step = rounded.step.next_up();
         }
-        let inverse = rounded.step.recip();
-        for (lane, (min, max)) in boxes.iter().enumerate() {
-            for axis in 0..3 {
-                let place = |x: f32| ((x - low[axis]) * inverse) as u8;
-                let (mut least, mut greatest) = (place(min[axis]), place(max[axis]));
-                // Rounding may be off by some.
-                while rounded.at(axis, least) > min[axis] {
-                    least -= 1;
-                }
-                while rounded.at(axis, greatest) < max[axis] {
-                    greatest += 1;
-                }
-                (rounded.min[axis][lane], rounded.max[axis][lane]) = (least, greatest);
-            }
-        }
+        run(Round { rounded: &mut rounded, boxes });
         rounded
     }
 
@@ -114,6 +100,59 @@ impl Boxes for Rounded {
     #[inline(always)]
     fn max<W: Wide>(&self, wide: W, axis: usize) -> W::F {
         self.places(wide, axis, self.max[axis])
+    }
+}
+
+/// Rounds boxes to a grid that is known.
+struct Round<'a> {
+    rounded: &'a mut Rounded,
+    boxes: &'a [Bounds],
+}
+
+impl Task for Round<'_> {
+    #[inline(always)]
+    fn run(self, wide: impl Wide) {
+        /// Between this and twice as much, numbers have a distance of one, and their last bits count from here.
+        const WHOLE: f32 = (1 << 23) as f32;
+        let Self { rounded, boxes } = self;
+        let (step, inverse) = (rounded.step, rounded.step.recip());
+        for axis in 0..3 {
+            let origin = rounded.origin[axis];
+            let (mut min, mut max) = ([origin; WIDTH], [origin; WIDTH]);
+            for (lane, bounds) in boxes.iter().enumerate() {
+                (min[lane], max[lane]) = (bounds.0[axis], bounds.1[axis]);
+            }
+            let at = |place: f32| origin + place * step;
+            let nearest = |x: f32| {
+                let place = (x - origin) * inverse;
+                // Also where there is no such number.
+                let place = if place < 255.0 { place } else { 255.0 };
+                place + WHOLE - WHOLE
+            };
+            let (mut least, mut greatest) = (min.map(nearest), max.map(nearest));
+            for lane in 0..WIDTH {
+                least[lane] -= if at(least[lane]) > min[lane] { 1.0 } else { 0.0 };
+                greatest[lane] += if at(greatest[lane]) < max[lane] { 1.0 } else { 0.0 };
+            }
+            let byte = |place: f32| (place + WHOLE).to_bits() as u8;
+            (rounded.min[axis], rounded.max[axis]) = (least.map(byte), greatest.map(byte));
+            let held = wide.less_equal(wide.load(&least.map(at)), wide.load(&min))
+                & wide.less_equal(wide.load(&max), wide.load(&greatest.map(at)));
+            // Rounding may be off by more.
+            if held != 0xff {
+                for lane in 0..WIDTH {
+                    while rounded.at(axis, rounded.min[axis][lane]) > min[lane] {
+                        rounded.min[axis][lane] -= 1;
+                    }
+                    while rounded.at(axis, rounded.max[axis][lane]) < max[lane] {
+                        rounded.max[axis][lane] += 1;
+                    }
+                }
+            }
+            // No box ends before it begins.
+            rounded.min[axis][boxes.len()..].fill(u8::MAX);
+            rounded.max[axis][boxes.len()..].fill(0);
+        }
     }
 }
 

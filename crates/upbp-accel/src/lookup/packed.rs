@@ -5,11 +5,12 @@
 //! misses the cache. So both are gathered in lists before they are looked at: many are fetched at the same time.
 
 use glam::Vec3;
+use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
 use super::boxes::{Bounds, Boxes, Exact, union};
 use super::probe::lanes;
-use super::sort::{Buckets, Item, split};
+use super::sort::{Buckets, Item, split, split_few};
 use super::wide::{Task, Wide, run};
 
 /// Items per block and children per node.
@@ -67,17 +68,17 @@ impl<L: Boxes> PackedTree<L> {
         Self { nodes: Vec::new(), leaves: Vec::new(), bounds: (Vec3::ZERO, Vec3::ZERO) };
 
     /// Builds over items at finite places with the given finite bounds, and packs up to eight items at a time
-    /// into a block; the leaves that are not full have `empty` ones.
+    /// into an `empty` block; the leaves that are not full have some that stay empty.
     pub(super) fn build<T: Copy + Send + Sync, B: Copy + Send + Sync>(
         items: &[Item<T>],
         bounds: impl Fn(&Item<T>) -> Bounds + Sync,
         empty: B,
-        block: impl Fn(&[Item<T>]) -> B + Sync,
+        fill: impl Fn(&mut B, &[Item<T>]) + Sync,
     ) -> (Self, Vec<B>) {
         assert!(u32::try_from(items.len()).is_ok(), "{} items are more than can be indexed", items.len());
         let buckets = Buckets::new(items);
         let leaves = || buckets.counts.iter().map(|count| count.div_ceil(LEAF));
-        let mut blocks = vec![empty; leaves().sum::<usize>() * WIDTH];
+        let mut blocks: Vec<B> = repeat_n(empty, leaves().sum::<usize>() * WIDTH).collect();
         let (mut rest, mut first) = (&mut blocks[..], 0);
         let mut work = Vec::new();
         for (bucket, leaves) in leaves().enumerate() {
@@ -92,7 +93,7 @@ impl<L: Boxes> PackedTree<L> {
             let mut items = buckets.items(bucket);
             let branch = Branch::new(&mut items, first, &bounds);
             for (to, items) in own.iter_mut().zip(items.chunks(WIDTH)) {
-                *to = block(items);
+                fill(to, items);
             }
             branch
         });
@@ -296,7 +297,7 @@ impl<L: Boxes> Branch<L> {
         items: &mut [Item<T>],
         bounds: &impl Fn(&Item<T>) -> Bounds,
     ) -> Bounds {
-        split(items, WIDTH);
+        split_few(items);
         let mut boxes = [Bounds::default(); WIDTH];
         let boxes = &mut boxes[..items.len().div_ceil(WIDTH)];
         for (own, items) in boxes.iter_mut().zip(items.chunks(WIDTH)) {

@@ -1,6 +1,7 @@
 //! Points, looked up in a ball (PP3D, SURF) or around a ray (PB2D).
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::boxes::{Boxes, Rounded};
 use super::packed::{PackedTree, Query, WAITING, WIDTH};
@@ -18,15 +19,14 @@ struct Block<P> {
 }
 
 impl<P: Copy> Block<P> {
-    /// With items in the first lanes.
-    fn with(mut self, items: &[Item<P>]) -> Self {
+    /// Puts items into the first lanes.
+    fn fill(&mut self, items: &[Item<P>]) {
         for (lane, &(position, payload)) in items.iter().enumerate() {
             self.payload[lane] = payload;
             for axis in 0..3 {
                 self.position[axis][lane] = position[axis];
             }
         }
-        self
     }
 }
 
@@ -50,14 +50,16 @@ impl<P: Copy + Send + Sync> PointTree<P> {
     #[must_use]
     pub fn build(mut points: Vec<(Vec3, P)>) -> Self {
         let count = points.len();
-        points.retain(|(position, _)| position.is_finite());
+        if !points.par_iter().with_min_len(1 << 14).all(|(position, _)| position.is_finite()) {
+            points.retain(|(position, _)| position.is_finite());
+        }
         let dropped = count - points.len();
         let Some(&(_, payload)) = points.first() else {
             return Self { tree: PackedTree::EMPTY, blocks: Vec::new(), count: 0, dropped };
         };
         let empty = Block { position: [[f32::NAN; WIDTH]; 3], payload: [payload; WIDTH] };
         let bounds = |&(position, _): &Item<P>| (position, position);
-        let (tree, blocks) = PackedTree::build(&points, bounds, empty, |items| empty.with(items));
+        let (tree, blocks) = PackedTree::build(&points, bounds, empty, Block::fill);
         Self { tree, blocks, count: points.len(), dropped }
     }
 

@@ -93,13 +93,11 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
             let (piece, segment) = piece_of(item);
             bounds(segment, piece)
         };
-        let (tree, blocks) = PackedTree::build(&items, bounds, Block::EMPTY, |items| {
-            let mut block = Block::EMPTY;
+        let (tree, blocks) = PackedTree::build(&items, bounds, Block::EMPTY, |block, items| {
             for (lane, item) in items.iter().enumerate() {
                 let (piece, segment) = piece_of(item);
                 block.set(lane, piece, segment);
             }
-            block
         });
         let ends = segments.iter().flat_map(|(segment, _)| [segment.start, segment.end]);
         let reach = ends.fold(0.0, |reach: f32, end| reach.max(end.abs()));

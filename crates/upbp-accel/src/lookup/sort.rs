@@ -4,8 +4,13 @@
 //! of a sample: they put every item into a bucket in one pass, instead of moving all of them once a level. A bucket
 //! fits in the cache of a core and is split at exact medians. Neither depends on the number of threads.
 
-use glam::Vec3;
+use std::cmp::Ordering;
+
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
+
+use super::packed::WIDTH;
+use super::wide::{Task, Wide, run};
 
 /// Something with a place.
 pub(super) type Item<T> = (Vec3, T);
@@ -33,7 +38,7 @@ impl<T: Copy + Send + Sync> Buckets<T> {
     /// Sorts items into a power of eight buckets; neighbours in the list of buckets are neighbours in space.
     pub(super) fn new(items: &[Item<T>]) -> Self {
         let splitters = Splitters::new(items);
-        let buckets = splitters.0.len();
+        let buckets = splitters.buckets();
         let (chunks, starts): (Vec<_>, Vec<_>) =
             items.par_chunks(CHUNK).map(|chunk| splitters.sort(chunk)).unzip();
         let count = |bucket| {
@@ -53,82 +58,121 @@ impl<T: Copy + Send + Sync> Buckets<T> {
     }
 }
 
-/// A k-d tree over a sample: the children of split `i` are `2i` and `2i + 1`, the root is 1.
-struct Splitters(Vec<(f32, u32)>);
+/// Three levels of a k-d tree. Lane `i − 1` is split `i`: its children are `2i` and `2i + 1`, the root is 1. The planes
+/// of a lane are at infinity along all axes but one.
+#[derive(Clone, Copy)]
+struct Splits([[f32; WIDTH]; 3]);
+
+/// Where splits lead that have the point on their far side, one bit per lane: one to eight.
+const CHILDREN: [u8; 256] = {
+    let mut children = [0; 256];
+    let mut beyond = 0;
+    while beyond < 256 {
+        let second = 2 + (beyond & 1);
+        let third = 2 * second + (beyond >> (second - 1) & 1);
+        children[beyond] = (2 * third + (beyond >> (third - 1) & 1) + 1 - WIDTH) as u8;
+        beyond += 1;
+    }
+    children
+};
+
+/// A k-d tree over a sample: the children of node `i` follow `8i`, the root is 0.
+struct Splitters {
+    nodes: Vec<Splits>,
+    levels: u32,
+}
 
 impl Splitters {
     fn new<T: Copy>(items: &[Item<T>]) -> Self {
-        let mut buckets = 1;
-        while buckets * 8 * BUCKET <= items.len() {
-            buckets *= 8;
+        let (mut nodes, mut levels) = (0, 0);
+        while WIDTH.pow(levels + 1) * BUCKET <= items.len() {
+            nodes += WIDTH.pow(levels);
+            levels += 1;
         }
-        let mut splits = vec![(0.0, 0); buckets];
-        if buckets > 1 {
-            let (samples, count) = ((buckets * SAMPLES) as u64, items.len() as u64);
+        let mut splitters = Self { nodes: vec![Splits([[f32::INFINITY; WIDTH]; 3]); nodes], levels };
+        if levels > 0 {
+            let (samples, count) = ((splitters.buckets() * SAMPLES) as u64, items.len() as u64);
             let sampled = |i: u64| {
                 // Scattered: items may repeat with a period.
                 let scatter = i.wrapping_mul(0x9e37_79b9_7f4a_7c15) % count;
                 (items[((i * count + scatter) / samples) as usize].0, ())
             };
-            let mut sample: Vec<Item<()>> = (0..samples).map(sampled).collect();
-            Self::split(&mut splits, 1, &mut sample);
+            splitters.split(0, 1, &mut (0..samples).map(sampled).collect::<Vec<_>>());
         }
-        Self(splits)
+        splitters
     }
 
-    fn split(splits: &mut [(f32, u32)], index: usize, sample: &mut [Item<()>]) {
-        if index >= splits.len() {
-            return;
+    /// The number of buckets.
+    fn buckets(&self) -> usize {
+        WIDTH.pow(self.levels)
+    }
+
+    fn split(&mut self, node: usize, index: usize, sample: &mut [Item<()>]) {
+        if index >= WIDTH {
+            return self.split(WIDTH * node + 1 + index - WIDTH, 1, sample);
         }
-        let axis = widest_axis(sample).0;
+        let Some(splits) = self.nodes.get_mut(node) else { return };
+        let (min, max) = corners(sample);
+        let axis = (max - min).max_position();
         let middle = sample.len() / 2;
         select(sample, axis, middle);
         let (left, right) = sample.split_at_mut(middle);
-        splits[index] = (right[0].0[axis], axis as u32);
-        Self::split(splits, 2 * index, left);
-        Self::split(splits, 2 * index + 1, right);
-    }
-
-    /// The buckets of points. Several descend together: each has to wait for its memory.
-    fn buckets<T>(&self, items: &[Item<T>]) -> Vec<u32> {
-        const TOGETHER: usize = 16;
-        let last = self.0.len() - 1;
-        let mut buckets = Vec::with_capacity(items.len());
-        for items in items.chunks(TOGETHER) {
-            let mut points = [[0.0; 4]; TOGETHER];
-            for (point, item) in points.iter_mut().zip(items) {
-                *point = item.0.extend(0.0).to_array();
-            }
-            let mut places = [1_u32; TOGETHER];
-            for _ in 0..self.0.len().ilog2() {
-                for (place, point) in places.iter_mut().zip(&points) {
-                    let (split, axis) = self.0[*place as usize & last];
-                    *place = 2 * *place + u32::from(point[axis as usize & 3] >= split);
-                }
-            }
-            buckets.extend(places[..items.len()].iter().map(|place| place - self.0.len() as u32));
-        }
-        buckets
+        splits.0[axis][index - 1] = right[0].0[axis];
+        self.split(node, 2 * index, left);
+        self.split(node, 2 * index + 1, right);
     }
 
     fn sort<T: Copy>(&self, chunk: &[Item<T>]) -> (Vec<Item<T>>, Vec<u32>) {
-        let buckets = self.buckets(chunk);
-        let mut starts = vec![0_u32; self.0.len() + 1];
-        for &bucket in &buckets {
-            starts[bucket as usize] += 1;
-        }
+        let mut starts = vec![0_u32; self.buckets() + 1];
+        let mut buckets = vec![0; chunk.len()];
+        run(Descent { splitters: self, items: chunk, buckets: &mut buckets, counts: &mut starts });
         let mut sum = 0;
         for start in &mut starts {
             sum += *start;
             *start = sum;
         }
-        let mut sorted = chunk.to_vec();
-        for (item, &bucket) in chunk.iter().zip(&buckets).rev() {
+        // Places in a chunk are moved, instead of items, as long as there is something to move them to.
+        let mut order = vec![0_u16; chunk.len()];
+        for (index, &bucket) in buckets.iter().enumerate().rev() {
             let start = &mut starts[bucket as usize];
             *start -= 1;
-            sorted[*start as usize] = *item;
+            order[*start as usize] = index as u16;
         }
-        (sorted, starts)
+        (order.into_iter().map(|index| chunk[index as usize]).collect(), starts)
+    }
+}
+
+/// Finds the buckets of items, and counts how many each has.
+struct Descent<'a, T> {
+    splitters: &'a Splitters,
+    items: &'a [Item<T>],
+    buckets: &'a mut [u32],
+    counts: &'a mut [u32],
+}
+
+impl<T> Task for Descent<'_, T> {
+    #[inline(always)]
+    fn run(self, wide: impl Wide) {
+        /// Each has to wait for its memory.
+        const TOGETHER: usize = 16;
+        let nodes = &self.splitters.nodes[..];
+        for (buckets, items) in self.buckets.chunks_mut(TOGETHER).zip(self.items.chunks(TOGETHER)) {
+            let mut places = [0_u32; TOGETHER];
+            for _ in 0..self.splitters.levels {
+                for (place, item) in places.iter_mut().zip(items) {
+                    let [x, y, z] = wide.splat3(item.0.to_array());
+                    let [splits_x, splits_y, splits_z] = wide.load3(&nodes[*place as usize].0);
+                    let beyond = wide.less_equal(splits_x, x)
+                        | wide.less_equal(splits_y, y)
+                        | wide.less_equal(splits_z, z);
+                    *place = 8 * *place + u32::from(CHILDREN[(beyond & 0xff) as usize]);
+                }
+            }
+            for (bucket, place) in buckets.iter_mut().zip(places) {
+                *bucket = place - nodes.len() as u32;
+                self.counts[*bucket as usize] += 1;
+            }
+        }
     }
 }
 
@@ -138,18 +182,14 @@ pub(super) fn split<T: Copy + Send>(items: &mut [Item<T>], capacity: usize) {
     if parts <= 1 {
         return;
     }
-    let (axis, extent) = widest_axis(items);
-    if extent == 0.0 {
+    let (min, max) = corners(items);
+    let axis = (max - min).max_position();
+    if min[axis] == max[axis] {
         // All the same: any order will do.
         return;
     }
     let middle = parts.div_ceil(2) * capacity;
-    match items.len() {
-        0..=16 => sort_few::<16, T>(items, axis, extent),
-        17..=32 => sort_few::<32, T>(items, axis, extent),
-        33..=64 => sort_few::<64, T>(items, axis, extent),
-        _ => select(items, axis, middle),
-    }
+    select(items, axis, middle);
     // A bucket of many items that are all but the same need not be left to one thread.
     let parallel = items.len() > CHUNK;
     let (left, right) = items.split_at_mut(middle);
@@ -161,16 +201,72 @@ pub(super) fn split<T: Copy + Send>(items: &mut [Item<T>], capacity: usize) {
     }
 }
 
-/// Sorts up to `N` items, at most 64, along an axis by counting for each how many come before: there is nothing to
-/// mispredict. Items nearer than 2⁻²⁴ of the extent keep their order.
-fn sort_few<const N: usize, T: Copy>(items: &mut [Item<T>], axis: usize, extent: f32) {
-    let first = items.iter().fold(f32::INFINITY, |first, item| first.min(item.0[axis]));
-    let scale = (1 << 24) as f32 / extent;
-    let mut keys = [i32::MAX; N];
-    for (index, (key, item)) in keys.iter_mut().zip(&*items).enumerate() {
+/// Sorts up to 64 items so that every run of eight is compact.
+pub(super) fn split_few<T: Copy>(items: &mut [Item<T>]) {
+    run(SplitFew(items));
+}
+
+struct SplitFew<'a, T>(&'a mut [Item<T>]);
+
+impl<T: Copy> Task for SplitFew<'_, T> {
+    #[inline(always)]
+    fn run(self, _: impl Wide) {
+        let Some(&first) = self.0.first() else { return };
+        let mut copy = [first; 64];
+        let copy = &mut copy[..self.0.len()];
+        // To and fro.
+        for half in halves::<64, T>(self.0, copy) {
+            for quarter in halves::<32, T>(half.to, half.from) {
+                halves::<16, T>(quarter.to, quarter.from);
+            }
+        }
+        self.0.copy_from_slice(copy);
+    }
+}
+
+/// Where items were and where they are now.
+struct Moved<'a, T> {
+    from: &'a mut [Item<T>],
+    to: &'a mut [Item<T>],
+}
+
+impl<T> Moved<'_, T> {
+    #[inline(always)]
+    fn halves(self, middle: usize) -> [Self; 2] {
+        let (from, to) = (self.from.split_at_mut(middle), self.to.split_at_mut(middle));
+        [Self { from: from.0, to: to.0 }, Self { from: from.1, to: to.1 }]
+    }
+}
+
+/// Splits up to `N` items, at most 64, as [`split`] does into runs of eight, by counting for each how many come before:
+/// there is nothing to mispredict. Items nearer than 2⁻²³ of the extent keep their order.
+#[inline(always)]
+fn halves<'a, const N: usize, T: Copy>(
+    items: &'a mut [Item<T>],
+    sorted: &'a mut [Item<T>],
+) -> [Moved<'a, T>; 2] {
+    /// Between this and twice as much, numbers have a distance of one, and their last bits count from here.
+    const WHOLE: f32 = (1 << 23) as f32;
+    let parts = items.len().div_ceil(WIDTH);
+    let middle = parts.div_ceil(2) * WIDTH;
+    if parts <= 1 {
+        sorted.copy_from_slice(items);
+        let middle = items.len();
+        return Moved { from: items, to: sorted }.halves(middle);
+    }
+    let (min, max) = corners(items);
+    let axis = (max - min).max_position();
+    let scale = WHOLE / (max[axis] - min[axis]);
+    let mut places = [0.0; N];
+    for (place, item) in places.iter_mut().zip(&*items) {
+        *place = item.0[axis];
+    }
+    let mut keys = [0; N];
+    for (index, (key, place)) in keys.iter_mut().zip(&places).enumerate() {
+        let place = (place - min[axis]) * scale;
         // In range even if the difference or the scale is not.
-        let place = ((item.0[axis] - first) * scale).min((1 << 24) as f32) as i32;
-        *key = place << 6 | i32::from(index as u8);
+        let place = if place < WHOLE - 1.0 { place } else { WHOLE - 1.0 };
+        *key = ((place + WHOLE).to_bits() << 8 >> 2 | u32::from(index as u8)).cast_signed();
     }
     let mut ranks = [0_i32; N];
     for &other in &keys[..items.len()] {
@@ -178,17 +274,18 @@ fn sort_few<const N: usize, T: Copy>(items: &mut [Item<T>], axis: usize, extent:
             *rank += i32::from(other < key);
         }
     }
-    let mut sorted = [items[0]; N];
     for (item, &rank) in items.iter().zip(&ranks) {
-        sorted[rank as usize & (N - 1)] = *item;
+        sorted[rank as usize] = *item;
     }
-    items.copy_from_slice(&sorted[..items.len()]);
+    Moved { from: items, to: sorted }.halves(middle)
 }
 
 /// Moves the `middle` least items along an axis to the front.
 fn select<T>(items: &mut [Item<T>], axis: usize, middle: usize) {
     fn along<const AXIS: usize, T>(items: &mut [Item<T>], middle: usize) {
-        items.select_nth_unstable_by(middle, |a, b| a.0[AXIS].total_cmp(&b.0[AXIS]));
+        items.select_nth_unstable_by(middle, |a, b| {
+            a.0[AXIS].partial_cmp(&b.0[AXIS]).unwrap_or(Ordering::Equal)
+        });
     }
     match axis {
         0 => along::<0, T>(items, middle),
@@ -197,12 +294,24 @@ fn select<T>(items: &mut [Item<T>], axis: usize, middle: usize) {
     }
 }
 
-/// The axis along which items extend most, and how far they do.
-fn widest_axis<T>(items: &[Item<T>]) -> (usize, f32) {
-    let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for item in items {
-        (min, max) = (min.min(item.0), max.max(item.0));
+/// The corners of the box around items. Several boxes grow by turns, none waits for the last item.
+#[inline(always)]
+fn corners<T>(items: &[Item<T>]) -> (Vec3, Vec3) {
+    const BY_TURNS: usize = 4;
+    // Four numbers are one vector, three are not.
+    let (mut min, mut max) = ([Vec4::INFINITY; BY_TURNS], [Vec4::NEG_INFINITY; BY_TURNS]);
+    let mut grow = |items: &[Item<T>]| {
+        for ((min, max), item) in min.iter_mut().zip(&mut max).zip(items) {
+            let place = item.0.extend(0.0);
+            (*min, *max) = (min.min(place), max.max(place));
+        }
+    };
+    let (turns, rest) = items.as_chunks::<BY_TURNS>();
+    for turn in turns {
+        grow(turn);
     }
-    let extent = max - min;
-    (extent.max_position(), extent.max_element())
+    grow(rest);
+    let least = min.into_iter().reduce(Vec4::min).unwrap_or_default();
+    let greatest = max.into_iter().reduce(Vec4::max).unwrap_or_default();
+    (least.truncate(), greatest.truncate())
 }
