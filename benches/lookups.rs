@@ -336,6 +336,12 @@ fn ends(segment: &Segment) -> (Vec3, Vec3) {
     (a.min(b), a.max(b))
 }
 
+/// As the renderer builds it.
+fn beam_tree(segments: Vec<(Segment, u32)>) -> SegmentTree<u32> {
+    let split = SplitParams::choose(&segments);
+    SegmentTree::build(segments, split)
+}
+
 fn beam_grid(segments: &[(Segment, u32)], radius: f32, resolution: f32) -> Box<dyn Fn(&Ray) -> usize + '_> {
     let grid = BeamGrid::build(segments, radius, resolution);
     Box::new(move |ray| {
@@ -350,7 +356,7 @@ fn beam(criterion: &mut Criterion) {
     let question = Question {
         name: "beam",
         elements: segments,
-        build: |segments| SegmentTree::build(segments, SplitParams::default()),
+        build: beam_tree,
         queries: rays::<256>,
         tree: |tree, ray, radius| {
             let mut count = 0;
@@ -408,8 +414,7 @@ fn build(criterion: &mut Criterion) {
             }
             let list = LazyCell::new(|| segments(elements, spread));
             group.bench_function(id("segments/tree"), |bencher| {
-                let build = |list| SegmentTree::build(list, SplitParams::default());
-                bencher.iter_batched(|| list.clone(), build, BatchSize::PerIteration);
+                bencher.iter_batched(|| list.clone(), beam_tree, BatchSize::PerIteration);
             });
         }
     }

@@ -201,6 +201,30 @@ fn the_number_of_pieces_is_bounded() {
 }
 
 #[test]
+fn beams_are_split_where_it_pays() {
+    let mut random = Random::new(7);
+    let mut beams = |count, lamp: Option<Vec3>| -> Vec<(Segment, ())> {
+        let origins = positions(Spread::Uniform, count, 1.0, Vec3::ZERO, &mut random);
+        let mut beam = |origin| Segment { origin, direction: random.direction(), start: 0.0, end: 1.0 };
+        origins.into_iter().map(|origin| (beam(lamp.unwrap_or(origin)), ())).collect()
+    };
+    let whole = SplitParams { pieces_per_segment: 1.0, ..SplitParams::default() };
+    assert_eq!(SplitParams::choose(&beams(10_000, None)), SplitParams::default());
+    let mut from_one_point = beams(10_000, Some(Vec3::ONE));
+    assert_eq!(SplitParams::choose(&from_one_point), whole);
+    // Those that will be dropped do not matter.
+    for (beam, ()) in from_one_point.iter_mut().step_by(3) {
+        beam.end = f32::NAN;
+    }
+    assert_eq!(SplitParams::choose(&from_one_point), whole);
+    for (beam, ()) in &mut from_one_point {
+        beam.end = f32::NAN;
+    }
+    assert_eq!(SplitParams::choose(&from_one_point), SplitParams::default());
+    assert_eq!(SplitParams::choose::<()>(&[]), SplitParams::default());
+}
+
+#[test]
 fn empty_and_extreme_queries_are_answered() {
     let ray = Ray::new(Vec3::new(0.1, 0.2, 0.3), Vec3::X).with_range(-1e3, 1e3);
     let none = tree(&[], 8.0);

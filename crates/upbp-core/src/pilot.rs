@@ -116,6 +116,7 @@ pub(crate) fn run<S: Scene>(
     let (on_surfaces, in_media) =
         (|site: &Site<_>| matches!(site, Site::Surface(_)), |site: &Site<_>| matches!(site, Site::Medium(_)));
     let (surface, medium) = (photons(near.0, on_surfaces), photons(near.0, in_media));
+    // Split in any case: so memory is enough whether or not the beams of an iteration are.
     let beams = SegmentTree::build(
         light.beams.iter().map(|beam| (beam.segment, ())).collect(),
         SplitParams::default(),

@@ -30,8 +30,9 @@ impl<B: Copy + Send + Sync, D: Densities> LightMap<B, D> {
         };
         let surface = photons(plan.mis.surf > 0.0, |site| matches!(site, Site::Surface(_)));
         let medium = photons(plan.stores_medium_photons(), |site| matches!(site, Site::Medium(_)));
-        let segments = beams.iter().enumerate().map(|(i, b)| (b.segment, i as u32)).collect();
-        let beam_tree = SegmentTree::build(segments, SplitParams::default());
+        let segments: Vec<_> = beams.iter().enumerate().map(|(i, b)| (b.segment, i as u32)).collect();
+        let split = SplitParams::choose(&segments);
+        let beam_tree = SegmentTree::build(segments, split);
         Self { vertices, beams, surface, medium, beam_tree }
     }
 

@@ -1,5 +1,7 @@
 //! Segments, looked up around a ray (BB1D) or around a point (BP2D).
 
+use std::cell::Cell;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -126,6 +128,82 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
         }
         let probe = BallProbe::widened(point, radius, self.tree.extent_from(point) + self.reach);
         self.tree.ask(AroundPoint { segments: self, probe, point, radius2: radius * radius, visit });
+    }
+}
+
+impl SplitParams {
+    /// Of so many segments, one is looked at.
+    const SAMPLED: usize = 16;
+
+    /// Segments that are looked at, at least and at most: fewer tell nothing, more tell nothing new.
+    const SAMPLE: (usize, usize) = (64, 1024);
+
+    /// Rays that ask among them.
+    const RAYS: usize = 128;
+
+    /// The default, or no split where that looks better: among beams through one place, whose pieces lie there together, and
+    /// all the more the fewer they are.
+    ///
+    /// Decided by how many boxes and blocks some rays between segments have to look at, with and without a split of a sample;
+    /// depends on nothing but the segments.
+    #[must_use]
+    pub fn choose<P>(segments: &[(Segment, P)]) -> Self {
+        let (least, most) = Self::SAMPLE;
+        let (split, whole) = (Self::default(), Self { pieces_per_segment: 1.0, ..Self::default() });
+        let count = (segments.len() / Self::SAMPLED).min(most);
+        if count < least {
+            return split;
+        }
+        // Scattered: segments may repeat with a period.
+        let scattered =
+            |i: usize, count: usize| ((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % count;
+        let stride = segments.len() / count;
+        let sampled = |i: usize| (segments[i * stride + scattered(i, stride)].0, ());
+        let sample: Vec<_> = (0..count).map(sampled).filter(|(segment, ())| segment.is_usable()).collect();
+        let place = |i: usize| {
+            let segment = sample.get(scattered(i, count))?.0;
+            let part = (scattered(i + 1, 256) as f32 + 0.5) / 256.0;
+            Some(segment.at(segment.start + (segment.end - segment.start) * part))
+        };
+        let ray = |i: usize| {
+            let (a, b) = (place(2 * i)?, place(2 * i + 1)?);
+            Some(Ray::new(a, (b - a).try_normalize()?).with_range(f32::NEG_INFINITY, f32::INFINITY))
+        };
+        let rays: Vec<_> = (0..Self::RAYS).filter_map(ray).collect();
+        let effort = |params| SegmentTree::build(sample.clone(), params).effort(&rays) as f64;
+        // Pieces gain about so much more among more segments, and have to gain so much as they take more memory.
+        let more = (segments.len() as f64 / count as f64).powf(0.1);
+        if effort(whole) * more >= effort(split) * 1.45 { split } else { whole }
+    }
+}
+
+/// Counts what is in the way of rays without width.
+struct Effort<'a> {
+    probe: RayProbe,
+    total: &'a Cell<u64>,
+}
+
+impl Query for Effort<'_> {
+    #[inline(always)]
+    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
+        self.total.set(self.total.get() + 1);
+        self.probe.test(wide, boxes)
+    }
+
+    #[inline(always)]
+    fn blocks<W: Wide>(&mut self, _: W, blocks: &[u32]) {
+        self.total.set(self.total.get() + 2 * blocks.len() as u64);
+    }
+}
+
+impl<P> SegmentTree<P> {
+    /// The number of nodes and leaves that rays without width have to look at, and twice that of blocks.
+    fn effort(&self, rays: &[Ray]) -> u64 {
+        let total = Cell::new(0);
+        for ray in rays {
+            self.tree.ask(Effort { probe: RayProbe::new(ray, 0.0, 0.0), total: &total });
+        }
+        total.get()
     }
 }
 
