@@ -9,7 +9,6 @@ use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
 use super::boxes::{Bounds, Boxes, Exact, union};
-use super::probe::lanes;
 use super::sort::{Buckets, Item, split, split_few};
 use super::wide::{Task, Wide, run};
 
@@ -214,14 +213,34 @@ struct List {
     len: usize,
 }
 
+/// The lanes whose bit is set, by the bits.
+const LANES: [[u8; WIDTH]; 256] = {
+    let mut lanes = [[0; WIDTH]; 256];
+    let mut bits = 0;
+    while bits < 256 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < WIDTH {
+            if bits >> lane & 1 == 1 {
+                lanes[bits][count] = lane as u8;
+                count += 1;
+            }
+            lane += 1;
+        }
+        bits += 1;
+    }
+    lanes
+};
+
 impl List {
-    /// Adds those after `first` whose bit is set.
+    /// Adds those after `first` whose bit is set; there has to be room for all. Nothing can be mispredicted.
     #[inline(always)]
     fn extend(&mut self, first: u32, bits: u32) {
-        for lane in lanes(bits) {
-            self.indices[self.len] = first + lane as u32;
-            self.len += 1;
+        let lanes = &LANES[(bits & 0xff) as usize];
+        let room = &mut self.indices[self.len..][..WIDTH];
+        for (to, &lane) in room.iter_mut().zip(lanes) {
+            *to = first + u32::from(lane);
         }
+        self.len += (bits & 0xff).count_ones() as usize;
     }
 
     /// Whether not all lanes of another node have room.
