@@ -42,23 +42,23 @@ impl LightCounts {
         const NODES: f64 = 256.0 / 512.0 * 8.0 / 7.0;
         const POINT_BOXES: f64 = 1.0 + NODES;
         const PIECE_BOXES: f64 = 3.0 + NODES;
-        /// A position with its payload: given to be sorted, sorted into buckets, and in its place in the tree.
+        /// A position with its payload: sorted into buckets, and before that given to be sorted, after that in its place in the
+        /// tree.
         const POINT: f64 = 16.0;
         /// A segment with its payload.
         const SEGMENT: f64 = 36.0;
-        /// A piece of one; its centre and index, given to be sorted and sorted into buckets; its place in the tree.
+        /// A piece of one; its centre and index, sorted into buckets; its place in the tree.
         const PIECE: f64 = 12.0;
         const CENTRE: f64 = 16.0;
         const PLACED: f64 = 40.0;
         let held =
             self.vertices * size_of::<LightVertex<B>>() as f64 + self.beams * size_of::<PhotonBeam>() as f64;
-        // What is sorted is kept until the tree is there.
-        let (building, tree) = (3.0 * POINT + POINT_BOXES, POINT + POINT_BOXES);
+        // Buckets are kept until the tree is there.
+        let (building, tree) = (2.0 * POINT + POINT_BOXES, POINT + POINT_BOXES);
         let surface = self.surface * building;
         let medium = self.surface * tree + self.medium * building;
         let points = (self.surface + self.medium) * tree;
-        let beams =
-            points + self.beams * SEGMENT + self.pieces * (PIECE + 2.0 * CENTRE + PLACED + PIECE_BOXES);
+        let beams = points + self.beams * SEGMENT + self.pieces * (PIECE + CENTRE + PLACED + PIECE_BOXES);
         held + surface.max(medium).max(beams)
     }
 }

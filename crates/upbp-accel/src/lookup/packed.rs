@@ -67,9 +67,10 @@ impl<L: Boxes> PackedTree<L> {
         Self { nodes: Vec::new(), leaves: Vec::new(), bounds: (Vec3::ZERO, Vec3::ZERO) };
 
     /// Builds over items at finite places with the given finite bounds, and packs up to eight items at a time
-    /// into an `empty` block; the leaves that are not full have some that stay empty.
+    /// into an `empty` block; the leaves that are not full have some that stay empty. Items are let go as soon as they are
+    /// sorted into buckets, before there are blocks.
     pub(super) fn build<T: Copy + Send + Sync, B: Copy + Send + Sync>(
-        items: &[Item<T>],
+        items: Vec<Item<T>>,
         bounds: impl Fn(&Item<T>) -> Bounds + Sync,
         empty: B,
         fill: impl Fn(&mut B, &[Item<T>]) + Sync,
@@ -96,7 +97,9 @@ impl<L: Boxes> PackedTree<L> {
             }
             branch
         });
-        (Self::join(&branches.collect::<Vec<_>>()), blocks)
+        let branches: Vec<_> = branches.collect();
+        drop(buckets);
+        (Self::join(&branches), blocks)
     }
 
     /// Puts branches under common nodes, eight at a time.

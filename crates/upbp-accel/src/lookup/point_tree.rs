@@ -59,8 +59,8 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         };
         let empty = Block { position: [[f32::NAN; WIDTH]; 3], payload: [payload; WIDTH] };
         let bounds = |&(position, _): &Item<P>| (position, position);
-        let (tree, blocks) = PackedTree::build(&points, bounds, empty, Block::fill);
-        Self { tree, blocks, count: points.len(), dropped }
+        let (tree, blocks) = PackedTree::build(points, bounds, empty, Block::fill);
+        Self { tree, blocks, count: count - dropped, dropped }
     }
 
     /// Visits every point nearer than `radius` to `centre`, with the squared distance.

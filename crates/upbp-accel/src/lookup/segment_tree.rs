@@ -95,7 +95,7 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
             let (piece, segment) = piece_of(item);
             bounds(segment, piece)
         };
-        let (tree, blocks) = PackedTree::build(&items, bounds, Block::EMPTY, |block, items| {
+        let (tree, blocks) = PackedTree::build(items, bounds, Block::EMPTY, |block, items| {
             for (lane, item) in items.iter().enumerate() {
                 let (piece, segment) = piece_of(item);
                 block.set(lane, piece, segment);

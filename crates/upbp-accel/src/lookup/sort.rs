@@ -36,11 +36,12 @@ pub(super) struct Buckets<T> {
 
 impl<T: Copy + Send + Sync> Buckets<T> {
     /// Sorts items into a power of eight buckets; neighbours in the list of buckets are neighbours in space.
-    pub(super) fn new(items: &[Item<T>]) -> Self {
-        let splitters = Splitters::new(items);
+    pub(super) fn new(items: Vec<Item<T>>) -> Self {
+        let splitters = Splitters::new(&items);
         let buckets = splitters.buckets();
         let (chunks, starts): (Vec<_>, Vec<_>) =
             items.par_chunks(CHUNK).map(|chunk| splitters.sort(chunk)).unzip();
+        drop(items);
         let count = |bucket| {
             starts.iter().map(|starts: &Vec<u32>| (starts[bucket + 1] - starts[bucket]) as usize).sum()
         };
