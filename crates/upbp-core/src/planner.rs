@@ -65,7 +65,10 @@ impl Planner {
                         None => BEAM_PATHS.into_iter().filter(fits).collect(),
                         Some(_) => vec![1.0],
                     },
-                    roulettes: 0..if settings.roulette.is_some() { 1 } else { roulette::COUNT },
+                    roulettes: match settings.roulette {
+                        Some(_) => roulette::TRIAL..roulette::TRIAL + 1,
+                        None => 0..roulette::COUNT,
+                    },
                 },
                 most_paths: emitters::light_paths(pilot.vertices_per_path),
                 timed: !settings.deterministic,

@@ -8,6 +8,7 @@
 use upbp_estimators::Technique;
 
 use super::recorder::TECHNIQUES;
+use super::roulette::TRIAL;
 use super::search::Candidate;
 use super::trial::{Trial, Work};
 use super::watch::WALK;
@@ -54,12 +55,12 @@ impl Costs {
         };
         let ratio = |measured: f64, model: f64| (measured / model).clamp(0.1, 10.0);
         if let Some(time) = work.camera_time {
-            costs.camera_walk = ratio(time[WALK], work.camera_edges[0] * EDGE[0]);
+            costs.camera_walk = ratio(time[WALK], work.camera_edges[TRIAL] * EDGE[0]);
             for technique in Technique::ALL {
                 let i = technique as usize;
                 // The trial has fewer photons than the plan.
-                let calls = work.calls[i][0];
-                let seen = work.samples[i][0] * trial.thinning(technique);
+                let calls = work.calls[i][TRIAL];
+                let seen = work.samples[i][TRIAL] * trial.thinning(technique);
                 if technique != Technique::LightTracing && calls > LEAST && TURN[i] > 0.0 {
                     costs.techniques[i] = ratio(time[i], calls * TURN[i] + seen * SAMPLE[i]);
                 }
@@ -70,7 +71,7 @@ impl Costs {
         {
             costs.light_walk = ratio(walk, work.light_edges * EDGE[1] + work.vertices * STORE);
             let i = Technique::LightTracing as usize;
-            let calls = work.calls[i][0];
+            let calls = work.calls[i][TRIAL];
             if calls > LEAST {
                 costs.techniques[i] = ratio(splats, calls * TURN[i]);
             }

@@ -2,17 +2,19 @@
 
 use upbp_estimators::Roulette;
 
-/// Thresholds: first the one that a trial runs with, from which what the others would do is predicted.
-const TRIED: [f32; COUNT] = [0.5, 0.25, 0.7, 1.0];
+/// Thresholds, ascending.
+const TRIED: [f32; COUNT] = [0.25, 0.5, 0.7, 1.0];
 /// Their number.
 pub(crate) const COUNT: usize = 4;
+/// The one that a trial runs with, from which what the others would do is predicted.
+pub(crate) const TRIAL: usize = 1;
 
 /// What a trial runs with, unless another roulette is asked for. Then nothing else is tried.
-pub(crate) const OF_TRIAL: Roulette = Roulette::Below(TRIED[0]);
+pub(crate) const OF_TRIAL: Roulette = Roulette::Below(TRIED[TRIAL]);
 
-/// A roulette by its number; 0 is the trial's.
+/// A roulette by its number.
 pub(crate) fn numbered(number: usize, of_trial: Roulette) -> Roulette {
-    if number == 0 { of_trial } else { Roulette::Below(TRIED[number]) }
+    if number == TRIAL { of_trial } else { Roulette::Below(TRIED[number]) }
 }
 
 /// How many camera sub-paths get past vertices with this product of albedos, relative to the trial's.

@@ -8,6 +8,7 @@ use upbp_estimators::{Technique, TechniqueSet};
 use super::cost::Costs;
 use super::prediction::{Counts, GROUPS, Prediction};
 use super::recorder::TECHNIQUES;
+use super::roulette::TRIAL;
 
 /// A plan that may be chosen. Numbers of sub-paths are relative to the trial's plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +35,7 @@ pub(crate) struct Bounds {
     pub(crate) light_paths: Vec<f64>,
     /// The same of those with photon beams.
     pub(crate) beam_paths: Vec<f64>,
-    /// Numbers of roulettes.
+    /// Numbers of roulettes, ascending.
     pub(crate) roulettes: Range<usize>,
 }
 
@@ -49,7 +50,7 @@ impl Candidate {
             light_paths: 1.0,
             beam_paths: 1.0,
             seldom: TechniqueSet::EMPTY,
-            roulette: 0,
+            roulette: TRIAL,
         }
     }
 
@@ -165,15 +166,24 @@ pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain
                 None => break,
             }
         }
-        // After all else: each roulette takes several times as long to predict as the trial's own.
-        let roulettes = bounds.roulettes.clone().map(|roulette| Candidate { roulette, ..at.candidate });
-        let all = judge.judge(&roulettes.collect::<Vec<_>>());
-        at = all.into_iter().min_by(|a, b| a.product().total_cmp(&b.product())).unwrap_or(at);
+        at = with_roulette(&mut judge, at, bounds);
         if best.is_none_or(|best| at.product() < gain * best.product()) {
             best = Some(at);
         }
     }
     insured(best.map_or(everything, |best| best.candidate), costs, bounds)
+}
+
+/// The same with the roulette that ends least walks of those that are nearly as good as the best. Random numbers of camera sub-paths are
+/// stratified, which trials do not know of: it makes all that does not come from roulette smaller.
+///
+/// After all else, since each takes several times as long to predict as the trial's own.
+fn with_roulette(judge: &mut Judge<'_>, at: Judged, bounds: &Bounds) -> Judged {
+    const NEARLY: f64 = 1.05;
+    let with = |roulette| Candidate { roulette, ..at.candidate };
+    let all = judge.judge(&bounds.roulettes.clone().map(with).collect::<Vec<_>>());
+    let least = all.iter().map(Judged::product).fold(f64::INFINITY, f64::min);
+    all.into_iter().find(|judged| judged.product() <= NEARLY * least).unwrap_or(at)
 }
 
 /// A candidate with what may find light that the trial missed, if it has light sub-paths: on all camera sub-paths where this costs

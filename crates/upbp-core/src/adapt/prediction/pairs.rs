@@ -4,7 +4,7 @@ use glam::DVec3;
 use upbp_estimators::{Technique, TechniqueSet};
 
 use super::super::recorder::{Sample, TECHNIQUES};
-use super::super::roulette::relative_reach;
+use super::super::roulette::{TRIAL, relative_reach};
 use super::super::trial::Trial;
 use super::Counts;
 
@@ -49,7 +49,7 @@ impl<'a> Looks<'a> {
     /// A look at samples, which come after the given albedos, descending.
     pub(super) fn look(&self, samples: &[Sample], levels: &[f32]) -> Look {
         let mut look = self.after(samples, f32::INFINITY);
-        if self.counts.roulette > 0 {
+        if self.counts.roulette != TRIAL {
             // A pair is there as often as the sub-path gets to the deeper of both, and each weighs as if it was as often as the
             // sub-path gets to it: by the less deep one, pairs count more or less than in the trial.
             let mut before = 1.0;
@@ -106,7 +106,7 @@ impl<'a> Looks<'a> {
     #[inline]
     fn per_reach(&self, albedos: f32) -> f64 {
         match self.counts.roulette {
-            0 => 1.0,
+            TRIAL => 1.0,
             roulette => f64::from(relative_reach(roulette, albedos)).recip(),
         }
     }

@@ -4,7 +4,7 @@ use glam::Vec3;
 use upbp_estimators::Technique;
 use upbp_estimators::scene::PixelRect;
 
-use super::super::roulette::{COUNT, OF_TRIAL, numbered};
+use super::super::roulette::{COUNT, OF_TRIAL, TRIAL, numbered};
 use super::super::trial::Work;
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
@@ -66,8 +66,12 @@ fn variances_are_those_of_the_estimators() {
     // The picture is 1 everywhere.
     let relative = 1.0 / (1.0 + DARKNESS);
     for (hit, connect) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-        let mut counts =
-            Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES], roulette: 0 };
+        let mut counts = Counts {
+            relative: [0.0; TECHNIQUES],
+            paths: [1.0; 2],
+            look_ups: [1.0; TECHNIQUES],
+            roulette: TRIAL,
+        };
         counts.relative[Technique::Hit as usize] = hit;
         counts.relative[Technique::Connect as usize] = connect;
         // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n.
@@ -122,7 +126,7 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
             relative: [0.0; TECHNIQUES],
             paths: [paths; 2],
             look_ups: [1.0; TECHNIQUES],
-            roulette: 0,
+            roulette: TRIAL,
         };
         counts.relative[Technique::Pb2d as usize] = paths;
         let found: f64 = prediction.relative_variance(&counts).iter().sum();
@@ -135,7 +139,7 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
 #[test]
 fn variances_know_where_walks_end() {
     const ALBEDO: f32 = 0.3;
-    let reached = numbered(0, OF_TRIAL).reach(ALBEDO);
+    let reached = OF_TRIAL.reach(ALBEDO);
     let mut shares = [0.0; TECHNIQUES];
     shares[Technique::Hit as usize] = 1.0;
     let (mut samples, mut ends) = (Vec::new(), Vec::new());
@@ -176,7 +180,7 @@ fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
     let prediction =
         Prediction::new(trial, &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE));
     let mut counts =
-        Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES], roulette: 0 };
+        Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES], roulette: TRIAL };
     counts.relative[Technique::Hit as usize] = 1.0;
     assert!(prediction.relative_variance(&counts).iter().sum::<f64>().is_infinite());
 }
