@@ -67,6 +67,11 @@ fn light_that_only_merges_find_is_not_lost() {
     }
 }
 
+fn mean_of(pixels: &[[f32; 3]]) -> DVec3 {
+    let sum: DVec3 = pixels.iter().map(|p| DVec3::from(p.map(f64::from))).sum();
+    sum / pixels.len() as f64
+}
+
 /// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.
 ///
 /// Kernels have a fifth of their usual width: at first they blur 0.2 % of the light out of the medium of one of the scenes, whoever chose
@@ -77,11 +82,7 @@ fn unbiased(name: &str, folder: &str) {
     let scene = shipped(&format!("{folder}/{name}"));
     let data = if folder == "suite" { "suite" } else { "references" };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/data/{data}/{name}.exr"));
-    let mean = |pixels: &[[f32; 3]]| {
-        let sum: DVec3 = pixels.iter().map(|p| DVec3::from(p.map(f64::from))).sum();
-        sum / pixels.len() as f64
-    };
-    let expected = mean(&read_exr(&path).expect("a reference").pixels);
+    let expected = mean_of(&read_exr(&path).expect("a reference").pixels);
     let narrow = Radius::Scene(6e-4);
     let radii = Radii { surf: narrow, pp3d: narrow, pb2d: narrow, bp2d: narrow, bb1d: narrow };
     let mut plans = Vec::new();
@@ -92,7 +93,7 @@ fn unbiased(name: &str, folder: &str) {
                 std::ops::ControlFlow::Continue(())
             });
             plans.push(renderer.report().plan.stages()[0].to_string());
-            mean(&renderer.film().image().pixels)
+            mean_of(&renderer.film().image().pixels)
         })
         .collect();
     let n = SEEDS as f64;
@@ -117,6 +118,35 @@ fn no_bias_in_fog() {
 #[test]
 fn no_bias_in_a_forward_scattering_box() {
     unbiased("forward_hg_box", "reference");
+}
+
+/// A render by the plan that its own seed has chosen against one by the plan of the next seed, with kernels of the usual width: plans of all
+/// seeds blur alike on average, so that what is left is what a plan and the samples that it serves have to do with each other.
+#[test]
+fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
+    const SEEDS: u64 = 16;
+    let scene = shipped("reference/forward_hg_box");
+    let plans: Vec<RenderPlan> = (0..=SEEDS)
+        .map(|seed| renderer(&scene, Settings { seed, ..settings() }).report().plan.clone())
+        .collect();
+    let render = |seed, plan: &RenderPlan| {
+        let settings = Settings { seed, ..settings() }.validate().expect("valid settings");
+        let mut renderer = Renderer::with_plan(&scene, settings, plan.clone()).expect("a plan of this scene");
+        for _ in 0..8 {
+            assert!(renderer.iterate());
+        }
+        mean_of(&renderer.film().image().pixels)
+    };
+    let pairs = plans.windows(2).zip(0..);
+    let differences: Vec<DVec3> =
+        pairs.map(|(plans, seed)| render(seed, &plans[0]) - render(seed, &plans[1])).collect();
+    assert!(differences.iter().any(|d| *d != DVec3::ZERO), "all seeds choose the same");
+    let n = SEEDS as f64;
+    let found = differences.iter().sum::<DVec3>() / n;
+    let variance = differences.iter().map(|d| (*d - found).powf(2.0)).sum::<DVec3>() / (n - 1.0);
+    let sigmas = found / (variance / n).map(f64::sqrt);
+    println!("own plan less another's: {found:.6}, {sigmas:.2} sigma");
+    assert!(sigmas.abs().cmple(DVec3::splat(4.0)).all(), "{found}, {sigmas}");
 }
 
 #[test]
