@@ -23,6 +23,11 @@ impl Estimate {
         Self { mean, error: (variance / n).sqrt() }
     }
 
+    /// A value that is known.
+    pub(crate) const fn exactly(mean: f64) -> Self {
+        Self { mean, error: 0.0 }
+    }
+
     /// Difference to another independent estimate in standard errors.
     pub(crate) fn sigmas(&self, other: &Self) -> f64 {
         (self.mean - other.mean) / self.error.hypot(other.error)
@@ -53,6 +58,19 @@ pub(crate) fn render<S: Scene>(scene: &S, settings: &Settings, iterations: u64) 
 
 /// Renders `iterations` iterations and returns the estimate of the image mean per channel.
 pub(crate) fn render_channels<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> [Estimate; 3] {
-    let (means, _) = iterate(scene, settings, iterations);
-    std::array::from_fn(|c| Estimate::of(&means.iter().map(|m| m[c]).collect::<Vec<_>>()))
+    channels(&iterate(scene, settings, iterations).0)
+}
+
+/// Mean and standard error of independent values, per channel.
+pub(crate) fn channels(values: &[[f64; 3]]) -> [Estimate; 3] {
+    std::array::from_fn(|c| Estimate::of(&values.iter().map(|v| v[c]).collect::<Vec<_>>()))
+}
+
+/// Asserts that estimates agree within 4 standard errors, per channel.
+pub(crate) fn assert_same(found: [Estimate; 3], expected: [Estimate; 3], what: &str) {
+    for (found, expected) in found.iter().zip(&expected) {
+        let sigmas = found.sigmas(expected);
+        println!("{what}: {found:?}, expected {expected:?}, {sigmas:.2} sigma");
+        assert!(sigmas.abs() < 4.0, "{what}: {found:?}, expected {expected:?}");
+    }
 }
