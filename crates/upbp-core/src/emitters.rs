@@ -12,10 +12,12 @@ use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, EmitterShares, LightMap, Plan, StreamKind, World};
 
-/// Camera sub-paths.
+/// Camera sub-paths, if there are many emitters.
 const CAMERA_PATHS: u64 = 2048;
-/// Light sub-paths, unless they are long.
+/// Light sub-paths, unless they are long or emitters are few.
 const LIGHT_PATHS: u32 = 4096;
+/// So many emitters are many; of less, less is to be told.
+const MANY: usize = 8;
 /// Light vertices that are enough.
 const LIGHT_VERTICES: f64 = 2e5;
 /// Sub-paths per piece of work.
@@ -26,6 +28,16 @@ const ROUNDS: u32 = 16;
 /// The number of light sub-paths for sub-paths of `vertices` vertices.
 pub(crate) fn light_paths(vertices: f64) -> u32 {
     (LIGHT_VERTICES / vertices.max(1.0)).clamp(64.0, f64::from(LIGHT_PATHS)) as u32
+}
+
+/// Light sub-paths of `vertices` vertices that tell enough of so many emitters.
+pub(crate) fn light_paths_for(emitters: usize, vertices: f64) -> u32 {
+    (enough(emitters) * f64::from(light_paths(vertices))) as u32
+}
+
+/// The part of all sub-paths that tells enough of so many emitters.
+fn enough(emitters: usize) -> f64 {
+    emitters.clamp(2, MANY) as f64 / MANY as f64
 }
 
 /// How emitters are chosen in the iterations of a render.
@@ -97,7 +109,8 @@ fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, Emitt
         LightMap::empty()
     };
 
-    let walks: Vec<_> = (0..CAMERA_PATHS.div_ceil(u64::from(CHUNK)))
+    let camera_paths = (enough(emitters) * CAMERA_PATHS as f64) as u64;
+    let walks: Vec<_> = (0..camera_paths.div_ceil(u64::from(CHUNK)))
         .into_par_iter()
         .map_init(Scratch::default, |scratch, chunk| {
             let mut seen = Seen::default();
@@ -110,7 +123,7 @@ fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, Emitt
         })
         .collect();
     // Light tracing fills the whole picture, camera sub-paths a part of it.
-    let scale = pixels as f64 / CAMERA_PATHS as f64;
+    let scale = pixels as f64 / camera_paths as f64;
     for seen in walks {
         by_path(&seen.emission, &starts, scale);
         for (emitter, contribution) in seen.next_event {

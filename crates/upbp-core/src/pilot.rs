@@ -24,8 +24,10 @@ use crate::neighbours::{Nearest, Neighbours};
 use crate::passes::{Lists, light_pass};
 use crate::settings::CheckedSettings;
 
-/// Light sub-paths of the pilot: of a first, quick one, and of the one that counts.
+/// Light sub-paths of the pilot: of a first, quick one, and at most of the one that counts,
 pub(crate) const LIGHT_PATHS: [u32; 2] = [1024, 8192];
+/// which does with less if they have more than so many vertices.
+const VERTICES: f64 = 24_576.0;
 /// One of so many leaves beams.
 const PATHS_PER_BEAM_PATH: u32 = 8;
 /// Camera sub-paths.
@@ -33,7 +35,7 @@ const CAMERA_PATHS: u64 = 1024;
 /// Of them in a piece of work.
 const CHUNK: u64 = 64;
 /// Queries of each kind that are measured.
-const QUERIES: usize = 256;
+const QUERIES: usize = 96;
 /// Light vertices that distances are measured to: those of the first light sub-paths.
 const NEIGHBOURS: usize = 16384;
 
@@ -62,17 +64,16 @@ pub(crate) struct Pilot {
     pub(crate) bb1d: Option<Neighbours>,
 }
 
-/// Runs a pilot with so many light sub-paths.
+/// Runs a pilot with at most so many light sub-paths.
 pub(crate) fn run<S: Scene>(
     world: &World<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
-    light_paths: u32,
+    most_light_paths: u32,
 ) -> Pilot {
     let nominal = 1e-3 * world.bounds.radius;
-    let plan = Plan::new(
-        world.scene,
-        &PlanChoices {
+    let plan_with = |light_paths| {
+        let choices = PlanChoices {
             seed: settings.seed,
             iteration: 0,
             // Light tracing is of no use here.
@@ -95,18 +96,19 @@ pub(crate) fn run<S: Scene>(
             heuristic: Heuristic::Balance,
             photon_beams: settings.photon_beams,
             query_beams: BeamExtent::Short,
-        },
-    );
-    let context = Context { world, plan: &plan };
+        };
+        Plan::new(world.scene, &choices)
+    };
     let mut light = Lists::default();
-    light_pass(
-        &context,
-        StreamKind::PilotLight,
-        &LightCounts::default(),
-        &mut light,
-        &AtomicBool::new(false),
-        |_| (),
-    );
+    let few = most_light_paths.min(LIGHT_PATHS[0]);
+    let mut plan = plan_with(few);
+    trace_light(world, &plan, &mut light);
+    let enough = VERTICES / light.vertices.len().max(1) as f64 * f64::from(few);
+    let light_paths = (enough as u32).min(most_light_paths);
+    if light_paths > few {
+        plan = plan_with(light_paths);
+        trace_light(world, &plan, &mut light);
+    }
     let queries = camera_queries(world, &plan);
     let beam_paths = f64::from(plan.beam_paths);
     let paths = f64::from(plan.light_paths);
@@ -158,6 +160,11 @@ pub(crate) fn run<S: Scene>(
             beams.around_ray(edge, radius, |(), approach| found(approach.distance));
         }),
     }
+}
+
+fn trace_light<S: Scene>(world: &World<'_, S>, plan: &Plan, lists: &mut Lists<S::Bsdf>) {
+    let (context, expected) = (Context { world, plan }, LightCounts::default());
+    light_pass(&context, StreamKind::PilotLight, &expected, lists, &AtomicBool::new(false), |_| ());
 }
 
 /// The vertices of the first light sub-paths, and how many sub-paths those are.

@@ -106,7 +106,7 @@ impl<'a, S: Scene> Renderer<'a, S> {
         let [few, many] = pilot::LIGHT_PATHS;
         let emitters = (scene.emitters().len() > 1).then(|| {
             let pilot = look(&world, few);
-            let light_paths = emitters::light_paths(pilot.vertices_per_path);
+            let light_paths = emitters::light_paths_for(scene.emitters().len(), pilot.vertices_per_path);
             let plan = |techniques| {
                 let stage = stage(&world, &settings, techniques, &pilot, [light_paths, light_paths / 8]);
                 choices::plan(&world, &settings, &stage, 0)

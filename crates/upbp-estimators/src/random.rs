@@ -16,6 +16,8 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// Draws that are stratified: about four vertices of a path.
 const STRATIFIED_DRAWS: u32 = 24;
+/// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the lens, the first distance.
+const COMMON_DRAWS: u32 = 3;
 
 /// What a stream is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -26,7 +28,9 @@ pub enum StreamKind {
     Camera,
     /// Light sub-paths of the pilot, which sets radii and counts before the first iteration.
     PilotLight,
-    /// Camera sub-paths of the pilot.
+    /// Camera sub-paths of the pilot. Those with the same index, of different iterations, begin alike and are independent from their first
+    /// vertex on: what they differ in is what stratification leaves of the variance of a pixel, since it takes away what their common
+    /// decisions make.
     PilotCamera,
 }
 
@@ -38,6 +42,8 @@ pub struct Stream {
     /// What is common to the streams that are stratified among each other.
     family: u64,
     draws: u32,
+    /// Draws from the sequences.
+    from_sequences: u32,
     rest: Xoshiro256PlusPlus,
 }
 
@@ -51,13 +57,16 @@ impl Stream {
         let of_index = index.wrapping_mul(0xaef1_7502_108e_f2d9);
         // Light sub-paths share an iteration, camera sub-paths a pixel. Beyond 2³² the sequences repeat their points, which
         // costs stratification only.
-        let (point, family) = match kind {
-            StreamKind::Light | StreamKind::PilotLight => (index as u32, mix(common ^ of_iteration)),
-            StreamKind::Camera | StreamKind::PilotCamera => (iteration as u32, mix(common ^ of_index)),
+        let (point, family, from_sequences) = match kind {
+            StreamKind::Light | StreamKind::PilotLight => {
+                (index as u32, mix(common ^ of_iteration), STRATIFIED_DRAWS)
+            }
+            StreamKind::Camera => (iteration as u32, mix(common ^ of_index), STRATIFIED_DRAWS),
+            StreamKind::PilotCamera => (0, mix(common ^ of_index), COMMON_DRAWS),
         };
         // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in common.
         let rest = Xoshiro256PlusPlus::seed_from_u64(mix(mix(common ^ of_iteration) ^ of_index));
-        Self { point, family, draws: 0, rest }
+        Self { point, family, draws: 0, from_sequences, rest }
     }
 
     /// Uniform in `[0, 1)`, a multiple of 2⁻²⁴.
@@ -90,11 +99,11 @@ impl Stream {
         ((u128::from(self.rest.next_u64()) * count as u128) >> 64) as usize
     }
 
-    /// The key of the next decision, while decisions are stratified.
+    /// The key of the next decision, while decisions come from the sequences.
     #[inline]
     fn next_decision(&mut self) -> Option<u64> {
         self.draws += 1;
-        (self.draws <= STRATIFIED_DRAWS)
+        (self.draws <= self.from_sequences)
             .then(|| mix(self.family.wrapping_add(u64::from(self.draws).wrapping_mul(0x9e37_79b9_7f4a_7c15))))
     }
 }
@@ -229,6 +238,32 @@ mod tests {
             }),
         ] {
             assert!(z.abs() < 4.5, "correlation of {z} standard deviations");
+        }
+    }
+
+    #[test]
+    fn camera_sub_paths_of_a_pilot_begin_alike() {
+        let twins = |index| [1, 2].map(|iteration| Stream::new(7, iteration, StreamKind::PilotCamera, index));
+        for index in 0..100 {
+            let [mut first, mut second] = twins(index);
+            for draw in 0..12 {
+                assert_eq!(first.pair() == second.pair(), draw < COMMON_DRAWS, "draw {draw}");
+            }
+        }
+        for draws in [0, COMMON_DRAWS] {
+            let after = |mut stream: Stream| {
+                for _ in 0..draws {
+                    stream.pair();
+                }
+                stream.uniform()
+            };
+            // Those of two pixels are independent, as are twins later.
+            let z = correlation(|i| {
+                let [first, second] = twins(i);
+                let other = if draws == 0 { twins(i + 1)[0].clone() } else { second };
+                (after(first), after(other))
+            });
+            assert!(z.abs() < 4.5, "correlation of {z} standard deviations after {draws} draws");
         }
     }
 

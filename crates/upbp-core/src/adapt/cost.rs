@@ -62,7 +62,8 @@ impl Costs {
                 let calls = work.calls[i][TRIAL];
                 let seen = work.samples[i][TRIAL] * trial.thinning(technique);
                 if technique != Technique::LightTracing && calls > LEAST && TURN[i] > 0.0 {
-                    costs.techniques[i] = ratio(time[i], calls * TURN[i] + seen * SAMPLE[i]);
+                    let turns = calls * TURN[i] * costs.depth(technique, trial.thinning(technique));
+                    costs.techniques[i] = ratio(time[i], turns + seen * SAMPLE[i]);
                 }
             }
         }
@@ -77,6 +78,18 @@ impl Costs {
             }
         }
         costs
+    }
+
+    /// How many times as long a turn to a technique takes if there are so many photons or beams, relative to the plan: by the
+    /// depth of their tree.
+    fn depth(&self, technique: Technique, photons: f64) -> f64 {
+        let elements = match technique {
+            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => return 1.0,
+            Technique::Surf | Technique::Pp3d | Technique::Pb2d => self.planned[0] * self.work.vertices,
+            Technique::Bp2d | Technique::Bb1d => self.planned[1] * self.work.beams,
+        };
+        let levels = |elements: f64| (2.0 + elements).ln();
+        levels(elements * photons) / levels(elements)
     }
 
     /// Nanoseconds of an iteration, on one thread.
@@ -94,7 +107,8 @@ impl Costs {
                 Technique::Bp2d | Technique::Bb1d => candidate.beam_paths,
                 _ => candidate.light_paths,
             };
-            let each = work.calls[i][roulette] * TURN[i] + photons * work.samples[i][roulette] * SAMPLE[i];
+            let turns = work.calls[i][roulette] * TURN[i] * self.depth(technique, photons);
+            let each = turns + photons * work.samples[i][roulette] * SAMPLE[i];
             camera += self.techniques[i] * candidate.look_up(technique) * each;
         }
         let mut light = work.light_edges * EDGE[1] * self.light_walk;

@@ -151,7 +151,8 @@ impl Judge<'_> {
 }
 
 /// The best candidate that small steps from some sensible ones lead to. A step must make the product smaller by the factor
-/// `gain`: predictions are noisy, and the least of many is so by chance.
+/// `gain`: predictions are noisy, and the least of many is so by chance. Where the ways end there are only a few, none of which is
+/// to be preferred.
 pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
     let mut judge = Judge { prediction, costs, known: Vec::new() };
     let everything = Candidate::everything(bounds);
@@ -167,7 +168,7 @@ pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain
             }
         }
         at = with_roulette(&mut judge, at, bounds);
-        if best.is_none_or(|best| at.product() < gain * best.product()) {
+        if best.is_none_or(|best| at.product() < best.product()) {
             best = Some(at);
         }
     }
@@ -175,7 +176,7 @@ pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain
 }
 
 /// The same with the roulette that ends least walks of those that are nearly as good as the best. Random numbers of camera sub-paths are
-/// stratified, which trials do not know of: it makes all that does not come from roulette smaller.
+/// stratified, of which trials know the first ones only: it makes all that does not come from roulette smaller.
 ///
 /// After all else, since each takes several times as long to predict as the trial's own.
 fn with_roulette(judge: &mut Judge<'_>, at: Judged, bounds: &Bounds) -> Judged {

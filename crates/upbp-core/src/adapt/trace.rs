@@ -11,6 +11,7 @@ use upbp_estimators::walk::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
 
 use super::grid::Grid;
+use super::trial::PASSES;
 
 /// Sub-paths per piece of work.
 pub(super) const CHUNK: usize = 16;
@@ -112,9 +113,8 @@ impl<O> Pass<O> {
                 let mut observer = O::default();
                 let mut counters = Counters::default();
                 watch(&mut observer, room, cells, |cell, observer| {
-                    // A number of its own for every sub-path: those of a pixel are not to be stratified among each other, so
-                    // that their variance can be taken.
-                    let index = u64::from(pass) << 32 | u64::from(cell);
+                    // Passes of a trial begin alike: what they differ in is what stratification leaves.
+                    let index = u64::from(pass / PASSES) << 32 | u64::from(cell);
                     let (kind, pixel) = (StreamKind::PilotCamera, grid.pixel(cell));
                     let counters = &mut counters;
                     trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);

@@ -16,7 +16,7 @@ use super::grid::Grid;
 use super::recorder::{Sample, TECHNIQUES};
 use super::trial::{PASSES, Trial};
 use limits::{reductions, relative_to, surroundings};
-use pairs::Looks;
+use pairs::{Looks, View};
 
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
@@ -40,12 +40,10 @@ pub(crate) struct Counts {
 
 /// A trial, made ready for predictions.
 pub(crate) struct Prediction {
-    /// Samples are relative to the radiance around them.
+    /// Splats and counts; values are relative to the radiance around them.
     trial: Trial,
     evenness: f64,
-    /// The albedos of a look's samples, descending; `level_ends` as the trial's ends.
-    levels: Vec<f32>,
-    level_ends: Vec<u32>,
+    looks: Looks,
 }
 
 impl Prediction {
@@ -70,52 +68,40 @@ impl Prediction {
             let range = trial.range(cell, pass);
             trial.samples[range].iter_mut().for_each(|sample| sample.value *= reduction);
         }
-        let (mut levels, mut level_ends) = (Vec::new(), Vec::with_capacity(trial.ends.len()));
-        for (cell, pass) in looks {
-            let mut own: Vec<f32> = trial.look(cell, pass).iter().map(|sample| sample.albedos).collect();
-            own.sort_unstable_by(|a, b| b.total_cmp(a));
-            own.dedup();
-            levels.extend(own);
-            level_ends.push(levels.len() as u32);
-        }
         let evenness = splat_evenness(&trial);
-        Self { trial, evenness, levels, level_ends }
+        let looks = Looks::new(&trial);
+        trial.samples = Vec::new();
+        Self { trial, evenness, looks }
     }
 
     /// The relative variance of an iteration of a plan with these counts, mean over pixels and channels, in parts due to groups of
     /// cells. Infinite if a path that the trial found is one that the plan cannot find.
     pub(crate) fn relative_variance(&self, counts: &Counts) -> [f64; GROUPS] {
         let trial = &self.trial;
-        let looks = Looks::new(trial, counts);
+        let mut view = View::new(trial, &self.looks, counts);
         let mut single = [0.0; GROUPS];
         let mut all = [0.0; GROUPS];
         for cell in 0..trial.cells {
-            let sums = self.of_cell(cell, &looks);
+            let sums = self.of_cell(cell, &mut view);
             single[group(cell)] += sums[0] / trial.cells as f64;
             all[group(cell)] += sums[1] / trial.cells as f64;
         }
         // The difference of two noisy numbers may be anything.
         let mut variance = std::array::from_fn(|group| f64::max(all[group], LEAST_PART * single[group]));
         for (_, cell, splat) in trial.splats() {
-            variance[group(cell)] += self.evenness * trial.per_splat() * looks.second_moment(splat);
+            let second_moment = trial.second_moment(splat) / f64::from(view.share(&splat.shares));
+            variance[group(cell)] += self.evenness * trial.per_splat() * second_moment;
         }
         variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
     }
 
-    /// The albedos that samples of a look come after, descending.
-    fn levels(&self, cell: usize, pass: usize) -> &[f32] {
-        let look = cell * self.trial.passes + pass;
-        let start = if look == 0 { 0 } else { self.level_ends[look - 1] };
-        &self.levels[start as usize..self.level_ends[look] as usize]
-    }
-
     /// Its second moments of single samples, and all of its variance.
-    fn of_cell(&self, cell: usize, looks: &Looks<'_>) -> [f64; 2] {
+    fn of_cell(&self, cell: usize, view: &mut View<'_>) -> [f64; 2] {
         let passes = self.trial.passes as f64;
         let (mut single, mut products) = (0.0, 0.0);
         let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
         for pass in 0..self.trial.passes {
-            let look = looks.look(self.trial.look(cell, pass), self.levels(cell, pass));
+            let look = view.look(cell * self.trial.passes + pass);
             single += look.single;
             products += look.products;
             sum += look.sum;

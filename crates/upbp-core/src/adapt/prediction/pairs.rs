@@ -1,22 +1,70 @@
 //! What the samples of one camera sub-path have in common.
 
-use glam::DVec3;
-use upbp_estimators::{Technique, TechniqueSet};
+use std::num::NonZeroU32;
+
+use glam::{DVec3, Vec3};
+use upbp_estimators::Technique;
 
 use super::super::recorder::{Sample, TECHNIQUES};
-use super::super::roulette::{TRIAL, relative_reach};
+use super::super::roulette::{COUNT, relative_reach};
 use super::super::trial::Trial;
 use super::Counts;
 
-/// What a plan makes of looks at cells.
-pub(super) struct Looks<'a> {
-    counts: &'a Counts,
-    /// Samples of each technique relative to the trial's.
-    relative: [f32; TECHNIQUES],
-    /// Samples of the trial of what its plan has one of.
-    thinning: [f64; TECHNIQUES],
-    /// As many pairs of photons of one light sub-path as the plan has, less those of the trial: by points and by beams.
-    more: [f64; 2],
+/// The samples of a trial, ready for being looked at by many plans.
+pub(super) struct Looks {
+    /// By look, those after most albedos first.
+    seen: Vec<Seen>,
+    /// Behind the last one of each look, and its number of light sub-paths with several photons.
+    ends: Vec<(u32, u32)>,
+}
+
+/// A sample, with all that no plan changes.
+struct Seen {
+    technique: Technique,
+    /// The number, in its look and from 1, of a light sub-path with several photons.
+    light_path: Option<NonZeroU32>,
+    albedos: f32,
+    /// How much more it weighs than in the trial, by the number of a roulette: walks get to it less often.
+    rarity: [f32; COUNT],
+    value: Vec3,
+    /// Its square, of as many samples as the plan has.
+    square: f32,
+    shares: [f32; TECHNIQUES],
+}
+
+impl Looks {
+    /// Takes the samples of a trial.
+    pub(super) fn new(trial: &Trial) -> Self {
+        let mut looks = Self { seen: Vec::with_capacity(trial.samples.len()), ends: Vec::new() };
+        let of_one_path = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
+        for look in 0..trial.cells * trial.passes {
+            let start = looks.seen.len();
+            let mut light_paths = 0;
+            for photons in trial.look(look / trial.passes, look % trial.passes).chunk_by(of_one_path) {
+                light_paths += u32::from(photons.len() > 1);
+                let light_path = if photons.len() > 1 { NonZeroU32::new(light_paths) } else { None };
+                looks.seen.extend(photons.iter().map(|sample| Seen {
+                    technique: sample.technique,
+                    light_path,
+                    albedos: sample.albedos,
+                    rarity: std::array::from_fn(|number| relative_reach(number, sample.albedos).recip()),
+                    value: sample.value,
+                    square: trial.second_moment(sample) as f32,
+                    shares: sample.shares,
+                }));
+            }
+            looks.seen[start..].sort_by(|a, b| a.albedos.total_cmp(&b.albedos));
+            looks.ends.push((looks.seen.len() as u32, light_paths));
+        }
+        looks
+    }
+
+    /// The samples of a look, and its number of light sub-paths.
+    fn of(&self, look: usize) -> (&[Seen], u32) {
+        let start = if look == 0 { 0 } else { self.ends[look - 1].0 };
+        let (end, light_paths) = self.ends[look];
+        (&self.seen[start as usize..end as usize], light_paths)
+    }
 }
 
 /// A look under a plan.
@@ -30,145 +78,93 @@ pub(super) struct Look {
     pub(super) sum: DVec3,
 }
 
-impl<'a> Looks<'a> {
-    pub(super) fn new(trial: &Trial, counts: &'a Counts) -> Self {
+/// Looks with the eyes of a plan.
+pub(super) struct View<'a> {
+    looks: &'a Looks,
+    roulette: usize,
+    /// Samples of each technique relative to the trial's.
+    relative: [f32; TECHNIQUES],
+    /// How many more pairs of samples of one look-up count than if each was made for itself: it is made for both or for none.
+    common: [f32; TECHNIQUES],
+    /// As many pairs of photons of one light sub-path as the plan has, less those of the trial: by points and by beams.
+    more: [f32; 2],
+    /// Sums of what was found of a light sub-path.
+    found: Vec<Found>,
+}
+
+/// Sums of samples: by class and, where look-ups are seldom, by technique.
+#[derive(Clone, Copy, Default)]
+struct Found {
+    by_class: [Vec3; 2],
+    by_technique: [Vec3; TECHNIQUES],
+}
+
+impl<'a> View<'a> {
+    pub(super) fn new(trial: &Trial, looks: &'a Looks, counts: &Counts) -> Self {
         Self {
-            counts,
+            looks,
+            roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
-            thinning: Technique::ALL.map(|technique| trial.thinning(technique)),
-            more: [0, 1].map(|i| (trial.thinning[i] / counts.paths[i] - 1.0).min(1e6)),
+            common: counts.look_ups.map(|p| (1.0 / p - 1.0) as f32),
+            more: [0, 1].map(|i| (trial.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
+            found: Vec::new(),
         }
     }
 
-    /// Second moment of a sample, of as many as the plan has.
-    pub(super) fn second_moment(&self, sample: &Sample) -> f64 {
-        self.thinning[sample.technique as usize] * f64::from(sample.value.length_squared())
-            / self.share(sample)
-    }
-
-    /// A look at samples, which come after the given albedos, descending.
-    pub(super) fn look(&self, samples: &[Sample], levels: &[f32]) -> Look {
-        let mut look = self.after(samples, f32::INFINITY);
-        if self.counts.roulette != TRIAL {
-            // A pair is there as often as the sub-path gets to the deeper of both, and each weighs as if it was as often as the
-            // sub-path gets to it: by the less deep one, pairs count more or less than in the trial.
-            let mut before = 1.0;
-            for &level in levels {
-                let factor = self.per_reach(level);
-                if factor != before {
-                    look.products += (factor - before) * self.after(samples, level).products;
-                    before = factor;
-                }
+    /// A look at what one camera sub-path found.
+    pub(super) fn look(&mut self, look: usize) -> Look {
+        let mut result = Look::default();
+        let mut all = Found::default();
+        let (samples, light_paths) = self.looks.of(look);
+        self.found.clear();
+        self.found.resize(light_paths as usize, Found::default());
+        for seen in samples {
+            let i = seen.technique as usize;
+            let per_share = self.share(&seen.shares).recip();
+            let rarity = seen.rarity[self.roulette];
+            result.single += f64::from(rarity * seen.square * per_share);
+            let weight = self.relative[i] * per_share;
+            // Neither without samples nor without a number.
+            if !(weight > 0.0) {
+                continue;
             }
+            let y = seen.value * weight;
+            let [points, beams] = all.by_class;
+            let mut others = points + beams + self.common[i] * all.by_technique[i];
+            all.add(seen.technique, y, self.common[i]);
+            if let Some(path) = seen.light_path {
+                let found = &mut self.found[path.get() as usize - 1];
+                let [points, beams] = found.by_class;
+                let own = class(seen.technique);
+                others += self.more[0] * points + self.more[own] * beams;
+                others += self.more[own] * self.common[i] * found.by_technique[i];
+                found.add(seen.technique, y, self.common[i]);
+            }
+            // A pair is there as often as walks get to the deeper of both, which came before, and each weighs as if it was as often
+            // as walks get to it: what is left is how rare the other is.
+            result.products += f64::from(2.0 * rarity * y.dot(others));
         }
-        look
-    }
-
-    /// A look at the samples after vertices with no more than these albedos.
-    fn after(&self, samples: &[Sample], albedos: f32) -> Look {
-        let mut look = Look::default();
-        let mut all = Pairs::default();
-        let together = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
-        for run in samples.chunk_by(together) {
-            let mut same = Pairs::default();
-            let into = if run.len() > 1 { &mut same } else { &mut all };
-            for sample in run.iter().filter(|sample| sample.albedos <= albedos) {
-                let i = sample.technique as usize;
-                let per_share = self.share(sample).recip();
-                let square = f64::from(sample.value.length_squared());
-                look.single += self.per_reach(sample.albedos) * self.thinning[i] * square * per_share;
-                let weight = self.counts.relative[i] * per_share;
-                // Neither without samples nor without a number.
-                if weight > 0.0 {
-                    into.add(sample, square, weight, self.counts);
-                }
-            }
-            if run.len() > 1 {
-                look.products += same.total(self.more, self.counts);
-                all.join(&same);
-            }
-        }
-        look.products += all.total([1.0; 2], self.counts);
-        look.sum = all.sum();
-        look
+        result.sum = (all.by_class[0] + all.by_class[1]).as_dvec3();
+        result
     }
 
     /// The densities of the plan at a sample's path, relative to the trial's.
     #[inline]
-    fn share(&self, sample: &Sample) -> f64 {
+    pub(super) fn share(&self, shares: &[f32; TECHNIQUES]) -> f32 {
         let [a, b, c, d, e, f, g, h, i]: [f32; TECHNIQUES] =
-            std::array::from_fn(|i| sample.shares[i] * self.relative[i]);
+            std::array::from_fn(|i| shares[i] * self.relative[i]);
         // Not one after the other: the search has nothing else to wait for.
-        f64::from((((a + b) + (c + d)) + ((e + f) + (g + h))) + i)
-    }
-
-    /// How much more a sample weighs after vertices with this product of albedos than in the trial.
-    #[inline]
-    fn per_reach(&self, albedos: f32) -> f64 {
-        match self.counts.roulette {
-            TRIAL => 1.0,
-            roulette => f64::from(relative_reach(roulette, albedos)).recip(),
-        }
+        (((a + b) + (c + d)) + ((e + f) + (g + h))) + i
     }
 }
 
-/// Sums over pairs of different samples.
-#[derive(Default)]
-struct Pairs {
-    /// Of samples whose number goes with light sub-paths, and with those with beams.
-    sums: [DVec3; 2],
-    /// Pairs of a sample and itself.
-    squares: [f64; 2],
-    /// Of techniques that are looked up seldom.
-    seldom: Option<[DVec3; TECHNIQUES]>,
-}
-
-impl Pairs {
+impl Found {
     #[inline]
-    fn add(&mut self, sample: &Sample, square: f64, weight: f64, counts: &Counts) {
-        let technique = sample.technique;
-        let y = sample.value.as_dvec3() * weight;
-        let p = counts.look_ups[technique as usize];
-        self.sums[class(technique)] += y;
-        if p < 1.0 {
-            self.squares[class(technique)] += square * weight * weight / p;
-            self.seldom.get_or_insert_default()[technique as usize] += y;
-        } else {
-            self.squares[class(technique)] += square * weight * weight;
+    fn add(&mut self, technique: Technique, y: Vec3, common: f32) {
+        self.by_class[class(technique)] += y;
+        if common > 0.0 {
+            self.by_technique[technique as usize] += y;
         }
-    }
-
-    fn join(&mut self, other: &Self) {
-        for i in 0..2 {
-            self.sums[i] += other.sums[i];
-            self.squares[i] += other.squares[i];
-        }
-        if let Some(seldom) = &other.seldom {
-            for (sum, other) in self.seldom.get_or_insert_default().iter_mut().zip(seldom) {
-                *sum += other;
-            }
-        }
-    }
-
-    fn sum(&self) -> DVec3 {
-        self.sums[0] + self.sums[1]
-    }
-
-    /// The products of all pairs. Those of a look-up that is made with probability p count 1/p times; those of two beams count
-    /// `factors[1]` times, all others `factors[0]` times.
-    fn total(&self, factors: [f64; 2], counts: &Counts) -> f64 {
-        let [points, beams] = self.sums;
-        let mut total = factors[0] * points.dot(points + 2.0 * beams) + factors[1] * beams.length_squared();
-        for (squares, factor) in self.squares.iter().zip(factors) {
-            total -= factor * squares;
-        }
-        if let Some(seldom) = &self.seldom {
-            for technique in TechniqueSet::ALL.without(TechniqueSet::BPT).iter() {
-                let (sum, p) = (seldom[technique as usize], counts.look_ups[technique as usize]);
-                total += factors[class(technique)] * (1.0 / p - 1.0) * sum.length_squared();
-            }
-        }
-        total
     }
 }
 
