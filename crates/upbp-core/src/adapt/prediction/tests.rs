@@ -1,10 +1,11 @@
 //! Predictions of what can be computed otherwise.
 
 use glam::Vec3;
-use upbp_estimators::Technique;
+use proptest::prelude::*;
 use upbp_estimators::scene::PixelRect;
+use upbp_estimators::{Technique, TechniqueSet};
 
-use super::super::roulette::{COUNT, OF_TRIAL, TRIAL, numbered};
+use super::super::roulette::{COUNT, OF_TRIAL, TRIAL, numbered, relative_reach};
 use super::super::trial::Work;
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
@@ -194,4 +195,70 @@ fn no_part_is_more_than_the_largest() {
     assert!((most / sum - LARGEST_PART).abs() < 1e-9, "{most} of {sum}");
     // Nothing to limit.
     assert!(largest(vec![1.0; 1000]) >= 1.0);
+}
+
+/// Products of all pairs, one by one.
+fn products(samples: &[Sample], thinning: [f64; 2], counts: &Counts) -> f64 {
+    let beams = |sample: &Sample| matches!(sample.technique, Technique::Bp2d | Technique::Bb1d);
+    let y = |sample: &Sample| {
+        let share: f64 = sample.shares.iter().zip(counts.relative).map(|(s, n)| f64::from(*s) * n).sum();
+        sample.value.as_dvec3() * counts.relative[sample.technique as usize] / share
+    };
+    let mut sum = 0.0;
+    for (i, a) in samples.iter().enumerate() {
+        for b in samples[..i].iter().chain(&samples[i + 1..]) {
+            // Walks get to both as often as to the deeper one, and each weighs as if it was alone.
+            let reach = |sample: &Sample| f64::from(relative_reach(counts.roulette, sample.albedos));
+            let deeper = if a.albedos < b.albedos { a } else { b };
+            let mut factor = reach(deeper) / (reach(a) * reach(b));
+            if a.technique == b.technique {
+                factor /= counts.look_ups[a.technique as usize];
+            }
+            if a.merged.is_some() && a.merged == b.merged {
+                let class = usize::from(beams(a) && beams(b));
+                factor *= thinning[class] / counts.paths[class];
+            }
+            sum += factor * y(a).dot(y(b));
+        }
+    }
+    sum
+}
+
+fn sample() -> impl Strategy<Value = Sample> {
+    let technique = proptest::sample::select(Technique::ALL.to_vec());
+    let albedos = proptest::sample::select(vec![1.0_f32, 0.9, 0.6, 0.4, 0.2, 0.01]);
+    (technique, 0..4_u32, albedos, prop::array::uniform3(0.0_f32..2.0), prop::array::uniform(0.01_f32..1.0))
+        .prop_map(|(technique, path, albedos, value, densities): (_, _, _, _, [f32; TECHNIQUES])| {
+            let sum: f32 = densities.iter().sum();
+            Sample {
+                technique,
+                merged: (!TechniqueSet::BPT.has(technique)).then_some(path),
+                albedos,
+                value: value.into(),
+                shares: densities.map(|density| density / sum),
+            }
+        })
+}
+
+proptest! {
+    #[test]
+    fn pairs_are_what_they_are_one_by_one(
+        mut samples in prop::collection::vec(sample(), 0..24),
+        roulette in 0..COUNT,
+        paths in prop::array::uniform2(0.25_f64..4.0),
+        seldom in prop::array::uniform(proptest::bool::ANY),
+        thinning in prop::array::uniform2(0.1_f64..1.0),
+    ) {
+        let seldom: [bool; TECHNIQUES] = seldom;
+        samples.sort_by_key(|sample| sample.merged);
+        let look_ups: [f64; TECHNIQUES] = std::array::from_fn(|i| {
+            if seldom[i] && !TechniqueSet::BPT.has(Technique::ALL[i]) { 0.25 } else { 1.0 }
+        });
+        let counts = Counts { relative: look_ups.map(|p| 0.5 + p), paths, look_ups, roulette };
+        let expected = products(&samples, thinning, &counts);
+        let trial = Trial { cells: 1, passes: 1, ends: vec![samples.len() as u32], samples, thinning, ..trial() };
+        let looks = pairs::Looks::new(&trial);
+        let found = View::new(&trial, &looks, &counts).look(0).products;
+        prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
+    }
 }
