@@ -16,7 +16,8 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// Draws that are stratified: about four vertices of a path.
 const STRATIFIED_DRAWS: u32 = 24;
-/// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the lens, the first distance.
+/// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the lens, and the first
+/// distance in a medium or, where there is none, what is drawn next.
 const COMMON_DRAWS: u32 = 3;
 
 /// What a stream is for.
@@ -28,8 +29,8 @@ pub enum StreamKind {
     Camera,
     /// Light sub-paths of the pilot, which sets radii and counts before the first iteration.
     PilotLight,
-    /// Camera sub-paths of the pilot. Those with the same index, of different iterations, begin alike and are independent from their first
-    /// vertex on: what they differ in is what stratification leaves of the variance of a pixel, since it takes away what their common
+    /// Camera sub-paths of the pilot. Those with the same index, of different iterations, begin alike and are independent after a few
+    /// draws: what they differ in is what stratification leaves of the variance of a pixel, since it takes away what their common
     /// decisions make.
     PilotCamera,
 }

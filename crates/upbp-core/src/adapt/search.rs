@@ -178,7 +178,7 @@ pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain
 /// The same with the roulette that ends least walks of those that are nearly as good as the best. Random numbers of camera sub-paths are
 /// stratified, of which trials know the first ones only: it makes all that does not come from roulette smaller.
 ///
-/// After all else, since each takes several times as long to predict as the trial's own.
+/// After all else, so that there are fewer candidates on the way.
 fn with_roulette(judge: &mut Judge<'_>, at: Judged, bounds: &Bounds) -> Judged {
     const NEARLY: f64 = 1.05;
     let with = |roulette| Candidate { roulette, ..at.candidate };
