@@ -11,7 +11,7 @@ use std::path::Path as FilePath;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use upbp_core::{MediumId, Renderer, Settings, TechniqueSet};
+use upbp_core::{MediumId, Settings, TechniqueSet};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy, VertexKind};
 use upbp_estimators::mis::{
     BeamExtent, Edge, End, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges,
@@ -42,7 +42,7 @@ fn iteration(criterion: &mut Criterion) {
         let auto = Settings { deterministic: true, ..Settings::default() };
         for (set, settings) in [("auto", auto), ("everything", everything), ("bpt", bpt)] {
             let settings = settings.validate().expect("valid settings");
-            let mut renderer = Renderer::new(&scene, settings).expect("a scene that can be rendered");
+            let mut renderer = scene.renderer(settings).expect("a scene that can be rendered");
             group.bench_function(BenchmarkId::new(name, set), |bencher| {
                 bencher.iter(|| assert!(renderer.iterate()));
             });

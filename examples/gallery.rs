@@ -7,7 +7,7 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use upbp_core::{Renderer, Settings, Stop, write_png};
+use upbp_core::{Settings, Stop, write_png};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
 
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("only_bb1d", "bb1d"),
     ] {
         let settings = Settings { techniques: techniques.parse()?, ..Settings::default() };
-        let mut renderer = Renderer::new(&scene, settings.validate()?)?;
+        let mut renderer = scene.renderer(settings.validate()?)?;
         renderer.render(&stop, |_| ControlFlow::Continue(()));
         println!("{name}\n{}", renderer.report());
         write_png(&folder.join(format!("{name}.png")), &renderer.film().image(), 1.0)?;

@@ -16,7 +16,7 @@ use std::str::FromStr;
 
 use clap::Parser;
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image as ExrImage, WritableImage as _, f16};
-use upbp_core::{Image, Radii, Radius, Renderer, Settings, Stop, TechniqueSet};
+use upbp_core::{Image, Radii, Radius, Settings, Stop, TechniqueSet};
 use upbp_scene::ReadyScene;
 
 use scenes::{Group, Shipped, names};
@@ -131,7 +131,7 @@ impl Batches {
                 seed: options.seed + batch,
                 ..Settings::default()
             };
-            let mut renderer = Renderer::new(scene, settings.validate()?)?;
+            let mut renderer = scene.renderer(settings.validate()?)?;
             let stop = Stop { seconds: Some(options.time), ..Stop::default() };
             renderer.render(&stop, |_| ControlFlow::Continue(()));
             images.push(renderer.film().image());

@@ -4,18 +4,12 @@ mod support;
 
 use std::path::Path;
 
-use support::{Estimate, assert_same, channels};
-use upbp_core::{
-    LightPaths, Radii, Radius, RenderPlan, Renderer, Settings, TechniqueSet, Techniques, read_exr,
-};
+use support::{Estimate, assert_same, channels, renderer};
+use upbp_core::{LightPaths, Radii, Radius, RenderPlan, Settings, TechniqueSet, Techniques, read_exr};
 use upbp_scene::ReadyScene;
 
 fn settings() -> Settings {
     Settings { deterministic: true, ..Settings::default() }
-}
-
-fn renderer(scene: &ReadyScene, settings: Settings) -> Renderer<'_, ReadyScene> {
-    Renderer::new(scene, settings.validate().expect("valid settings")).expect("a scene that can be rendered")
 }
 
 fn shipped(name: &str) -> ReadyScene {
@@ -118,7 +112,7 @@ fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
         .collect();
     let render = |seed, plan: &RenderPlan| {
         let settings = Settings { seed, ..settings() }.validate().expect("valid settings");
-        let mut renderer = Renderer::with_plan(&scene, settings, plan.clone()).expect("a plan of this scene");
+        let mut renderer = scene.renderer_with_plan(settings, plan.clone()).expect("a plan of this scene");
         for _ in 0..8 {
             assert!(renderer.iterate());
         }
@@ -147,7 +141,7 @@ fn a_frozen_plan_makes_the_same_iterations() {
     let plan = RenderPlan::from_ron(&first.state().identity().plan.to_string()).expect("a plan");
     let checked = || measured.clone().validate().expect("valid settings");
     let part = |range: std::ops::Range<u64>| {
-        let mut renderer = Renderer::with_plan(&scene, checked(), plan.clone()).expect("the plan fits");
+        let mut renderer = scene.renderer_with_plan(checked(), plan.clone()).expect("the plan fits");
         renderer.set_range(range);
         while renderer.iterate() {}
         renderer.state().clone()
@@ -181,11 +175,11 @@ fn a_state_is_taken_up_whatever_was_chosen_since() {
             plan = RenderPlan::from_ron(&both).expect("two stages");
         }
         let run = |iterations| {
-            let mut renderer = Renderer::with_plan(&scene, auto(), plan.clone()).expect("a plan for it");
+            let mut renderer = scene.renderer_with_plan(auto(), plan.clone()).expect("a plan for it");
             (0..iterations).for_each(|_| assert!(renderer.iterate()));
             renderer
         };
-        let mut resumed = Renderer::new(&scene, auto()).expect("a valid render");
+        let mut resumed = scene.renderer(auto()).expect("a valid render");
         resumed.resume(run(2).state().clone()).expect("the same render");
         (0..3).for_each(|_| assert!(resumed.iterate()));
         assert_eq!(resumed.film().fingerprint(), run(5).film().fingerprint(), "{names}");
@@ -200,10 +194,9 @@ fn a_plan_that_does_not_fit_is_refused() {
     let checked = || settings().validate().expect("valid settings");
     let greedy = plan.to_string().replace("light_paths: 4096,", "light_paths: 4000000000,");
     let greedy = RenderPlan::from_ron(&greedy).expect("a plan");
-    let error = Renderer::with_plan(&fog, checked(), greedy).map(|_| ()).expect_err("too much").to_string();
+    let error = fog.renderer_with_plan(checked(), greedy).map(|_| ()).expect_err("too much").to_string();
     assert!(error.starts_with("plan, stage from iteration 0: needs") && error.contains("2048"), "{error}");
     let matt = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
-    let error =
-        Renderer::with_plan(&matt, checked(), plan).map(|_| ()).expect_err("no media here").to_string();
+    let error = matt.renderer_with_plan(checked(), plan).map(|_| ()).expect_err("no media here").to_string();
     assert!(error.contains("pb2d") && error.contains("cannot be used"), "{error}");
 }

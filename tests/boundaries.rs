@@ -3,7 +3,7 @@
 mod support;
 
 use support::render;
-use upbp_core::{Renderer, Settings};
+use upbp_core::Settings;
 use upbp_scene::ReadyScene;
 
 fn scene(text: &str) -> ReadyScene {
@@ -67,7 +67,7 @@ fn no_walk_is_lost_where_free_paths_are_as_short_as_roundings() {
         lights: [Constant(1)])",
     );
     let settings = Settings { max_length: 200, ..settings("hit") };
-    let mut renderer = Renderer::new(&scene, settings.validate().expect("valid settings")).expect("a scene");
+    let mut renderer = scene.renderer(settings.validate().expect("valid settings")).expect("a scene");
     for _ in 0..16 {
         renderer.iterate();
     }

@@ -1,8 +1,7 @@
 //! The same scene, settings and seed give the same bits, whatever the number of threads, and however the iterations are shared
 //! out among runs.
 
-#[path = "../examples/host_renderer/scene.rs"]
-mod host;
+mod support;
 
 use proptest::prelude::*;
 use upbp_core::{LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
@@ -27,8 +26,7 @@ fn bits(threads: usize, techniques: &str) -> Vec<u32> {
             deterministic: true,
             ..Settings::default()
         };
-        let mut renderer =
-            Renderer::new(&scene, settings.validate().expect("valid settings")).expect("a renderer");
+        let mut renderer = support::renderer(&scene, settings);
         for _ in 0..3 {
             assert!(renderer.iterate());
         }
@@ -72,8 +70,7 @@ fn a_crop_shows_the_same_camera_samples_as_the_whole() {
             techniques: "pt".parse().expect("technique names"),
             ..Settings::default()
         };
-        let mut renderer =
-            Renderer::new(&scene, settings.validate().expect("valid settings")).expect("a renderer");
+        let mut renderer = support::renderer(&scene, settings);
         assert!(renderer.iterate());
         renderer.film().image()
     };
@@ -86,14 +83,14 @@ fn a_crop_shows_the_same_camera_samples_as_the_whole() {
 }
 
 /// A render of a small room with everything, by one run or a part of one.
-fn room_renderer(room: &host::Room) -> Renderer<'_, host::Room> {
+fn room_renderer(room: &ReadyScene) -> Renderer<'_> {
     let settings = Settings {
         techniques: "all".parse().expect("technique names"),
         light_paths: LightPaths::Count(200),
         beams: Some(20),
         ..Settings::default()
     };
-    let mut renderer = Renderer::new(room, settings.validate().expect("valid settings")).expect("a renderer");
+    let mut renderer = support::renderer(room, settings);
     renderer.identify_scene("room", b"room");
     renderer
 }
@@ -121,7 +118,7 @@ proptest! {
         order in Just(vec![0, 1, 2]).prop_shuffle(),
         threads in 1..4_usize,
     ) {
-        let room = host::Room::new(6).expect("valid coefficients");
+        let room = support::room(6);
         let mut whole = room_renderer(&room);
         whole.set_range(0..SHARED);
         while whole.iterate() {}
@@ -156,7 +153,7 @@ proptest! {
 
 #[test]
 fn what_does_not_belong_together_is_refused_by_name() {
-    let room = host::Room::new(6).expect("valid coefficients");
+    let room = support::room(6);
     let render = |change: fn(&mut Settings), scene: &[u8], first: u64| {
         let mut settings = Settings {
             techniques: TechniqueSet::default().into(),
@@ -164,8 +161,7 @@ fn what_does_not_belong_together_is_refused_by_name() {
             ..Settings::default()
         };
         change(&mut settings);
-        let mut renderer =
-            Renderer::new(&room, settings.validate().expect("valid settings")).expect("a renderer");
+        let mut renderer = support::renderer(&room, settings);
         renderer.identify_scene("room", scene);
         renderer.set_range(first..first + 2);
         while renderer.iterate() {}

@@ -5,8 +5,8 @@ mod support;
 #[path = "../examples/host_renderer/scene.rs"]
 mod scene;
 
-use support::{Estimate, render};
-use upbp_core::{Radii, Radius, Settings};
+use support::{Estimate, render, render_by};
+use upbp_core::{Image, Radii, Radius, Renderer, Settings};
 
 fn settings(techniques: &str) -> Settings {
     let radius = Radius::Absolute(0.01);
@@ -21,10 +21,15 @@ fn settings(techniques: &str) -> Settings {
     }
 }
 
+fn render_room(room: &scene::Room, settings: &Settings, iterations: u64) -> (Estimate, Image) {
+    let checked = settings.clone().validate().expect("valid settings");
+    render_by(Renderer::new(room, checked).expect("a renderer"), iterations)
+}
+
 #[test]
 fn all_subsets_agree() {
     let room = scene::Room::new(24).expect("valid coefficients");
-    let (reference, _) = render(&room, &settings("pt"), 400);
+    let (reference, _) = render_room(&room, &settings("pt"), 400);
     let mut worst = 0.0_f64;
     for techniques in [
         "hit+nee",
@@ -38,7 +43,7 @@ fn all_subsets_agree() {
         "bpt+bb1d",
         "all",
     ] {
-        let (estimate, _): (Estimate, _) = render(&room, &settings(techniques), 100);
+        let (estimate, _) = render_room(&room, &settings(techniques), 100);
         let sigmas = estimate.sigmas(&reference);
         println!("{techniques:12} {:.5} ± {:.5}  {sigmas:+.2} sigma", estimate.mean, estimate.error);
         worst = worst.max(sigmas.abs());
@@ -46,41 +51,12 @@ fn all_subsets_agree() {
     assert!(worst < 4.0, "worst: {worst:.2} sigma");
 }
 
-/// The same room as a scene file: other geometry code, other materials, lights and camera.
-const READY_MADE: &str = r#"(
-  version: 1,
-  camera: Perspective(origin: (0, 0, 0.95), target: (0, 0, 0), fov_degrees: 77.319616508),
-  film: (width: 24, height: 24),
-  outside: "haze",
-  media: {
-    "haze": Homogeneous(sigma_a: 0.05, sigma_s: 0.25, phase: HenyeyGreenstein(0.3)),
-    "milk": Homogeneous(sigma_a: (0.05, 0.1, 0.2), sigma_s: 8, phase: HenyeyGreenstein(0.5)),
-  },
-  materials: {
-    "white": Lambert(0.7),
-    "red": Lambert((0.6, 0.1, 0.1)),
-    "green": Lambert((0.1, 0.5, 0.1)),
-    "black": Lambert(0),
-    "boundary": Null,
-  },
-  shapes: [
-    (name: "left", material: "red", geometry: Quad(origin: (-1, -1, -1), edge_u: (0, 2, 0), edge_v: (0, 0, 2))),
-    (name: "right", material: "green", geometry: Quad(origin: (1, -1, -1), edge_u: (0, 0, 2), edge_v: (0, 2, 0))),
-    (name: "floor", material: "white", geometry: Quad(origin: (-1, -1, -1), edge_u: (0, 0, 2), edge_v: (2, 0, 0))),
-    (name: "ceiling", material: "white", geometry: Quad(origin: (-1, 1, -1), edge_u: (2, 0, 0), edge_v: (0, 0, 2))),
-    (name: "back", material: "white", geometry: Quad(origin: (-1, -1, -1), edge_u: (2, 0, 0), edge_v: (0, 2, 0))),
-    (name: "front", material: "white", geometry: Quad(origin: (-1, -1, 1), edge_u: (0, 2, 0), edge_v: (2, 0, 0))),
-    (name: "milk", material: "boundary", interior: "milk", geometry: Sphere(centre: (-0.35, -0.5, -0.2), radius: 0.4)),
-    (name: "lamp", material: "black", emission: (14, 12, 9), geometry: Sphere(centre: (0.45, 0.5, -0.3), radius: 0.12)),
-  ],
-)"#;
-
 #[test]
 fn the_ready_made_scene_looks_the_same() {
     let room = scene::Room::new(24).expect("valid coefficients");
-    let ready_made = upbp_scene::ReadyScene::from_ron_str(READY_MADE, "").expect("a valid scene");
+    let ready_made = support::room(24);
     for techniques in ["bpt", "bpt+surf+pp3d+pb2d+bb1d"] {
-        let (theirs, their_image) = render(&room, &settings(techniques), 150);
+        let (theirs, their_image) = render_room(&room, &settings(techniques), 150);
         let (ours, our_image) = render(&ready_made, &settings(techniques), 150);
         let sigmas = theirs.sigmas(&ours);
         let difference = their_image.relative_mse(&our_image);

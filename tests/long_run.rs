@@ -3,13 +3,13 @@
 //! `UPBP_ITERATIONS=100000` sets how many; a few thousand by default.
 #![cfg(target_os = "linux")]
 
-#[path = "../examples/host_renderer/scene.rs"]
-mod host;
+mod support;
 
 use std::fs;
 use std::time::Instant;
 
 use upbp_core::{ErrorPoint, LightPaths, MAX_ITERATIONS, Radius, Renderer, Settings};
+use upbp_scene::ReadyScene;
 
 /// Resident memory, KiB.
 fn resident() -> i64 {
@@ -18,7 +18,7 @@ fn resident() -> i64 {
     line.trim().trim_end_matches(" kB").parse().expect("a number")
 }
 
-fn renderer(room: &host::Room, change: impl Fn(&mut Settings)) -> Renderer<'_, host::Room> {
+fn renderer(room: &ReadyScene, change: impl Fn(&mut Settings)) -> Renderer<'_> {
     let mut settings = Settings {
         techniques: "all".parse().expect("technique names"),
         light_paths: LightPaths::Count(16),
@@ -26,18 +26,18 @@ fn renderer(room: &host::Room, change: impl Fn(&mut Settings)) -> Renderer<'_, h
         ..Settings::default()
     };
     change(&mut settings);
-    Renderer::new(room, settings.validate().expect("valid settings")).expect("a renderer")
+    support::renderer(room, settings)
 }
 
 #[test]
 fn nothing_grows_with_the_number_of_iterations() {
     let wanted: u64 = std::env::var("UPBP_ITERATIONS").map_or(4000, |text| text.parse().expect("a number"));
-    let room = host::Room::new(4).expect("valid coefficients");
+    let room = support::room(4);
     let mut renderer = renderer(&room, |_| ());
     let start = Instant::now();
     let mut early = 0;
     let mut early_size = 0;
-    let size = |renderer: &Renderer<'_, host::Room>| {
+    let size = |renderer: &Renderer<'_>| {
         let mut bytes = Vec::new();
         renderer.state().write(&mut bytes).expect("a vector takes all");
         bytes.len()
@@ -78,7 +78,7 @@ fn nothing_grows_with_the_number_of_iterations() {
 
 #[test]
 fn the_last_iterations_are_as_good_as_the_first() {
-    let room = host::Room::new(4).expect("valid coefficients");
+    let room = support::room(4);
     for (what, radius) in
         [("auto", Radius::Auto), ("tiny", Radius::Absolute(1e-30)), ("scene", Radius::Scene(1e-12))]
     {

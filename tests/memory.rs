@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use upbp_core::{LightPaths, Renderer, Settings};
+use upbp_core::{LightPaths, Settings};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
 
@@ -48,7 +48,7 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
     pool.install(|| {
         let renderer = |paths, memory| {
             let checked = settings(paths, beams, memory).validate().expect("valid settings");
-            Renderer::new(&scene, checked).expect("a renderer")
+            scene.renderer(checked).expect("a renderer")
         };
         // A pilot first: what it leaves with the allocator and the threads does not grow with what is rendered.
         let paths = vertices / renderer(1000, 100).state().identity().plan.stage(0).vertices_per_light_path;

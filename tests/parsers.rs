@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use proptest::prelude::*;
 use readers::{little, read_mesh, read_scene, read_settings, read_state, sealed};
-use upbp_core::{Renderer, Settings};
+use upbp_core::Settings;
 use upbp_scene::{ReadyScene, SceneDescription};
 
 const SCENES: [&str; 3] = [
@@ -100,8 +100,7 @@ fn state() -> &'static [u8] {
     static STATE: OnceLock<Vec<u8>> = OnceLock::new();
     STATE.get_or_init(|| {
         let scene = ReadyScene::from_ron_str(SCENES[2], "").expect("a good scene");
-        let mut renderer =
-            Renderer::new(&scene, little().validate().expect("valid settings")).expect("a renderer");
+        let mut renderer = scene.renderer(little().validate().expect("valid settings")).expect("a renderer");
         renderer.iterate();
         let mut bytes = Vec::new();
         renderer.state().write(&mut bytes).expect("a vector takes all");

@@ -9,7 +9,7 @@ mod compare;
 use std::path::Path;
 
 use compare::{Comparison, Reference, Spread};
-use upbp_core::{Renderer, Settings};
+use upbp_core::Settings;
 use upbp_scene::ReadyScene;
 
 /// Iterations of each render: enough for the spread to be known.
@@ -37,7 +37,7 @@ fn check(scene_name: &str) {
             ..Settings::default()
         };
         let settings = settings.validate().expect("valid settings");
-        let mut renderer = Renderer::new(&scene, settings).expect("a scene that can be rendered");
+        let mut renderer = scene.renderer(settings).expect("a scene that can be rendered");
         let mut spread = Spread::default();
         for _ in 0..ITERATIONS {
             assert!(renderer.iterate());

@@ -1,28 +1,26 @@
 //! State files that are cut off, changed or of somebody else are refused, whatever is in them.
 
-#[path = "../examples/host_renderer/scene.rs"]
-mod host;
 #[path = "support/readers.rs"]
 mod readers;
+mod support;
 
 use std::sync::OnceLock;
 
 use proptest::prelude::*;
 use readers::sealed;
-use upbp_core::{ErrorPoint, LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
+use upbp_core::{ErrorPoint, LightPaths, Settings, State, StateError, TechniqueSet};
 
 /// The bytes of a good state.
 fn good() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
-        let room = host::Room::new(5).expect("valid coefficients");
+        let room = support::room(5);
         let settings = Settings {
             techniques: TechniqueSet::default().into(),
             light_paths: LightPaths::Count(100),
             ..Settings::default()
         };
-        let mut renderer =
-            Renderer::new(&room, settings.validate().expect("valid settings")).expect("a renderer");
+        let mut renderer = support::renderer(&room, settings);
         renderer.identify_scene("room", b"room");
         for range in [0..2, 7..8] {
             renderer.set_range(range);

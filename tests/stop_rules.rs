@@ -1,20 +1,20 @@
 //! Renders stop when they are told to.
 
-#[path = "../examples/host_renderer/scene.rs"]
-mod scene;
+mod support;
 
 use std::ops::ControlFlow;
 
 use upbp_core::{Renderer, Settings, Stop, StopReason};
+use upbp_scene::ReadyScene;
 
-fn renderer(room: &scene::Room) -> Renderer<'_, scene::Room> {
+fn renderer(room: &ReadyScene) -> Renderer<'_> {
     let settings = Settings { techniques: "bpt".parse().expect("a technique"), ..Settings::default() };
-    Renderer::new(room, settings.validate().expect("valid settings")).expect("a renderer")
+    support::renderer(room, settings)
 }
 
 #[test]
 fn each_rule_stops() {
-    let room = scene::Room::new(12).expect("valid coefficients");
+    let room = support::room(12);
     let go_on = |_: &upbp_core::Progress<'_>| ControlFlow::Continue(());
 
     let mut by_count = renderer(&room);

@@ -45,8 +45,8 @@ fn run(options: &Options) -> Result<(), Failure> {
     let reference = options.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
     let plan = options.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
     let mut renderer = match plan {
-        None => Renderer::new(&scene, settings),
-        Some(plan) => Renderer::with_plan(&scene, settings, plan),
+        None => scene.renderer(settings),
+        Some(plan) => scene.renderer_with_plan(settings, plan),
     }
     .map_err(Failure::input)?;
     renderer
@@ -104,7 +104,7 @@ fn read_plan(path: &Path) -> Result<RenderPlan, String> {
 }
 
 /// Goes on from a state file, if there is one.
-fn resume(renderer: &mut Renderer<'_, ReadyScene>, path: &Path) -> Result<(), OutputError> {
+fn resume(renderer: &mut Renderer<'_>, path: &Path) -> Result<(), OutputError> {
     match State::load(path) {
         Err(OutputError::State { source: StateError::Io(error), .. })
             if error.kind() == std::io::ErrorKind::NotFound =>

@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use upbp_core::{ErrorPoint, ErrorSeries, Image, Progress, Renderer, State, Stop, StopReason};
-use upbp_scene::ReadyScene;
 
 use crate::exit::complain;
 
@@ -20,11 +19,7 @@ pub(crate) struct Beside<'a> {
 }
 
 /// Renders until a rule of `stop` holds.
-pub(crate) fn render(
-    renderer: &mut Renderer<'_, ReadyScene>,
-    stop: &Stop,
-    beside: &Beside<'_>,
-) -> StopReason {
+pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: &Beside<'_>) -> StopReason {
     let bar = if beside.quiet { ProgressBar::hidden() } else { ProgressBar::new(1000) };
     if let Ok(style) = ProgressStyle::with_template("[{elapsed_precise}] {bar:40} {percent:>3} %  {msg}") {
         bar.set_style(style);

@@ -3,7 +3,6 @@
 use std::error::Error;
 
 use upbp_core::{ErrorPoint, Renderer, Settings};
-use upbp_scene::ReadyScene;
 
 use crate::subject::Subject;
 
@@ -13,11 +12,8 @@ const SPACING: f64 = 1.1;
 const TURN: f64 = 0.1;
 
 /// A render that has not begun: the census is taken, the pilot has run.
-pub(crate) fn prepare(
-    subject: &Subject,
-    settings: Settings,
-) -> Result<Renderer<'_, ReadyScene>, Box<dyn Error>> {
-    let renderer = Renderer::new(&subject.scene, settings.validate()?)?;
+pub(crate) fn prepare(subject: &Subject, settings: Settings) -> Result<Renderer<'_>, Box<dyn Error>> {
+    let renderer = subject.scene.renderer(settings.validate()?)?;
     let (rect, reference) = (renderer.film().rect(), &subject.reference);
     if (reference.width, reference.height) != (rect.width, rect.height) {
         return Err(format!(
@@ -33,11 +29,7 @@ pub(crate) fn prepare(
 /// rendering, the pilot included; taking errors does not count.
 ///
 /// They take turns: the speed of a machine that others use changes within seconds, and so it does for all of them alike.
-pub(crate) fn measure(
-    subject: &Subject,
-    renderers: Vec<Renderer<'_, ReadyScene>>,
-    seconds: f64,
-) -> Vec<Vec<ErrorPoint>> {
+pub(crate) fn measure(subject: &Subject, renderers: Vec<Renderer<'_>>, seconds: f64) -> Vec<Vec<ErrorPoint>> {
     let mut lines: Vec<Line<'_>> =
         renderers.into_iter().map(|renderer| Line::new(subject, renderer)).collect();
     let mut turn_ends = 0.0;
@@ -53,7 +45,7 @@ pub(crate) fn measure(
 /// A render with what was measured of it so far.
 struct Line<'a> {
     subject: &'a Subject,
-    renderer: Renderer<'a, ReadyScene>,
+    renderer: Renderer<'a>,
     points: Vec<ErrorPoint>,
     /// The number of iterations at which the next error is taken.
     next: u64,
@@ -62,7 +54,7 @@ struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    fn new(subject: &'a Subject, renderer: Renderer<'a, ReadyScene>) -> Self {
+    fn new(subject: &'a Subject, renderer: Renderer<'a>) -> Self {
         let pilot = renderer.report().seconds.total();
         Self { subject, renderer, points: Vec::new(), next: 1, pilot, done: false }
     }

@@ -174,8 +174,8 @@ fn render<'s>(
     scene: &'s ReadyScene,
     settings: Settings,
     stop: &Stop,
-) -> Result<(Renderer<'s, ReadyScene>, Spread), Box<dyn Error>> {
-    let mut renderer = Renderer::new(scene, settings.validate()?)?;
+) -> Result<(Renderer<'s>, Spread), Box<dyn Error>> {
+    let mut renderer = scene.renderer(settings.validate()?)?;
     let mut spread = Spread::default();
     renderer.render(stop, |now| {
         spread.add(now.film);

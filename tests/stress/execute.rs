@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use upbp_core::{Counters, Film, Renderer, Settings};
+use upbp_core::{Counters, Film, Settings};
 use upbp_scene::ReadyScene;
 
 use crate::support::Estimate;
@@ -71,7 +71,7 @@ fn render_here(text: &str, settings: Settings, iterations: u64) -> Result<Render
     let start = Instant::now();
     let scene = ReadyScene::from_ron_str(text, "").map_err(|error| format!("refused: {error}"))?;
     let settings = settings.validate().map_err(|error| format!("refused: {error}"))?;
-    let mut renderer = Renderer::new(&scene, settings).map_err(|error| format!("refused: {error}"))?;
+    let mut renderer = scene.renderer(settings).map_err(|error| format!("refused: {error}"))?;
     let (mut values, mut before): (Vec<[f64; 3]>, _) = (Vec::new(), [0.0; 3]);
     for n in 1..=iterations {
         renderer.iterate();

@@ -1,9 +1,10 @@
-//! Statistics of renders, shared by the tests of the workspace.
+//! Scenes, renders and their statistics, shared by the tests of the workspace.
 
 #![allow(dead_code, reason = "each test uses its part")]
 
-use upbp_core::scene::Scene;
 use upbp_core::{Image, Renderer, Settings};
+use upbp_scene::ReadyScene;
+use upbp_scene::description::{Count, Film};
 
 /// A mean over independent iterations, with its standard error.
 #[derive(Clone, Copy, Debug)]
@@ -34,10 +35,28 @@ impl Estimate {
     }
 }
 
+/// The room of `examples/host_renderer`, as a scene file, `side` pixels wide and high.
+pub(crate) fn room(side: u32) -> ReadyScene {
+    let side = Count::new(side).expect("a positive number");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/room.ron");
+    ReadyScene::load_with(path, |description| {
+        description.film = Film { width: side, height: side, crop: None };
+    })
+    .expect("a valid scene")
+}
+
+/// A render that cannot be refused.
+pub(crate) fn renderer(scene: &ReadyScene, settings: Settings) -> Renderer<'_> {
+    scene.renderer(settings.validate().expect("valid settings")).expect("a scene that can be rendered")
+}
+
 /// Renders `iterations` iterations and returns the image mean of each, per channel, and the image.
-pub(crate) fn iterate<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Vec<[f64; 3]>, Image) {
-    let checked = settings.clone().validate().expect("valid settings");
-    let mut renderer = Renderer::new(scene, checked).expect("a scene that can be rendered");
+pub(crate) fn iterate(scene: &ReadyScene, settings: &Settings, iterations: u64) -> (Vec<[f64; 3]>, Image) {
+    iterate_by(renderer(scene, settings.clone()), iterations)
+}
+
+/// The same by a renderer of any scene.
+fn iterate_by(mut renderer: Renderer<'_>, iterations: u64) -> (Vec<[f64; 3]>, Image) {
     let mut means = Vec::new();
     let mut before = [0.0; 3];
     for n in 1..=iterations {
@@ -50,14 +69,19 @@ pub(crate) fn iterate<S: Scene>(scene: &S, settings: &Settings, iterations: u64)
 }
 
 /// Renders `iterations` iterations and returns the estimate of the image mean, and the image.
-pub(crate) fn render<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> (Estimate, Image) {
-    let (means, image) = iterate(scene, settings, iterations);
+pub(crate) fn render(scene: &ReadyScene, settings: &Settings, iterations: u64) -> (Estimate, Image) {
+    render_by(renderer(scene, settings.clone()), iterations)
+}
+
+/// The same by a renderer of any scene.
+pub(crate) fn render_by(renderer: Renderer<'_>, iterations: u64) -> (Estimate, Image) {
+    let (means, image) = iterate_by(renderer, iterations);
     let grey: Vec<f64> = means.iter().map(|m| m.iter().sum::<f64>() / 3.0).collect();
     (Estimate::of(&grey), image)
 }
 
 /// Renders `iterations` iterations and returns the estimate of the image mean per channel.
-pub(crate) fn render_channels<S: Scene>(scene: &S, settings: &Settings, iterations: u64) -> [Estimate; 3] {
+pub(crate) fn render_channels(scene: &ReadyScene, settings: &Settings, iterations: u64) -> [Estimate; 3] {
     channels(&iterate(scene, settings, iterations).0)
 }
 

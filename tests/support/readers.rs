@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use upbp_core::{LightPaths, Renderer, Settings, State, StateError};
+use upbp_core::{LightPaths, Settings, State, StateError};
 use upbp_scene::obj::ObjMesh;
 use upbp_scene::{ReadyScene, SceneDescription};
 
@@ -30,7 +30,7 @@ pub(crate) fn read_scene(text: &str) {
         crop: None,
     };
     let Ok(scene) = ReadyScene::build(&description, "no/such/folder") else { return };
-    if let Ok(mut renderer) = Renderer::new(&scene, little().validate().expect("valid settings")) {
+    if let Ok(mut renderer) = scene.renderer(little().validate().expect("valid settings")) {
         renderer.iterate();
         let fine = |value: &f32| value.is_finite() && *value >= 0.0;
         assert!(renderer.film().image().pixels.iter().flatten().all(fine), "{text}");

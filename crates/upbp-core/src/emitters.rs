@@ -7,7 +7,7 @@
 //! fixed before any sample of the image.
 
 use rayon::prelude::*;
-use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, Observer};
+use upbp_estimators::observer::{DynObserver, Joint, LightEnd, ObservedSample, Observer};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, EmitterShares, LightMap, Plan, StreamKind, World};
@@ -89,7 +89,8 @@ fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, Emitt
             let mut seen = Seen { first: range.start, starts: vec![None; range.len()], ..Seen::default() };
             let mut out = LightChunk::default();
             for index in range {
-                trace_light_path(&context, StreamKind::PilotLight, index, scratch, &mut out, &mut seen);
+                let observer: &mut DynObserver<'_, S::Bsdf> = &mut seen;
+                trace_light_path(&context, StreamKind::PilotLight, index, scratch, &mut out, observer);
             }
             (out, seen)
         })
@@ -117,7 +118,8 @@ fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, Emitt
             for index in chunk * u64::from(CHUNK)..(chunk + 1) * u64::from(CHUNK) {
                 let (pixel, counters) = (pixel(film, index), &mut Counters::default());
                 let kind = StreamKind::PilotCamera;
-                trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, &mut seen);
+                let observer: &mut DynObserver<'_, S::Bsdf> = &mut seen;
+                trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);
             }
             seen
         })

@@ -9,7 +9,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
-use upbp_estimators::observer::{ObservedVertex, Observer};
+use upbp_estimators::observer::{DynObserver, ObservedVertex, Observer};
 use upbp_estimators::scene::Scene;
 use upbp_estimators::walk::{Context, LightVertex, Scratch, Site, trace_camera_path};
 use upbp_estimators::{
@@ -227,7 +227,8 @@ fn camera_queries<S: Scene>(world: &World<'_, S>, plan: &Plan) -> Queries {
             for index in chunk * CHUNK..(chunk + 1) * CHUNK {
                 let (kind, pixel) = (StreamKind::PilotCamera, pixel(crop, index));
                 let counters = &mut Counters::default();
-                trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, &mut queries);
+                let observer: &mut DynObserver<'_, S::Bsdf> = &mut queries;
+                trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);
             }
             queries
         })

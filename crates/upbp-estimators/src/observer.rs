@@ -130,6 +130,10 @@ pub trait Observer<B> {
     }
 }
 
+/// Any observer. Walks are compiled for each type of observer, which takes long; those that see a few thousand paths do not need
+/// one of their own.
+pub type DynObserver<'a, B, D = f64> = dyn Observer<B, Densities = D> + 'a;
+
 /// Nobody looks.
 impl<B> Observer<B> for () {
     type Densities = f64;

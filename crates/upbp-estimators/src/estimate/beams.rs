@@ -16,7 +16,7 @@ use crate::technique::Technique;
 use crate::walk::{Context, Output, Passage, PhotonBeam, QueryEdge, Site, Span};
 
 /// The merges along an edge of the camera sub-path, through all its media. A short query beam ends where the walk stops.
-pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf>>(
+pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
     look_ups: &LookUps,
@@ -127,7 +127,7 @@ impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
     }
 
     /// PB2D.
-    fn merge_point<O: Observer<S::Bsdf, Densities = D>>(
+    fn merge_point<O: Observer<S::Bsdf, Densities = D> + ?Sized>(
         &self,
         map: &LightMap<S::Bsdf, O::Densities>,
         index: u32,
@@ -160,7 +160,7 @@ impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
     }
 
     /// BB1D.
-    fn merge_beam<O: Observer<S::Bsdf, Densities = D>>(
+    fn merge_beam<O: Observer<S::Bsdf, Densities = D> + ?Sized>(
         &self,
         beam: &PhotonBeam<D>,
         approach: &upbp_accel::ClosestApproach,
@@ -190,7 +190,7 @@ impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
         );
     }
 
-    fn merge<O: Observer<S::Bsdf, Densities = D>>(
+    fn merge<O: Observer<S::Bsdf, Densities = D> + ?Sized>(
         &self,
         light: &Incoming<D>,
         foot: &Foot<D>,

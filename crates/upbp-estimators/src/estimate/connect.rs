@@ -12,7 +12,7 @@ use crate::technique::Technique;
 use crate::walk::{Context, LightVertex, Output, QueryVertex, Site, Target, clear_edge, ray_origin};
 
 /// Connects `vertex` to as many light vertices as the plan says.
-pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf>>(
+pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,
@@ -35,7 +35,7 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf>>(
     out.observer.turns_to(None);
 }
 
-fn connect<S: Scene, O: Observer<S::Bsdf>>(
+fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,
     light: &LightVertex<S::Bsdf, O::Densities>,

@@ -13,7 +13,7 @@ use crate::walk::{Output, Passage, QueryEdge};
 /// Emission of media along the whole ray to the next surface, integrated in closed form.
 ///
 /// No other technique starts a path in a medium, so the weight is one.
-pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf>>(
+pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
     edge: &QueryEdge<O::Densities>,
@@ -45,7 +45,7 @@ pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf>>(
 
 /// The camera sub-path has hit a surface that may shine.
 #[expect(clippy::too_many_arguments, reason = "the state of one hit, used here only")]
-pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf>>(
+pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     hit: &Hit<S::Bsdf>,
     direction: Vec3,
@@ -62,7 +62,7 @@ pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf>>(
 }
 
 /// The camera sub-path has left the scene.
-pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf>>(
+pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
     edge: &QueryEdge<O::Densities>,
@@ -87,7 +87,7 @@ pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf>>(
 
 /// An emitter's light at the end of a camera sub-path.
 #[expect(clippy::too_many_arguments, reason = "the state of one hit, used here only")]
-fn shine<S: Scene, O: Observer<S::Bsdf>>(
+fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     emitter: EmitterId,
     point: &EmitterPoint,

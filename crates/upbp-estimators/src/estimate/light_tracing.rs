@@ -8,7 +8,7 @@ use crate::technique::Technique;
 use crate::walk::{Context, LightChunk, LightVertex, Sides, Splat, Target, clear_edge, ray_origin};
 
 /// Connects a light vertex to the camera; `sides` are the bodies around it.
-pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf>>(
+pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &LightVertex<S::Bsdf, O::Densities>,
     sides: &Sides,

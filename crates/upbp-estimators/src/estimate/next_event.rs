@@ -8,7 +8,7 @@ use crate::technique::Technique;
 use crate::walk::{Context, MIN_COSINE, Output, QueryVertex, Target, clear_edge, ray_origin};
 
 /// Connects `vertex` to as many points on lights as the plan says.
-pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf>>(
+pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,
     stream: &mut Stream,
@@ -26,7 +26,7 @@ pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf>>(
     out.observer.turns_to(None);
 }
 
-fn next_event<S: Scene, O: Observer<S::Bsdf>>(
+fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,
     stream: &mut Stream,

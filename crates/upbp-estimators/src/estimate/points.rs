@@ -19,7 +19,7 @@ const MIN_NORMAL_COSINE: f32 = 0.7;
 const MAX_PLANE_DISTANCE: f32 = 0.3;
 
 /// The merges at `vertex`.
-pub(crate) fn at_point<S: Scene, O: Observer<S::Bsdf>>(
+pub(crate) fn at_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
     look_ups: &LookUps,
@@ -90,7 +90,7 @@ fn lies_on<B, D>(
 
 /// Merges a photon with the query point: surface merging and PP3D differ in kernel and factor only. The photon comes with its
 /// squared distance and with how often the look-up counts.
-fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
+fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,
     photon: &LightVertex<S::Bsdf, O::Densities>,
@@ -149,7 +149,7 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf>>(
 }
 
 /// BP2D: photon beams around the query point, in its medium; `scale` is how often the look-up counts.
-fn beams_around<S: Scene, O: Observer<S::Bsdf>>(
+fn beams_around<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,

@@ -26,13 +26,13 @@ pub struct CameraWalk {
 }
 
 /// What a technique adds to: the layers of the sample at hand and the counters of the pass.
-pub(crate) struct Output<'a, O> {
+pub(crate) struct Output<'a, O: ?Sized> {
     pub(crate) layers: &'a mut [Spectrum; Layer::COUNT],
     pub(crate) counters: &'a mut Counters,
     pub(crate) observer: &'a mut O,
 }
 
-impl<O> Output<'_, O> {
+impl<O: ?Sized> Output<'_, O> {
     /// Adds a weighted contribution; whether it was accepted.
     #[inline]
     pub(crate) fn add<D: Densities>(
@@ -77,7 +77,7 @@ pub(crate) struct QueryVertex<B, D> {
 
 /// Traces the camera sub-path of one sample of a pixel. `index` addresses its random numbers.
 #[expect(clippy::too_many_arguments, reason = "one call per sample, with the state of the pass")]
-pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf>>(
+pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
     kind: StreamKind,

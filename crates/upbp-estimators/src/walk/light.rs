@@ -30,7 +30,7 @@ struct Flight<D> {
 }
 
 /// Traces light sub-path `index`.
-pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
+pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     kind: StreamKind,
     index: u32,
@@ -121,7 +121,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf>>(
     }
 }
 
-fn emit<S: Scene, O: Observer<S::Bsdf>>(
+fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     world: &World<'_, S>,
     context: &Context<'_, S>,
     index: u32,

@@ -8,7 +8,10 @@ use upbp_estimators::observer::LightEnd;
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Interior, MediumId, Roulette};
 
-use crate::closed_form::{ClosedForm, Fog, Material, Source};
+use super::fog::Fog;
+use super::light::Source;
+use super::material::Material;
+use super::scene::ClosedForm;
 
 /// Closer to a boundary or an end than this, double precision does not say on which side single precision
 /// was.

@@ -4,17 +4,14 @@
 //! Compared are means over the whole film, path by path: sums of thousands of pixels show a missing factor of
 //! a per cent, which single pixels hide in their noise.
 
-#[expect(dead_code, reason = "the scene also says what a path is rebuilt from; here it is only rendered")]
-#[path = "support/closed_form.rs"]
-mod closed_form;
-
-use closed_form::ClosedForm;
 use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, StreamKind, World,
 };
+
+use super::scene::ClosedForm;
 
 const SIZE: u32 = 48;
 

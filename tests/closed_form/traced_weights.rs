@@ -4,14 +4,7 @@
 //! The abstract test of the recursion takes densities as given. Here they are those of the walks: wrong
 //! distances, stacks of bodies, reverse densities and thresholds show.
 
-#[path = "support/closed_form.rs"]
-mod closed_form;
-#[path = "support/rebuild.rs"]
-mod rebuild;
-
-use closed_form::{ClosedForm, Material};
 use glam::Vec3;
-use rebuild::{Trace, Vertex};
 use upbp_estimators::mis::oracle::{Path, Strategy};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
@@ -23,6 +16,10 @@ use upbp_estimators::{
     Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Stream,
     StreamKind, Technique, TechniqueSet, World,
 };
+
+use super::material::Material;
+use super::rebuild::{Trace, Vertex};
+use super::scene::ClosedForm;
 
 /// Weights below this are compared with nothing: they are rounding of others.
 const SMALLEST_WEIGHT: f64 = 1e-6;

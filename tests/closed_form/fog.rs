@@ -1,0 +1,77 @@
+//! Chromatic media.
+
+use glam::Vec3;
+use upbp_estimators::Spectrum;
+use upbp_media::{Medium, PhaseFunction, RaySegment, SegmentDensity};
+
+/// A homogeneous medium that chooses among its channels with probabilities of its own.
+#[derive(Clone, Debug)]
+pub(crate) struct Fog {
+    pub(crate) sigma_a: [f32; 3],
+    pub(crate) sigma_s: [f32; 3],
+    pub(crate) g: f32,
+    phase: PhaseFunction,
+}
+
+impl Fog {
+    /// How often distances follow each channel.
+    pub(crate) const ALPHA: [f64; 3] = [0.5, 0.2, 0.3];
+
+    /// Probability to go on after a collision.
+    pub(crate) const CONTINUATION: f64 = 0.9;
+
+    pub(crate) fn new(sigma_a: [f32; 3], sigma_s: [f32; 3], g: f32) -> Self {
+        let phase = PhaseFunction::henyey_greenstein(g).expect("in range");
+        Self { sigma_a, sigma_s, g, phase }
+    }
+
+    pub(crate) fn extinction(&self) -> [f64; 3] {
+        [0, 1, 2].map(|channel| f64::from(self.sigma_a[channel] + self.sigma_s[channel]))
+    }
+}
+
+impl Medium for Fog {
+    fn scatters(&self) -> bool {
+        self.sigma_s != [0.0; 3]
+    }
+
+    fn segment(&self, segment: &RaySegment) -> SegmentDensity {
+        let sigma = self.extinction();
+        let passing = sigma.map(|sigma| (-sigma * segment.length_f64().min(f64::MAX)).exp());
+        let transmittance = Spectrum::from_array(passing.map(|t| t as f32));
+        if !self.scatters() {
+            return SegmentDensity::passing(transmittance);
+        }
+        let mean = |f: [f64; 3]| f.iter().zip(Self::ALPHA).map(|(f, alpha)| f * alpha).sum::<f64>();
+        let stop = mean([0, 1, 2].map(|channel| sigma[channel] * passing[channel]));
+        SegmentDensity { transmittance, reach: mean(passing), stop_at_end: stop, stop_at_start: stop }
+    }
+
+    fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32> {
+        let [first, second, _] = Self::ALPHA;
+        let u = f64::from(u_channel);
+        let sigma = self.extinction()[usize::from(u >= first) + usize::from(u >= first + second)];
+        let t = f64::from(segment.start) - f64::ln_1p(-f64::from(u_distance)) / sigma;
+        (self.scatters() && t < f64::from(segment.end)).then(|| (t as f32).min(segment.end.next_down()))
+    }
+
+    fn sigma_s(&self, _: Vec3) -> Spectrum {
+        self.sigma_s.into()
+    }
+
+    fn sigma_t(&self, _: Vec3) -> Spectrum {
+        Spectrum::from_array(self.extinction().map(|sigma| sigma as f32))
+    }
+
+    fn phase(&self) -> &PhaseFunction {
+        &self.phase
+    }
+
+    fn continuation(&self, _: Vec3) -> f32 {
+        Self::CONTINUATION as f32
+    }
+
+    fn mean_free_path(&self) -> f32 {
+        1.0 / self.sigma_t(Vec3::ZERO).mean()
+    }
+}

@@ -1,0 +1,177 @@
+//! The scene.
+
+use glam::{DVec3, Vec3};
+use upbp_estimators::scene::{BoundingSphere, EmitterId, Hit, Scene};
+use upbp_estimators::{BodyId, Interior, MediumId, Ray};
+
+use super::camera::Pinhole;
+use super::fog::Fog;
+use super::light::{Light, Source};
+use super::material::Material;
+use super::shape::Shape;
+
+/// Cosine of the shading normal's largest tilt is well above zero: it never leaves the hemisphere.
+const BUMP: f64 = 0.25;
+
+/// Something that a ray can meet.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Object {
+    pub(crate) shape: Shape,
+    /// `None`: an index-matched boundary.
+    pub(crate) material: Option<Material>,
+    pub(crate) interior: Option<Interior>,
+    pub(crate) emitter: Option<EmitterId>,
+    bumpy: bool,
+}
+
+impl Object {
+    fn new(shape: Shape, material: Option<Material>) -> Self {
+        Self { shape, material, interior: None, emitter: None, bumpy: false }
+    }
+
+    fn filled(self, body: u32, medium: u32, priority: i32, ior: f32) -> Self {
+        let interior = Interior { body: BodyId(body), medium: Some(MediumId(medium)), priority, ior };
+        Self { interior: Some(interior), ..self }
+    }
+
+    pub(crate) fn shading_normal(&self, point: DVec3) -> DVec3 {
+        let normal = self.shape.normal(point);
+        if !self.bumpy {
+            return normal;
+        }
+        let (s, t) = normal.any_orthonormal_pair();
+        (normal + BUMP * (5.0 * point.x).sin() * s + BUMP * (7.0 * point.z).cos() * t).normalize()
+    }
+}
+
+/// All of it.
+pub(crate) struct ClosedForm {
+    pub(crate) objects: Vec<Object>,
+    pub(crate) lights: Vec<Light>,
+    pub(crate) media: Vec<Fog>,
+    pub(crate) camera: Pinhole,
+}
+
+impl ClosedForm {
+    /// The scene, with a film of `size` pixels a side, the camera at `centre`.
+    pub(crate) fn new(centre: Vec3, size: u32) -> Self {
+        let media = vec![
+            // Chromatic and forward.
+            Fog::new([0.05, 0.02, 0.1], [0.4, 0.6, 0.9], 0.6),
+            // Dense, grey, backward.
+            Fog::new([0.2; 3], [1.8; 3], -0.3),
+            // Absorbs only.
+            Fog::new([0.5, 1.0, 2.0], [0.0; 3], 0.0),
+            // In the glass.
+            Fog::new([0.3, 0.1, 0.1], [0.2, 0.8, 0.5], 0.3),
+            // In the paper lantern.
+            Fog::new([0.1; 3], [1.2; 3], 0.0),
+        ];
+        let lamp = Shape::rectangle([-0.4, 1.9, -0.4], [0.8, 0.0, 0.0], [0.0, 0.0, 0.8]);
+        let lamp_in_fog = Shape::rectangle([0.3, 0.95, -0.2], [0.3, 0.0, 0.0], [0.0, 0.0, 0.3]);
+        // Both shine downwards: u × v = −y.
+        let shining = |shape, emitter| Object {
+            emitter: Some(EmitterId(emitter)),
+            ..Object::new(shape, Some(Material::Diffuse))
+        };
+        let objects = vec![
+            Object {
+                bumpy: true,
+                ..Object::new(
+                    Shape::rectangle([-2.0, -1.0, -2.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0]),
+                    Some(Material::Diffuse),
+                )
+            },
+            Object::new(
+                Shape::rectangle([-2.0, -1.0, -2.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]),
+                Some(Material::Coated),
+            ),
+            // Fog, open to the floor; a dense cloud in it, and a dark one in that.
+            Object::new(Shape::sphere([0.0, 0.1, 0.0], 1.3), None).filled(0, 0, 0, 1.0),
+            Object::new(Shape::sphere([0.55, -0.1, 0.1], 0.45), None).filled(1, 1, 1, 1.0),
+            Object::new(Shape::sphere([0.55, -0.1, 0.25], 0.2), None).filled(2, 2, 2, 1.0),
+            // Half in the fog, whose boundary is hidden inside.
+            Object::new(Shape::sphere([-0.8, -0.4, 0.4], 0.45), Some(Material::Glass)).filled(3, 3, 10, 1.5),
+            Object::new(Shape::sphere([0.2, -0.7, 0.8], 0.25), Some(Material::Mirror)),
+            Object::new(Shape::sphere([-0.1, 0.6, -0.3], 0.3), Some(Material::Paper)).filled(4, 4, 5, 1.0),
+            shining(lamp, 0),
+            shining(lamp_in_fog, 1),
+        ];
+        let light = |source, power| Light { source, power };
+        let lights = vec![
+            light(Source::Area(lamp), 3.0),
+            light(Source::Area(lamp_in_fog), 1.5),
+            light(Source::Point(DVec3::new(-0.5, 0.3, 0.6)), 2.0),
+            light(Source::Directional(DVec3::new(0.3, -1.0, -0.4).normalize()), 1.0),
+            light(Source::Environment, 2.0),
+        ];
+        let camera = Pinhole { centre, size, film_distance: size as f32 };
+        Self { objects, lights, media, camera }
+    }
+
+    /// The body that counts at a point, by asking all of them.
+    pub(crate) fn body_at(&self, point: DVec3) -> Option<Interior> {
+        let around = self.objects.iter().filter(|object| object.shape.contains(point));
+        around.filter_map(|object| object.interior).max_by_key(|interior| interior.priority)
+    }
+
+    /// The surface with a material that is nearest to a point, and how far it is.
+    pub(crate) fn surface_at(&self, point: DVec3) -> (&Object, f64) {
+        self.objects
+            .iter()
+            .filter(|object| object.material.is_some())
+            .map(|object| (object, object.shape.distance(point)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .expect("there are surfaces")
+    }
+}
+
+impl Scene for ClosedForm {
+    type Bsdf = Material;
+    type Emitter = Light;
+    type Medium = Fog;
+    type Camera = Pinhole;
+
+    fn intersect(&self, ray: &Ray) -> Option<Hit<Material>> {
+        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let range = f64::from(ray.t_min)..f64::from(ray.t_max);
+        let mut nearest: Option<(f64, &Object)> = None;
+        for object in &self.objects {
+            for t in object.shape.roots(origin, direction).into_iter().flatten() {
+                let inside = t > range.start && t < range.end && nearest.is_none_or(|(other, _)| t < other);
+                // Rounded to a boundary of the range it would not be in it.
+                if inside && t as f32 > ray.t_min {
+                    nearest = Some((t, object));
+                }
+            }
+        }
+        let (t, object) = nearest?;
+        let position = object.shape.snap(origin + t * direction);
+        let rounded = position.as_vec3();
+        Some(Hit {
+            t: t as f32,
+            position: rounded,
+            geometric_normal: object.shape.normal(position).as_vec3(),
+            shading_normal: object.shading_normal(rounded.as_dvec3()).as_vec3(),
+            bsdf: object.material,
+            interior: object.interior,
+            emitter: object.emitter,
+        })
+    }
+
+    fn bounds(&self) -> BoundingSphere {
+        BoundingSphere { centre: Vec3::ZERO, radius: 3.6 }
+    }
+
+    fn emitters(&self) -> &[Light] {
+        &self.lights
+    }
+
+    fn media(&self) -> &[Fog] {
+        &self.media
+    }
+
+    fn camera(&self) -> &Pinhole {
+        &self.camera
+    }
+}

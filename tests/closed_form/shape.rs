@@ -1,0 +1,98 @@
+//! Surfaces in closed form.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+/// A surface without thickness.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Shape {
+    Sphere {
+        centre: DVec3,
+        radius: f64,
+    },
+    /// `corner + u·edges[0] + v·edges[1]`, the edges perpendicular; the normal is their cross product.
+    Rectangle {
+        corner: DVec3,
+        edges: [DVec3; 2],
+    },
+}
+
+impl Shape {
+    pub(crate) fn rectangle(corner: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Self {
+        Self::Rectangle { corner: corner.into(), edges: [u.into(), v.into()] }
+    }
+
+    pub(crate) fn sphere(centre: [f64; 3], radius: f64) -> Self {
+        Self::Sphere { centre: centre.into(), radius }
+    }
+
+    pub(crate) fn normal(&self, point: DVec3) -> DVec3 {
+        match self {
+            Self::Sphere { centre, .. } => (point - centre).normalize(),
+            Self::Rectangle { edges: [u, v], .. } => u.cross(*v).normalize(),
+        }
+    }
+
+    /// Distances at which the line meets the surface.
+    pub(crate) fn roots(&self, origin: DVec3, direction: DVec3) -> [Option<f64>; 2] {
+        match self {
+            Self::Sphere { centre, radius } => {
+                let between = origin - centre;
+                let half = between.dot(direction);
+                // The discriminant from the distance to the line: nothing cancels for a far origin.
+                let across = between - half * direction;
+                let discriminant = radius * radius - across.length_squared();
+                if discriminant < 0.0 {
+                    return [None; 2];
+                }
+                let root = discriminant.sqrt();
+                [Some(-half - root), Some(-half + root)]
+            }
+            Self::Rectangle { corner, edges } => {
+                let normal = self.normal(*corner);
+                let t = (corner - origin).dot(normal) / direction.dot(normal);
+                let [u, v] = Self::coordinates(*corner, edges, origin + t * direction);
+                let inside = t.is_finite() && (0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v);
+                [inside.then_some(t), None]
+            }
+        }
+    }
+
+    pub(crate) fn coordinates(corner: DVec3, edges: &[DVec3; 2], point: DVec3) -> [f64; 2] {
+        edges.map(|edge| (point - corner).dot(edge) / edge.length_squared())
+    }
+
+    /// The nearest point of the surface's sphere or plane.
+    pub(crate) fn snap(&self, point: DVec3) -> DVec3 {
+        match self {
+            Self::Sphere { centre, radius } => centre + (point - centre).normalize() * *radius,
+            Self::Rectangle { corner, .. } => {
+                let normal = self.normal(point);
+                point - (point - corner).dot(normal) * normal
+            }
+        }
+    }
+
+    /// How far a point is from the surface.
+    pub(crate) fn distance(&self, point: DVec3) -> f64 {
+        match self {
+            Self::Sphere { .. } => (point - self.snap(point)).length(),
+            Self::Rectangle { corner, edges } => {
+                let [u, v] = Self::coordinates(*corner, edges, point).map(|x| x.clamp(0.0, 1.0));
+                (point - (corner + u * edges[0] + v * edges[1])).length()
+            }
+        }
+    }
+
+    pub(crate) fn contains(&self, point: DVec3) -> bool {
+        matches!(self, Self::Sphere { centre, radius } if (point - centre).length() < *radius)
+    }
+
+    pub(crate) fn area(&self) -> f64 {
+        match self {
+            Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
+            Self::Rectangle { edges: [u, v], .. } => u.cross(*v).length(),
+        }
+    }
+}
