@@ -5,6 +5,8 @@ mod support;
 #[path = "../examples/host_renderer/scene.rs"]
 mod scene;
 
+use std::ops::Range;
+
 use support::{Estimate, render, render_by};
 use upbp_core::{Image, Radii, Radius, Renderer, Settings};
 
@@ -49,6 +51,26 @@ fn all_subsets_agree() {
         worst = worst.max(sigmas.abs());
     }
     assert!(worst < 4.0, "worst: {worst:.2} sigma");
+}
+
+#[test]
+fn any_number_of_threads_and_any_split_give_the_same_bits() {
+    let room = scene::Room::new(12).expect("valid coefficients");
+    let part = |threads, range: Range<u64>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
+        pool.install(|| {
+            let checked = settings("all").validate().expect("valid settings");
+            let mut renderer = Renderer::new(&room, checked).expect("a renderer");
+            renderer.set_range(range);
+            while renderer.iterate() {}
+            renderer.state().clone()
+        })
+    };
+    let whole = part(1, 0..4);
+    assert!(part(4, 0..4).film() == whole.film());
+    let mut merged = part(2, 1..4);
+    merged.merge(part(3, 0..1)).expect("disjoint slices");
+    assert!(merged.film() == whole.film());
 }
 
 #[test]

@@ -8,20 +8,27 @@ use std::sync::OnceLock;
 
 use proptest::prelude::*;
 use readers::sealed;
-use upbp_core::{ErrorPoint, LightPaths, Settings, State, StateError, TechniqueSet};
+use upbp_core::{ErrorPoint, LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
+use upbp_scene::ReadyScene;
+
+/// The render that good states are of.
+fn renderer(room: &ReadyScene) -> Renderer<'_> {
+    let settings = Settings {
+        techniques: TechniqueSet::default().into(),
+        light_paths: LightPaths::Count(100),
+        ..Settings::default()
+    };
+    let mut renderer = support::renderer(room, settings);
+    renderer.identify_scene("room", b"room");
+    renderer
+}
 
 /// The bytes of a good state.
 fn good() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
         let room = support::room(5);
-        let settings = Settings {
-            techniques: TechniqueSet::default().into(),
-            light_paths: LightPaths::Count(100),
-            ..Settings::default()
-        };
-        let mut renderer = support::renderer(&room, settings);
-        renderer.identify_scene("room", b"room");
+        let mut renderer = renderer(&room);
         for range in [0..2, 7..8] {
             renderer.set_range(range);
             while renderer.iterate() {}
@@ -129,12 +136,13 @@ fn sizes_in_a_header_cost_no_memory() {
 }
 
 #[test]
-fn counts_of_any_size_are_merged_and_reported() {
+fn counts_and_times_of_any_size_are_merged_reported_and_resumed() {
     let read = |iterations: &str| {
         let mut changed = header().replace("[(0,2),(7,8)]", iterations);
         for count in ["dropped", "cut_walks", "lost_walks", "boundary_conflicts"] {
             changed = changed.replace(&format!("{count}:0"), &format!("{count}:{}", u64::MAX));
         }
+        changed = changed.replace("secs:0,", &format!("secs:{},", u64::MAX));
         let rows = &good()[16 + header().len()..];
         State::read(sealed(&[&good()[..16], changed.as_bytes(), rows].concat()).as_slice()).expect("a state")
     };
@@ -142,4 +150,9 @@ fn counts_of_any_size_are_merged_and_reported() {
     state.merge(read("[(3,6)]")).expect("no iterations in common");
     let text = state.report().to_string();
     assert!(text.contains(&format!("{} walks lost", u64::MAX)), "{text}");
+    let room = support::room(5);
+    let mut renderer = renderer(&room);
+    renderer.resume(state).expect("the same render");
+    assert!(renderer.iterate());
+    assert_eq!(renderer.film().iteration_set().to_string(), "0..6, 7..8");
 }

@@ -1,6 +1,6 @@
 //! Renders the whole stress matrix (`docs/stress.md`) and prints a table of what was run and what failed.
 //!
-//! `cargo run --release --example stress` takes the better part of an hour on two cores; `-- --filter transform` runs the
+//! `cargo run --release --example stress` takes minutes on two cores; `-- --filter transform` runs the
 //! cases whose line contains the words. Ends with exit code 1 if any case failed.
 
 #[path = "../../tests/stress/mod.rs"]

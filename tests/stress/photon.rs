@@ -11,12 +11,18 @@ use upbp_scene::ReadyScene;
 pub(crate) fn photons(scene: &str, settings: &Settings) -> Result<Vec<Vec3>, String> {
     let scene = ReadyScene::from_ron_str(scene, "").map_err(|error| format!("refused: {error}"))?;
     let settings = settings.clone().validate().map_err(|error| format!("refused: {error}"))?;
-    let plan = scene.renderer(settings).map_err(|error| format!("refused: {error}"))?.plan(0);
+    let mut renderer = scene.renderer(settings).map_err(|error| format!("refused: {error}"))?;
+    let plan = renderer.plan(0);
     let world = World::new(&scene).map_err(|error| format!("refused: {error}"))?;
     let context = Context { world: &world, plan: &plan };
     let (mut scratch, mut out) = (Scratch::default(), LightChunk::default());
     for path in 0..plan.light_paths {
         trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut out, &mut ());
+    }
+    renderer.iterate();
+    let (counted, own) = (renderer.report().counters, &out.counters);
+    if (counted.light_edges, counted.light_vertices) != (own.light_edges, own.light_vertices) {
+        return Err("the renderer has other light sub-paths".to_owned());
     }
     Ok(out.vertices.iter().map(|vertex| vertex.position).collect())
 }

@@ -1,6 +1,7 @@
 //! What a render asks of its scene, behind a trait without the scene's types.
 //!
-//! The walks are compiled for each type of scene; all else is compiled once, and gets here a few times per iteration.
+//! What touches the scene is compiled for each type of scene; the scheduler, which gets here a few times per iteration, films and files
+//! are compiled once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -23,7 +24,7 @@ use crate::stage::Stage;
 
 /// A scene at work.
 pub(crate) trait Engine: Send + Sync {
-    /// The stage that follows from a review.
+    /// The stage that follows from a review. Emitters are chosen as in stages with light sub-paths from then on.
     fn stage(&mut self, planner: &Planner, census: &Census, review: u32) -> Stage;
 
     /// What an iteration of a stage does.

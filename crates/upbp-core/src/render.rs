@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use upbp_estimators::Plan;
 use upbp_estimators::scene::Scene;
+use upbp_estimators::{Counters, Plan};
 
 use crate::adapt;
 use crate::census::Census;
@@ -17,7 +17,7 @@ use crate::iterations::MAX_ITERATIONS;
 use crate::passes::BLACK;
 use crate::planner::Planner;
 use crate::prepare::{Prepared, prepare};
-use crate::report::{ErrorPoint, Report};
+use crate::report::{ErrorPoint, PassTimes, Report};
 use crate::settings::CheckedSettings;
 use crate::stage::{RenderPlan, Stage};
 use crate::state::{Identity, State, fingerprint};
@@ -38,8 +38,16 @@ pub struct Renderer<'a> {
     cancelled: Arc<AtomicBool>,
 }
 
+/// A renderer may go to another thread.
+const _: () = {
+    const fn check<T: Send + Sync>() {}
+    check::<Renderer<'static>>();
+};
+
 impl<'a> Renderer<'a> {
     /// Takes the census, runs the pilot, and makes a plan.
+    ///
+    /// The walks are compiled for the type of scene, where this is called.
     ///
     /// # Errors
     /// A scene whose bounds, powers or crop make no sense, or a film that exceeds the memory budget.
@@ -50,7 +58,7 @@ impl<'a> Renderer<'a> {
     /// As [`new`](Self::new), but with a plan that was made before, perhaps on another machine, and does not change.
     ///
     /// # Errors
-    /// As `new`; or the plan has techniques that the settings or the scene rule out.
+    /// As `new`; or the plan has techniques that the settings or the scene rule out, or exceeds the memory budget.
     pub fn with_plan<S: Scene>(
         scene: &'a S,
         settings: CheckedSettings,
@@ -126,7 +134,8 @@ impl<'a> Renderer<'a> {
             let review = plan.stages().len() as u32;
             plan.push(Stage { from: *from, ..self.engine.stage(planner, census, review) });
         }
-        self.state.record.times.pilot += start.elapsed();
+        let times = PassTimes { pilot: start.elapsed(), ..PassTimes::default() };
+        self.state.record.times.add(&times);
     }
 
     /// Renders the next iteration: the first of the [range](Self::set_range) that is not on the film yet. `false` if there
@@ -140,11 +149,13 @@ impl<'a> Renderer<'a> {
             return false;
         };
         let start = Instant::now();
-        record.counters.dropped += film.add(iteration, &self.pixels);
+        let dropped = film.add(iteration, &self.pixels);
+        let film = start.elapsed();
+        // What a state file says may be of any size: sums that saturate.
+        record.counters.add(&Counters { dropped, ..Counters::default() });
         record.counters.add(&done.counters);
         record.map_bytes = record.map_bytes.max(done.map_bytes);
-        record.times.add(&done.times);
-        record.times.film += start.elapsed();
+        record.times.add(&PassTimes { film, ..done.times });
         true
     }
 

@@ -94,7 +94,7 @@ pub struct ObservedSample<B, D = f64> {
     pub value: Spectrum,
 }
 
-/// Receives what the walks do. All methods do nothing by default and then cost nothing.
+/// Receives what the walks do. All methods do nothing by default and then cost nothing, if the type is known.
 pub trait Observer<B> {
     /// What weights are to tell: `f64`, or [`ByTechnique`](crate::mis::ByTechnique).
     type Densities: Densities;
@@ -130,8 +130,8 @@ pub trait Observer<B> {
     }
 }
 
-/// Any observer. Walks are compiled for each type of observer, which takes long; those that see a few thousand paths do not need
-/// one of their own.
+/// Any observer, by calls through a table: for those that see a few thousand paths, so that walks are not compiled for each of
+/// them.
 pub type DynObserver<'a, B, D = f64> = dyn Observer<B, Densities = D> + 'a;
 
 /// Nobody looks.

@@ -12,6 +12,7 @@ impl ReadyScene {
     ///
     /// # Errors
     /// As there.
+    #[inline(never)]
     pub fn renderer(&self, settings: CheckedSettings) -> Result<Renderer<'_>, RenderError> {
         Renderer::new(self, settings)
     }
@@ -20,6 +21,7 @@ impl ReadyScene {
     ///
     /// # Errors
     /// As there.
+    #[inline(never)]
     pub fn renderer_with_plan(
         &self,
         settings: CheckedSettings,

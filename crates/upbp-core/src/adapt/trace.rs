@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
-use upbp_estimators::observer::{DynObserver, Observer};
+use upbp_estimators::observer::Observer;
 use upbp_estimators::scene::Scene;
 use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::walk::{trace_camera_path, trace_light_path};
@@ -87,7 +87,6 @@ impl<O> Pass<O> {
                 let mut observer = O::default();
                 let mut out = LightChunk::default();
                 watch(&mut observer, room, paths, |index, observer| {
-                    let observer: &mut DynObserver<'_, S::Bsdf, O::Densities> = observer;
                     trace_light_path(&context, StreamKind::PilotLight, index, scratch, &mut out, observer);
                 })?;
                 Some((out, observer))
@@ -118,7 +117,6 @@ impl<O> Pass<O> {
                     let index = u64::from(pass / PASSES) << 32 | u64::from(cell);
                     let (kind, pixel) = (StreamKind::PilotCamera, grid.pixel(cell));
                     let counters = &mut counters;
-                    let observer: &mut DynObserver<'_, S::Bsdf, O::Densities> = observer;
                     trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);
                 })?;
                 Some((observer, counters))
