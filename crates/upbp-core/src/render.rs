@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use upbp_estimators::Plan;
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{Counters, Plan};
 
 use crate::adapt;
 use crate::census::Census;
@@ -145,17 +145,17 @@ impl<'a> Renderer<'a> {
         self.plan_up_to(iteration);
         let plan = self.plan(iteration);
         let State { record, film, .. } = &mut self.state;
-        let Some(done) = self.engine.iterate(&plan, film.rect(), &mut self.pixels, &self.cancelled) else {
+        let Some(mut done) = self.engine.iterate(&plan, film.rect(), &mut self.pixels, &self.cancelled)
+        else {
             return false;
         };
         let start = Instant::now();
-        let dropped = film.add(iteration, &self.pixels);
-        let film = start.elapsed();
+        done.counters.dropped += film.add(iteration, &self.pixels);
+        done.times.film = start.elapsed();
         // What a state file says may be of any size: sums that saturate.
-        record.counters.add(&Counters { dropped, ..Counters::default() });
         record.counters.add(&done.counters);
+        record.times.add(&done.times);
         record.map_bytes = record.map_bytes.max(done.map_bytes);
-        record.times.add(&PassTimes { film, ..done.times });
         true
     }
 
