@@ -4,6 +4,8 @@
 //! Compared are means over the whole film, path by path: sums of thousands of pixels show a missing factor of
 //! a per cent, which single pixels hide in their noise.
 
+use std::num::NonZeroU32;
+
 use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
@@ -25,8 +27,8 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> PlanChoices {
         techniques: techniques.parse().expect("names"),
         light_paths: SIZE * SIZE,
         beam_paths: SIZE * SIZE / 2,
-        connections: 1,
-        next_events: 1,
+        connections: 1.0,
+        next_events: 1.0,
         look_ups: LookUps::ALL,
         vertices_per_light_path: 2.3,
         lengths,
@@ -73,9 +75,15 @@ fn iteration(scene: &ClosedForm, choices: &PlanChoices) -> f64 {
 
 /// Mean and standard error over the iterations.
 fn mean(scene: &ClosedForm, choices: &PlanChoices) -> (f64, f64) {
-    let n = ITERATIONS as f64;
-    let values: Vec<f64> =
-        (0..ITERATIONS).map(|i| iteration(scene, &PlanChoices { iteration: i, ..choices.clone() })).collect();
+    mean_of_blocks(scene, choices, 1)
+}
+
+/// Mean and standard error over blocks of so many iterations.
+fn mean_of_blocks(scene: &ClosedForm, choices: &PlanChoices, block: u64) -> (f64, f64) {
+    let one = |i| iteration(scene, &PlanChoices { iteration: i, ..choices.clone() });
+    let mean_of = |first: u64| (first..first + block).map(one).sum::<f64>() / block as f64;
+    let values: Vec<f64> = (0..ITERATIONS / block).map(|i| mean_of(block * i)).collect();
+    let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
     (mean, (variance / n).sqrt())
@@ -144,16 +152,19 @@ fn lights_that_are_never_hit() {
 }
 
 #[test]
-fn seldom_look_ups_and_many_next_events() {
+fn seldom_look_ups_and_other_counts() {
     let scene = ClosedForm::new(OUTSIDE, SIZE);
     let usual = choices("all", PathLengths { min: 1, max: 6 }, 200);
     let other = PlanChoices {
         seed: 201,
-        next_events: 3,
-        look_ups: LookUps { surf: 0.25, pp3d: 0.5, pb2d: 0.25, bp2d: 0.75, bb1d: 0.125 },
+        next_events: 3.0,
+        connections: 0.4,
+        look_ups: LookUps::by(|technique| NonZeroU32::new(1 + technique as u32 % 3).unwrap()),
         ..usual.clone()
     };
-    let ((expected, expected_error), (found, error)) = (mean(&scene, &usual), mean(&scene, &other));
+    let (expected, expected_error) = mean(&scene, &usual);
+    // Of periods of one, two and three, each of which has one turn.
+    let (found, error) = mean_of_blocks(&scene, &other, 6);
     let sigma = error.hypot(expected_error);
     println!("{found:.5} ± {error:.5}, expected {expected:.5} ± {expected_error:.5}");
     assert!((found - expected).abs() < 4.0 * sigma, "{found}, expected {expected} ± {sigma}");

@@ -1,7 +1,7 @@
 //! What follows from the pilot and the budget: counts and radii of all iterations.
 
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{PathLengths, Plan, PlanChoices, Roulette, Technique, TechniqueSet, World};
+use upbp_estimators::{LookUps, PathLengths, Plan, PlanChoices, Roulette, Technique, TechniqueSet, World};
 
 use crate::memory::LightCounts;
 use crate::neighbours::Neighbours;
@@ -55,10 +55,10 @@ pub(crate) fn stage<S: Scene>(
         techniques,
         light_paths: uses(TechniqueSet::ALL.without(TechniqueSet::PT), light_paths),
         beam_paths: uses(BEAMS, beam_paths),
-        connections: settings.connections.unwrap_or(1),
-        next_events: settings.next_events.unwrap_or(1),
+        connections: settings.connections.unwrap_or(1.0),
+        next_events: settings.next_events.unwrap_or(1.0),
         roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
-        look_ups: [1.0; 5],
+        look_ups: LookUps::ALL,
         vertices_per_light_path: pilot.vertices_per_path,
         radii: first_radii(world, settings, techniques, pilot, [light_paths, beam_paths]),
     }
@@ -140,7 +140,7 @@ pub(crate) fn plan<S: Scene>(
             lengths: PathLengths { min: settings.min_length, max: settings.max_length },
             roulette: stage.roulette,
             kernels: stage.radii.kernels(iteration),
-            look_ups: stage.look_ups(),
+            look_ups: stage.look_ups,
             heuristic: settings.heuristic,
             photon_beams: settings.photon_beams,
             query_beams: settings.query_beams,

@@ -80,8 +80,8 @@ pub(crate) fn run<S: Scene>(
             techniques: techniques.without([Technique::LightTracing].into_iter().collect()),
             light_paths,
             beam_paths: light_paths / PATHS_PER_BEAM_PATH,
-            connections: 1,
-            next_events: 1,
+            connections: 1.0,
+            next_events: 1.0,
             look_ups: LookUps::ALL,
             vertices_per_light_path: 1.0,
             lengths: PathLengths { min: settings.min_length, max: settings.max_length },
@@ -131,7 +131,7 @@ pub(crate) fn run<S: Scene>(
     };
     Pilot {
         vertices_per_path: light.vertices.len() as f64 / paths,
-        surface_per_path: looked_up(plan.mis.surf > 0.0, on_surfaces),
+        surface_per_path: looked_up(plan.looks_up(Technique::Surf), on_surfaces),
         medium_per_path: looked_up(plan.stores_medium_photons(), in_media),
         pieces_per_path: beams.pieces() as f64 / beam_paths,
         beams_per_path: light.beams.len() as f64 / beam_paths,

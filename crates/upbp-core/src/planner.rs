@@ -33,6 +33,8 @@ impl Planner {
         /// Numbers of light sub-paths that are tried, relative to one per pixel.
         const LIGHT_PATHS: [f64; 3] = [0.0625, 0.25, 1.0];
         const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
+        /// Connections per camera vertex that are tried, relative to one.
+        const CONNECTIONS: [f64; 3] = [0.25, 0.5, 1.0];
         let Self { settings, everything, .. } = self;
         if everything.techniques.without(TechniqueSet::PT).is_empty() {
             return everything.clone();
@@ -65,6 +67,10 @@ impl Planner {
                         None => BEAM_PATHS.into_iter().filter(fits).collect(),
                         Some(_) => vec![1.0],
                     },
+                    connections: match settings.connections {
+                        None => CONNECTIONS.to_vec(),
+                        Some(_) => vec![1.0],
+                    },
                     roulettes: match settings.roulette {
                         Some(_) => roulette::TRIAL..roulette::TRIAL + 1,
                         None => 0..roulette::COUNT,
@@ -88,6 +94,7 @@ impl Planner {
             techniques: candidate.techniques,
             light_paths,
             beam_paths,
+            connections: everything.connections * candidate.connections as f32,
             roulette: roulette::numbered(candidate.roulette, of_trial),
             look_ups: candidate.look_ups(),
             ..everything.clone()

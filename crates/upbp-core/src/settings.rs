@@ -6,6 +6,7 @@ use upbp_estimators::mis::{BeamExtent, Heuristic};
 
 use crate::error::SettingsError;
 use crate::radius::{Radii, Radius};
+use crate::stage::PER_VERTEX;
 use crate::techniques::Techniques;
 
 /// A number of light sub-paths per iteration.
@@ -33,10 +34,11 @@ pub struct Settings {
     /// Light sub-paths that leave photon beams; `None` for as many as a pilot finds useful, or a quarter or four times of that if techniques are
     /// chosen.
     pub beams: Option<u32>,
-    /// Light vertices that every camera vertex is connected to, `[1, 1000]`; `None` for one.
-    pub connections: Option<u32>,
-    /// Points on lights that every camera vertex is connected to, `[1, 1000]`; `None` for one.
-    pub next_events: Option<u32>,
+    /// Light vertices that every camera vertex is connected to, on average, in `[0.001, 1000]`; `None` for one, or fewer if
+    /// techniques are chosen.
+    pub connections: Option<f32>,
+    /// Points on lights that every camera vertex is connected to, likewise.
+    pub next_events: Option<f32>,
     /// Fewest edges of a path between light and camera, at least 1.
     pub min_length: u32,
     /// Most edges of a path, at least `min_length`. Thick media that hardly absorb need many: walks that are cut are counted
@@ -117,9 +119,9 @@ impl Settings {
         }
         for (name, count) in [("connections", self.connections), ("next_events", self.next_events)] {
             if let Some(count) = count
-                && !(1..=1000).contains(&count)
+                && !PER_VERTEX.contains(&count)
             {
-                return refuse(name, "1 to 1000", count.to_string());
+                return refuse(name, "0.001 to 1000", count.to_string());
             }
         }
         if let Some(Roulette::Below(least)) = self.roulette

@@ -1,11 +1,15 @@
 //! What a render runs: stages, each from some iteration on.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
-use upbp_estimators::{LookUps, Roulette, TechniqueSet};
+use upbp_estimators::{LookUps, Roulette, Technique, TechniqueSet};
 
 use crate::radius::RadiusSchedule;
+
+/// How many samples of a technique a camera vertex may have on average.
+pub(crate) const PER_VERTEX: RangeInclusive<f32> = 0.001..=1000.0;
 
 /// What iterations run, from the one with index `from` until the next stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,14 +23,14 @@ pub struct Stage {
     pub light_paths: u32,
     /// Of them with photon beams.
     pub beam_paths: u32,
-    /// Light vertices that every camera vertex is connected to.
-    pub connections: u32,
-    /// Points on lights that every camera vertex is connected to.
-    pub next_events: u32,
+    /// Light vertices that every camera vertex is connected to, on average.
+    pub connections: f32,
+    /// Points on lights that every camera vertex is connected to, on average.
+    pub next_events: f32,
     /// When walks end by Russian roulette.
     pub roulette: Roulette,
-    /// Parts of the camera sub-paths that look photons up: `surf`, `pp3d`, `pb2d`, `bp2d`, `bb1d`, in `(0, 1]`.
-    pub look_ups: [f32; 5],
+    /// In which iterations photons are looked up.
+    pub look_ups: LookUps,
     /// Connectible vertices per light sub-path, as the pilot found.
     pub vertices_per_light_path: f64,
     /// First radii and how they shrink.
@@ -34,11 +38,6 @@ pub struct Stage {
 }
 
 impl Stage {
-    pub(crate) const fn look_ups(&self) -> LookUps {
-        let [surf, pp3d, pb2d, bp2d, bb1d] = self.look_ups;
-        LookUps { surf, pp3d, pb2d, bp2d, bb1d }
-    }
-
     fn validate(&self) -> Result<(), String> {
         let radii = &self.radii;
         let lengths = [radii.surf, radii.pp3d, radii.pb2d, radii.bp2d, radii.bb1d];
@@ -52,12 +51,13 @@ impl Stage {
                 "beam_paths: expected at most light_paths ({}), found {}",
                 self.light_paths, self.beam_paths
             ))
-        } else if self.connections > 1000 || self.next_events > 1000 {
-            Err("connections, next_events: expected at most 1000".into())
+        } else if ![self.connections, self.next_events].iter().all(|mean| PER_VERTEX.contains(mean)) {
+            Err(format!(
+                "connections, next_events: expected {PER_VERTEX:?}, found {} and {}",
+                self.connections, self.next_events
+            ))
         } else if matches!(self.roulette, Roulette::Below(least) if !(least > 0.0 && least <= 1.0)) {
             Err(format!("roulette: expected Off, or Below a number in (0, 1], found {:?}", self.roulette))
-        } else if !self.look_ups.iter().all(|p| *p > 0.0 && *p <= 1.0) {
-            Err(format!("look_ups: expected probabilities in (0, 1], found {:?}", self.look_ups))
         } else if !(0.0..f64::INFINITY).contains(&self.vertices_per_light_path) {
             Err(format!("vertices_per_light_path: expected a number, found {}", self.vertices_per_light_path))
         } else if !(lengths.iter().all(finite) && finite(&radii.floor) && radii.floor > 0.0) {
@@ -77,20 +77,18 @@ impl fmt::Display for Stage {
         if self.beam_paths > 0 {
             write!(f, ", {} with beams", self.beam_paths)?;
         }
-        if self.connections > 1 {
-            write!(f, ", {} connections", self.connections)?;
+        if self.connections != 1.0 && self.techniques.has(Technique::Connect) {
+            write!(f, ", {} connections per vertex", self.connections)?;
         }
-        if self.next_events > 1 {
-            write!(f, ", {} next events", self.next_events)?;
+        if self.next_events != 1.0 && self.techniques.has(Technique::Nee) {
+            write!(f, ", {} next events per vertex", self.next_events)?;
         }
         match self.roulette {
             Roulette::Off => write!(f, ", no roulette")?,
             Roulette::Below(least) => write!(f, ", roulette below {least}")?,
         }
-        for (name, p) in ["surf", "pp3d", "pb2d", "bp2d", "bb1d"].iter().zip(self.look_ups) {
-            if p < 1.0 {
-                write!(f, ", {name} on {:.0} % of camera sub-paths", 100.0 * p)?;
-            }
+        for technique in self.techniques.iter().filter(|technique| self.look_ups.period(*technique) > 1) {
+            write!(f, ", {} in one of {} iterations", technique.name(), self.look_ups.period(technique))?;
         }
         Ok(())
     }
@@ -169,7 +167,7 @@ impl From<RenderPlan> for Vec<Stage> {
 
 #[cfg(test)]
 mod tests {
-    use upbp_estimators::Technique;
+    use std::num::NonZeroU32;
 
     use super::*;
 
@@ -179,10 +177,10 @@ mod tests {
             techniques: TechniqueSet::PT.with(Technique::Surf),
             light_paths: 1000,
             beam_paths: 0,
-            connections: 1,
-            next_events: 2,
+            connections: 1.0,
+            next_events: 2.0,
             roulette: Roulette::Below(0.5),
-            look_ups: [0.25, 1.0, 1.0, 1.0, 1.0],
+            look_ups: LookUps { surf: NonZeroU32::new(4).unwrap(), ..LookUps::ALL },
             vertices_per_light_path: 3.1,
             radii: RadiusSchedule {
                 surf: 1e-3,
@@ -204,7 +202,7 @@ mod tests {
         assert_eq!([0, 511, 512, 9999].map(|i| plan.stage(i).from), [0, 0, 512, 512]);
         assert_eq!(
             plan.stages()[1].to_string(),
-            "from iteration 512: hit+nee+surf, 1000 light sub-paths, 2 next events, roulette below 0.5, surf on 25 % of camera sub-paths"
+            "from iteration 512: hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, surf in one of 4 iterations"
         );
     }
 
@@ -219,13 +217,12 @@ mod tests {
             change(&mut second);
             refused(vec![stage(0), second])
         };
-        assert!(wrong(|s| s.look_ups[2] = 0.0).contains("stage 1: look_ups"));
-        assert!(wrong(|s| s.roulette = Roulette::Below(0.0)).contains("roulette"));
+        assert!(wrong(|s| s.roulette = Roulette::Below(0.0)).contains("stage 1: roulette"));
         assert!(wrong(|s| s.light_paths = 0).contains("light_paths"));
         assert!(wrong(|s| s.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|s| s.radii.pb2d = f32::NAN).contains("radii"));
         assert!(wrong(|s| s.techniques = TechniqueSet::EMPTY).contains("techniques"));
-        assert!(wrong(|s| s.next_events = 5000).contains("next_events"));
+        assert!(wrong(|s| s.next_events = 5000.0).contains("next_events"));
         assert!(wrong(|s| s.vertices_per_light_path = f64::INFINITY).contains("vertices"));
     }
 }

@@ -2,8 +2,9 @@
 
 use upbp_accel::{PointTree, SegmentTree, SplitParams};
 
-use crate::mis::{Densities, VolumeMerges};
+use crate::mis::Densities;
 use crate::plan::Plan;
+use crate::technique::Technique;
 use crate::walk::{LightVertex, PhotonBeam, Site};
 
 /// Light vertices and photon beams with their look-up structures.
@@ -28,7 +29,7 @@ impl<B: Copy + Send + Sync, D: Densities> LightMap<B, D> {
             let chosen = vertices.iter().enumerate().filter(|(_, v)| on && keep(&v.site));
             PointTree::build(chosen.map(|(i, v)| (v.position, i as u32)).collect())
         };
-        let surface = photons(plan.mis.surf > 0.0, |site| matches!(site, Site::Surface(_)));
+        let surface = photons(plan.looks_up(Technique::Surf), |site| matches!(site, Site::Surface(_)));
         let medium = photons(plan.stores_medium_photons(), |site| matches!(site, Site::Medium(_)));
         let segments: Vec<_> = beams.iter().enumerate().map(|(i, b)| (b.segment, i as u32)).collect();
         let split = SplitParams::choose(&segments);
@@ -57,14 +58,4 @@ impl<B: Copy + Send + Sync, D: Densities> LightMap<B, D> {
             + self.medium.memory_bytes()
             + self.beam_tree.memory_bytes()
     }
-}
-
-/// Whether photon points of a medium are looked up along query beams.
-pub(crate) fn queries_points(merges: &VolumeMerges) -> bool {
-    merges.pb2d > 0.0
-}
-
-/// Whether photon beams of a medium are looked up along query beams.
-pub(crate) fn queries_beams(merges: &VolumeMerges) -> bool {
-    merges.bb1d > 0.0
 }

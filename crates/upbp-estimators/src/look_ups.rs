@@ -1,59 +1,105 @@
-//! Which camera sub-paths look photons up.
+//! In which iterations photons are looked up.
 //!
-//! A look-up that brings little need not be made by every camera sub-path: with probability `p` it is made, its contributions
-//! count `1/p` times, and in weights its number of samples is `p n`. So the weights of a path sum to one for any `p`, and a
-//! technique that hardly pays but may be the only one for some paths stays, at a part of its cost.
+//! A look-up that brings little need not be made in every iteration: it is made in one of `m`, its contributions count `m` times, and
+//! in the weights of all iterations its number of samples is `n/m`. So the weights of a path sum to one for any `m`, and a technique
+//! that hardly pays but may be the only one for some paths stays, at a part of the cost of its look-ups and of what they need.
 
-use crate::random::Stream;
-use crate::technique::Technique;
+use std::num::NonZeroU32;
 
-/// The probability of each look-up, in `(0, 1]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+use serde::{Deserialize, Serialize};
+
+use crate::random::{Stream, StreamKind};
+use crate::technique::{Technique, TechniqueSet};
+
+/// One of how many iterations makes each look-up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct LookUps {
     /// Surface merging.
-    pub surf: f32,
+    pub surf: NonZeroU32,
     /// PP3D.
-    pub pp3d: f32,
+    pub pp3d: NonZeroU32,
     /// PB2D.
-    pub pb2d: f32,
+    pub pb2d: NonZeroU32,
     /// BP2D.
-    pub bp2d: f32,
+    pub bp2d: NonZeroU32,
     /// BB1D.
-    pub bb1d: f32,
+    pub bb1d: NonZeroU32,
 }
 
 impl LookUps {
-    /// Every camera sub-path makes all of them.
-    pub const ALL: Self = Self { surf: 1.0, pp3d: 1.0, pb2d: 1.0, bp2d: 1.0, bb1d: 1.0 };
+    /// Every iteration makes all of them.
+    pub const ALL: Self = {
+        let one = NonZeroU32::MIN;
+        Self { surf: one, pp3d: one, pb2d: one, bp2d: one, bb1d: one }
+    };
 
-    /// The probability of a technique's look-up; 1 for what looks nothing up.
+    /// With what each merge technique is given.
     #[must_use]
-    pub const fn probability(&self, technique: Technique) -> f32 {
-        match technique {
-            Technique::Surf => self.surf,
-            Technique::Pp3d => self.pp3d,
-            Technique::Pb2d => self.pb2d,
-            Technique::Bp2d => self.bp2d,
-            Technique::Bb1d => self.bb1d,
-            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 1.0,
+    pub fn by(period: impl Fn(Technique) -> NonZeroU32) -> Self {
+        use Technique::{Bb1d, Bp2d, Pb2d, Pp3d, Surf};
+        Self {
+            surf: period(Surf),
+            pp3d: period(Pp3d),
+            pb2d: period(Pb2d),
+            bp2d: period(Bp2d),
+            bb1d: period(Bb1d),
         }
     }
 
-    /// Decides for one camera sub-path: the inverse probability of what it looks up, 0 for what it does not.
-    #[inline]
-    pub(crate) fn draw(&self, stream: &mut Stream) -> Self {
-        // Not a random number where there is nothing to decide.
-        let mut decide = |p: f32| match p {
-            1.0 => 1.0,
-            p if stream.uniform() < p => p.recip(),
-            _ => 0.0,
-        };
-        Self {
-            surf: decide(self.surf),
-            pp3d: decide(self.pp3d),
-            pb2d: decide(self.pb2d),
-            bp2d: decide(self.bp2d),
-            bb1d: decide(self.bb1d),
+    /// One of how many iterations looks up what a technique merges; 1 for what looks nothing up.
+    #[must_use]
+    pub const fn period(&self, technique: Technique) -> u32 {
+        match technique {
+            Technique::Surf => self.surf.get(),
+            Technique::Pp3d => self.pp3d.get(),
+            Technique::Pb2d => self.pb2d.get(),
+            Technique::Bp2d => self.bp2d.get(),
+            Technique::Bb1d => self.bb1d.get(),
+            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 1,
         }
+    }
+
+    /// What runs in an iteration: each technique in one of every `m` iterations from a multiple of `m` on, whichever it happens to be.
+    /// So every iteration has it with probability `1/m`, and `m` of them have it once.
+    #[must_use]
+    pub fn due(&self, seed: u64, iteration: u64) -> TechniqueSet {
+        let due = |technique: &Technique| {
+            let period = u64::from(self.period(*technique));
+            let turn = || {
+                let block = iteration / period;
+                Stream::new(seed, block, StreamKind::LookUps, *technique as u64).index(period as usize)
+            };
+            period == 1 || iteration % period == turn() as u64
+        };
+        Technique::ALL.into_iter().filter(due).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_block_of_iterations_has_one_turn() {
+        let look_ups = LookUps::by(|technique| match technique {
+            Technique::Surf => NonZeroU32::new(8).unwrap(),
+            Technique::Bb1d => NonZeroU32::new(3).unwrap(),
+            _ => NonZeroU32::MIN,
+        });
+        let mut turns = [0_u32; 8];
+        for block in 0..4000_u64 {
+            let of_block: Vec<_> =
+                (0..8).filter(|i| look_ups.due(7, 8 * block + i).has(Technique::Surf)).collect();
+            assert_eq!(of_block.len(), 1);
+            turns[of_block[0] as usize] += 1;
+            let beams = (0..3).filter(|i| look_ups.due(7, 3 * block + i).has(Technique::Bb1d)).count();
+            assert_eq!(beams, 1);
+            assert!(
+                look_ups.due(7, block).has(Technique::Pb2d) && look_ups.due(7, block).has(Technique::Nee)
+            );
+        }
+        // 500 each, with a standard deviation of 21.
+        assert!(turns.iter().all(|&turns| turns.abs_diff(500) < 84), "{turns:?}");
     }
 }

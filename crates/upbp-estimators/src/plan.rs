@@ -66,18 +66,20 @@ pub struct Plan {
     pub light_paths: u32,
     /// How many of them leave photon beams.
     pub beam_paths: u32,
-    /// Light vertices that each camera vertex is connected to.
-    pub connections: u32,
-    /// Points on lights that each camera vertex is connected to.
-    pub next_events: u32,
+    /// Light vertices that each camera vertex is connected to, on average.
+    pub connections: f32,
+    /// Points on lights that each camera vertex is connected to, on average.
+    pub next_events: f32,
     /// Limits of the path length.
     pub lengths: PathLengths,
     /// When walks end by Russian roulette.
     pub roulette: Roulette,
     /// Kernels with the radii of this iteration.
     pub kernels: Kernels,
-    /// How many camera sub-paths look photons up.
+    /// In which iterations photons are looked up.
     pub look_ups: LookUps,
+    /// What runs in this iteration: all but the look-ups of other iterations.
+    pub due: TechniqueSet,
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
 }
@@ -95,10 +97,10 @@ pub struct PlanChoices {
     pub light_paths: u32,
     /// How many of them leave photon beams; at most `light_paths`.
     pub beam_paths: u32,
-    /// Light vertices that each camera vertex is connected to.
-    pub connections: u32,
-    /// Points on lights that each camera vertex is connected to.
-    pub next_events: u32,
+    /// Light vertices that each camera vertex is connected to, on average.
+    pub connections: f32,
+    /// Points on lights that each camera vertex is connected to, on average.
+    pub next_events: f32,
     /// Expected number of connectible vertices of a light sub-path. Must be known before the iteration: a figure of
     /// the iteration itself would correlate with its samples.
     pub vertices_per_light_path: f64,
@@ -108,7 +110,7 @@ pub struct PlanChoices {
     pub roulette: Roulette,
     /// Kernels.
     pub kernels: Kernels,
-    /// How many camera sub-paths look photons up.
+    /// In which iterations photons are looked up.
     pub look_ups: LookUps,
     /// Heuristic of the weights.
     pub heuristic: Heuristic,
@@ -135,7 +137,7 @@ impl Plan {
         let beam_paths = choices.beam_paths.min(light_paths);
         let look_ups = choices.look_ups;
         let on = |technique, value: f64| {
-            if techniques.has(technique) { value * f64::from(look_ups.probability(technique)) } else { 0.0 }
+            if techniques.has(technique) { value / f64::from(look_ups.period(technique)) } else { 0.0 }
         };
         let paths = f64::from(light_paths);
         let beams = f64::from(beam_paths);
@@ -185,12 +187,13 @@ impl Plan {
             techniques,
             light_paths,
             beam_paths,
-            connections: if connect > 0.0 { choices.connections } else { 0 },
-            next_events: if techniques.has(Technique::Nee) { choices.next_events } else { 0 },
+            connections: if connect > 0.0 { choices.connections } else { 0.0 },
+            next_events: if techniques.has(Technique::Nee) { choices.next_events } else { 0.0 },
             lengths: choices.lengths,
             roulette: choices.roulette,
             kernels,
             look_ups,
+            due: techniques.intersection(look_ups.due(choices.seed, choices.iteration)),
             mis,
         }
     }
@@ -198,26 +201,52 @@ impl Plan {
     /// Whether anything is stored along light sub-paths for camera sub-paths to look up.
     #[must_use]
     pub fn stores_vertices(&self) -> bool {
-        self.connections > 0 || self.mis.surf > 0.0 || self.stores_medium_photons()
+        self.connections > 0.0 || self.looks_up(Technique::Surf) || self.stores_medium_photons()
     }
 
-    /// Whether PP3D or PB2D runs.
+    /// Whether photon points in media are looked up.
     #[must_use]
     pub fn stores_medium_photons(&self) -> bool {
-        self.mis.volume.iter().any(|v| v.pp3d > 0.0 || v.pb2d > 0.0)
+        self.looks_up(Technique::Pp3d) || self.looks_up(Technique::Pb2d)
     }
 
-    /// Whether BP2D or BB1D runs.
+    /// Whether photon beams are looked up.
     #[must_use]
     pub fn stores_beams(&self) -> bool {
-        self.mis.volume.iter().any(|v| v.bp2d > 0.0 || v.bb1d > 0.0)
+        self.looks_up(Technique::Bp2d) || self.looks_up(Technique::Bb1d)
+    }
+
+    /// Whether this iteration looks up what a technique merges, anywhere.
+    #[must_use]
+    pub fn looks_up(&self, technique: Technique) -> bool {
+        let in_media = |factor: fn(&VolumeMerges) -> f64| self.mis.volume.iter().any(|v| factor(v) > 0.0);
+        self.due.has(technique)
+            && match technique {
+                Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => false,
+                Technique::Surf => self.mis.surf > 0.0,
+                Technique::Pp3d => in_media(|v| v.pp3d),
+                Technique::Pb2d => in_media(|v| v.pb2d),
+                Technique::Bp2d => in_media(|v| v.bp2d),
+                Technique::Bb1d => in_media(|v| v.bb1d),
+            }
+    }
+
+    /// How much a photon counts when it is looked up: one over the number of light sub-paths, as often as there are iterations to
+    /// one that looks it up.
+    #[inline]
+    pub(crate) fn per_photon(&self, technique: Technique) -> f32 {
+        let paths = match technique {
+            Technique::Bp2d | Technique::Bb1d => self.beam_paths,
+            _ => self.light_paths,
+        };
+        self.look_ups.period(technique) as f32 / paths as f32
     }
 
     /// Whether camera sub-paths are query beams beyond where they stop.
     #[must_use]
     pub fn has_long_query_beams(&self) -> bool {
         self.mis.query_beams == BeamExtent::Long
-            && self.mis.volume.iter().any(|v| v.pb2d > 0.0 || v.bb1d > 0.0)
+            && (self.looks_up(Technique::Pb2d) || self.looks_up(Technique::Bb1d))
     }
 
     /// Whether light sub-paths are of any use.

@@ -33,6 +33,8 @@ pub enum StreamKind {
     /// draws: what they differ in is what stratification leaves of the variance of a pixel, since it takes away what their common
     /// decisions make.
     PilotCamera,
+    /// Which iterations look photons up.
+    LookUps,
 }
 
 /// A stream of uniform random numbers.
@@ -64,6 +66,7 @@ impl Stream {
             }
             StreamKind::Camera => (iteration as u32, mix(common ^ of_index), STRATIFIED_DRAWS),
             StreamKind::PilotCamera => (0, mix(common ^ of_index), COMMON_DRAWS),
+            StreamKind::LookUps => (0, 0, 0),
         };
         // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in common.
         let rest = Xoshiro256PlusPlus::seed_from_u64(mix(mix(common ^ of_iteration) ^ of_index));
@@ -98,6 +101,14 @@ impl Stream {
     pub fn index(&mut self, count: usize) -> usize {
         // Multiply and shift: the bias is below count / 2⁶⁴.
         ((u128::from(self.rest.next_u64()) * count as u128) >> 64) as usize
+    }
+
+    /// One of the two whole numbers next to `mean`, which is the mean of what is drawn.
+    #[inline]
+    pub fn round(&mut self, mean: f32) -> u32 {
+        let (whole, part) = (mean.trunc(), mean.fract());
+        // Not a random number where there is nothing to decide.
+        whole as u32 + u32::from(part > 0.0 && self.uniform() < part)
     }
 
     /// The key of the next decision, while decisions come from the sequences.

@@ -107,7 +107,11 @@ impl Costs {
                 Technique::Bp2d | Technique::Bb1d => candidate.beam_paths,
                 _ => candidate.light_paths,
             };
-            let turns = work.calls[i][roulette] * TURN[i] * self.depth(technique, photons);
+            let calls = match technique {
+                Technique::Connect => candidate.connections * work.calls[i][roulette],
+                _ => work.calls[i][roulette],
+            };
+            let turns = calls * TURN[i] * self.depth(technique, photons);
             let each = turns + photons * work.samples[i][roulette] * SAMPLE[i];
             camera += self.techniques[i] * candidate.look_up(technique) * each;
         }
@@ -116,19 +120,20 @@ impl Costs {
             let i = Technique::LightTracing as usize;
             light += work.calls[i][roulette] * TURN[i] * self.techniques[i];
         }
-        let merges = has(Technique::Surf) || has(Technique::Pp3d) || has(Technique::Pb2d);
-        if merges || has(Technique::Connect) {
-            light += work.vertices * STORE;
-        }
-        if merges {
-            light += work.vertices * BUILD_POINT;
-        }
-        let beams = if has(Technique::Bb1d) || has(Technique::Bp2d) {
-            candidate.beam_paths * self.planned[1] * work.beams * BUILD_BEAM
-        } else {
-            0.0
+        // What part of the iterations run any of some techniques.
+        let any = |techniques: &[Technique]| {
+            let none = |left, technique: &Technique| {
+                left * if has(*technique) { 1.0 - candidate.look_up(*technique) } else { 1.0 }
+            };
+            1.0 - techniques.iter().fold(1.0, none)
         };
-        let light_paths = if candidate.needs_light() { candidate.light_paths * self.planned[0] } else { 0.0 };
-        self.pixels * camera + light_paths * light + beams
+        let points = [Technique::Surf, Technique::Pp3d, Technique::Pb2d];
+        let lines = [Technique::Bp2d, Technique::Bb1d];
+        let stored = if has(Technique::Connect) { 1.0 } else { any(&points) };
+        light = light
+            * any(&[points.as_slice(), &lines, &[Technique::Connect, Technique::LightTracing]].concat())
+            + work.vertices * (stored * STORE + any(&points) * BUILD_POINT);
+        let beams = any(&lines) * candidate.beam_paths * self.planned[1] * work.beams * BUILD_BEAM;
+        self.pixels * camera + candidate.light_paths * self.planned[0] * light + beams
     }
 }

@@ -1,9 +1,10 @@
 //! The plan with the least product of variance and cost.
 
+use std::num::NonZeroU32;
 use std::ops::Range;
 
 use rayon::prelude::*;
-use upbp_estimators::{Technique, TechniqueSet};
+use upbp_estimators::{LookUps, Technique, TechniqueSet};
 
 use super::cost::Costs;
 use super::prediction::{Counts, GROUPS, Prediction};
@@ -16,7 +17,9 @@ pub(crate) struct Candidate {
     pub(crate) techniques: TechniqueSet,
     pub(crate) light_paths: f64,
     pub(crate) beam_paths: f64,
-    /// Merges whose photons only a part of the camera sub-paths look up.
+    /// Connections per camera vertex, likewise.
+    pub(crate) connections: f64,
+    /// Merges whose photons only some iterations look up.
     pub(crate) seldom: TechniqueSet,
     /// The number of a roulette.
     pub(crate) roulette: usize,
@@ -35,12 +38,14 @@ pub(crate) struct Bounds {
     pub(crate) light_paths: Vec<f64>,
     /// The same of those with photon beams.
     pub(crate) beam_paths: Vec<f64>,
+    /// Connections per camera vertex, likewise. None more than one: a trial does not tell what several at a vertex have in common.
+    pub(crate) connections: Vec<f64>,
     /// Numbers of roulettes, ascending.
     pub(crate) roulettes: Range<usize>,
 }
 
-/// What part of the camera sub-paths look up what is looked up seldom.
-const SELDOM: f32 = 0.25;
+/// One of so many iterations looks up what is looked up seldom.
+const SELDOM: NonZeroU32 = NonZeroU32::new(8).unwrap();
 
 impl Candidate {
     /// All that is possible, as much of it as there may be.
@@ -49,19 +54,20 @@ impl Candidate {
             techniques: bounds.techniques,
             light_paths: 1.0,
             beam_paths: 1.0,
+            connections: 1.0,
             seldom: TechniqueSet::EMPTY,
             roulette: TRIAL,
         }
     }
 
+    /// The part of the iterations that make the look-up of a technique.
     pub(crate) fn look_up(&self, technique: Technique) -> f64 {
-        if self.seldom.has(technique) { f64::from(SELDOM) } else { 1.0 }
+        1.0 / f64::from(self.look_ups().period(technique))
     }
 
     /// As a stage has it.
-    pub(crate) fn look_ups(&self) -> [f32; 5] {
-        use Technique::{Bb1d, Bp2d, Pb2d, Pp3d, Surf};
-        [Surf, Pp3d, Pb2d, Bp2d, Bb1d].map(|technique| if self.seldom.has(technique) { SELDOM } else { 1.0 })
+    pub(crate) fn look_ups(&self) -> LookUps {
+        LookUps::by(|technique| if self.seldom.has(technique) { SELDOM } else { NonZeroU32::MIN })
     }
 
     /// Whether any technique uses light sub-paths.
@@ -84,7 +90,8 @@ impl Candidate {
             let p = self.look_up(technique);
             counts.look_ups[technique as usize] = p;
             counts.relative[technique as usize] = match technique {
-                Technique::Hit | Technique::Nee | Technique::Connect => 1.0,
+                Technique::Hit | Technique::Nee => 1.0,
+                Technique::Connect => self.connections,
                 Technique::LightTracing => self.light_paths,
                 Technique::Surf | Technique::Pp3d | Technique::Pb2d => p * self.light_paths,
                 Technique::Bp2d | Technique::Bb1d => p * self.beam_paths,
@@ -187,8 +194,8 @@ fn with_roulette(judge: &mut Judge<'_>, at: Judged, bounds: &Bounds) -> Judged {
     all.into_iter().find(|judged| judged.product() <= NEARLY * least).unwrap_or(at)
 }
 
-/// A candidate with what may find light that the trial missed, if it has light sub-paths: on all camera sub-paths where this costs
-/// little, else on some.
+/// A candidate with what may find light that the trial missed, if it has light sub-paths: in all iterations where this costs
+/// little, else in some.
 fn insured(best: Candidate, costs: &Costs, bounds: &Bounds) -> Candidate {
     /// The factor by which an iteration may take longer.
     const PREMIUM: f64 = 1.05;
@@ -238,6 +245,9 @@ fn steps(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
     }
     if from.techniques.has(Technique::Bb1d) {
         steps.extend(bounds.beam_paths.iter().map(|&beam_paths| Candidate { beam_paths, ..*from }));
+    }
+    if from.techniques.has(Technique::Connect) {
+        steps.extend(bounds.connections.iter().map(|&connections| Candidate { connections, ..*from }));
     }
     steps.retain(|step| step != from);
     steps

@@ -7,8 +7,7 @@ use glam::Vec3;
 use upbp_accel::Ray;
 use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
-use crate::light_map::{LightMap, queries_beams, queries_points};
-use crate::look_ups::LookUps;
+use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, Tip};
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::scene::{Scene, Walk};
@@ -19,7 +18,6 @@ use crate::walk::{Context, Output, Passage, PhotonBeam, QueryEdge, Site, Span};
 pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
-    look_ups: &LookUps,
     passage: &Passage<S::Bsdf>,
     edge: &QueryEdge<O::Densities>,
     out: &mut Output<'_, O>,
@@ -42,14 +40,14 @@ pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             let merges = plan.mis.merges_in(medium);
             let ray =
                 Ray { origin: passage.origin, direction: passage.direction, t_min: span.start, t_max: end };
-            let query = Query { context, look_ups, passage, span, edge, medium };
-            if queries_points(&merges) && look_ups.pb2d > 0.0 {
+            let query = Query { context, passage, span, edge, medium };
+            if merges.pb2d > 0.0 && plan.due.has(Technique::Pb2d) {
                 out.observer.turns_to(Some(Technique::Pb2d));
                 map.medium.around_ray(&ray, plan.kernels.pb2d.radius(), |index, t, distance2| {
                     query.merge_point(map, index, t, distance2, out);
                 });
             }
-            if queries_beams(&merges) && look_ups.bb1d > 0.0 {
+            if merges.bb1d > 0.0 && plan.due.has(Technique::Bb1d) {
                 out.observer.turns_to(Some(Technique::Bb1d));
                 map.beam_tree.around_ray(&ray, plan.kernels.bb1d.radius(), |index, approach| {
                     query.merge_beam(&map.beams[index as usize], &approach, out);
@@ -96,7 +94,6 @@ fn transmitted(density: &EdgeDensity, extent: BeamExtent) -> Spectrum {
 /// A query beam in one medium.
 struct Query<'a, 'b, S: Scene, D> {
     context: &'a Context<'b, S>,
-    look_ups: &'a LookUps,
     passage: &'a Passage<S::Bsdf>,
     span: &'a Span,
     edge: &'a QueryEdge<D>,
@@ -142,7 +139,7 @@ impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
             return;
         }
         let Some(foot) = self.foot(t) else { return };
-        let kernel = plan.kernels.pb2d.value(distance2) * self.look_ups.pb2d / plan.light_paths as f32;
+        let kernel = plan.kernels.pb2d.value(distance2) * plan.per_photon(Technique::Pb2d);
         self.merge(
             &Incoming {
                 technique: Technique::Pb2d,
@@ -172,8 +169,9 @@ impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
         }
         let Some((tip, throughput)) = beam_tip(self.context, beam, approach.t_segment) else { return };
         let Some(foot) = self.foot(approach.t_ray) else { return };
-        let kernel = plan.kernels.bb1d.value(approach.distance * approach.distance) * self.look_ups.bb1d
-            / (approach.sin_theta * plan.beam_paths as f32);
+        let kernel = plan.kernels.bb1d.value(approach.distance * approach.distance)
+            * plan.per_photon(Technique::Bb1d)
+            / approach.sin_theta;
         self.merge(
             &Incoming {
                 technique: Technique::Bb1d,

@@ -21,11 +21,11 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
-    if plan.connections == 0 || map.vertices.is_empty() {
+    if plan.connections == 0.0 || map.vertices.is_empty() {
         return;
     }
     let factor = map.vertices.len() as f64 / (f64::from(plan.connections) * f64::from(plan.light_paths));
-    for _ in 0..plan.connections {
+    for _ in 0..stream.round(plan.connections) {
         let light = &map.vertices[stream.index(map.vertices.len())];
         if plan.lengths.contain(vertex.depth + light.depth + 1) {
             out.observer.turns_to(Some(Technique::Connect));

@@ -16,10 +16,10 @@ pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
-    if plan.next_events == 0 || !plan.lengths.contain(vertex.depth + 1) {
+    if plan.next_events == 0.0 || !plan.lengths.contain(vertex.depth + 1) {
         return;
     }
-    for _ in 0..plan.next_events {
+    for _ in 0..stream.round(plan.next_events) {
         out.observer.turns_to(Some(Technique::Nee));
         next_event(context, vertex, stream, crossings, out);
     }

@@ -4,7 +4,6 @@ use upbp_media::{Medium, MediumId};
 
 use super::beams::beam_tip;
 use crate::light_map::LightMap;
-use crate::look_ups::LookUps;
 use crate::mis::Densities;
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::scene::{Scene, Walk};
@@ -22,27 +21,19 @@ const MAX_PLANE_DISTANCE: f32 = 0.3;
 pub(crate) fn at_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
-    look_ups: &LookUps,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
     match &vertex.site {
         Site::Surface(surface) => {
-            if plan.mis.surf > 0.0 && look_ups.surf > 0.0 {
+            if plan.looks_up(Technique::Surf) {
                 let kernel = &plan.kernels.surf;
                 out.observer.turns_to(Some(Technique::Surf));
                 map.surface.in_ball(vertex.position, kernel.radius(), |index, distance2| {
                     let photon = &map.vertices[index as usize];
                     if lies_on(surface, vertex, photon, kernel.radius()) {
-                        merge_point(
-                            context,
-                            vertex,
-                            photon,
-                            [distance2, look_ups.surf],
-                            Technique::Surf,
-                            out,
-                        );
+                        merge_point(context, vertex, photon, distance2, Technique::Surf, out);
                     }
                 });
                 out.observer.turns_to(None);
@@ -50,25 +41,18 @@ pub(crate) fn at_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         }
         Site::Medium(medium) => {
             let merges = plan.mis.merges_in(*medium);
-            if merges.pp3d > 0.0 && look_ups.pp3d > 0.0 {
+            if merges.pp3d > 0.0 && plan.due.has(Technique::Pp3d) {
                 out.observer.turns_to(Some(Technique::Pp3d));
                 map.medium.in_ball(vertex.position, plan.kernels.pp3d.radius(), |index, distance2| {
                     let photon = &map.vertices[index as usize];
                     if matches!(photon.site, Site::Medium(other) if other == *medium) {
-                        merge_point(
-                            context,
-                            vertex,
-                            photon,
-                            [distance2, look_ups.pp3d],
-                            Technique::Pp3d,
-                            out,
-                        );
+                        merge_point(context, vertex, photon, distance2, Technique::Pp3d, out);
                     }
                 });
             }
-            if merges.bp2d > 0.0 && look_ups.bp2d > 0.0 {
+            if merges.bp2d > 0.0 && plan.due.has(Technique::Bp2d) {
                 out.observer.turns_to(Some(Technique::Bp2d));
-                beams_around(context, map, vertex, (*medium, look_ups.bp2d), out);
+                beams_around(context, map, vertex, *medium, out);
             }
             out.observer.turns_to(None);
         }
@@ -88,13 +72,12 @@ fn lies_on<B, D>(
         && (photon.position - vertex.position).dot(normal).abs() < MAX_PLANE_DISTANCE * radius
 }
 
-/// Merges a photon with the query point: surface merging and PP3D differ in kernel and factor only. The photon comes with its
-/// squared distance and with how often the look-up counts.
+/// Merges a photon with the query point: surface merging and PP3D differ in kernel and factor only.
 fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,
     photon: &LightVertex<S::Bsdf, O::Densities>,
-    [distance2, scale]: [f32; 2],
+    distance2: f32,
     technique: Technique,
     out: &mut Output<'_, O>,
 ) {
@@ -132,7 +115,7 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let value = vertex.throughput
         * photon.throughput
         * scattering.value
-        * (kernel.value(distance2) * scale / plan.light_paths as f32);
+        * (kernel.value(distance2) * plan.per_photon(technique));
     if out.add(technique, value, &weight) {
         out.observer.sample(&ObservedSample {
             technique,
@@ -148,12 +131,12 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     }
 }
 
-/// BP2D: photon beams around the query point, in its medium; `scale` is how often the look-up counts.
+/// BP2D: photon beams around the query point, in its medium.
 fn beams_around<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
     vertex: &QueryVertex<S::Bsdf, O::Densities>,
-    (medium_id, scale): (MediumId, f32),
+    medium_id: MediumId,
     out: &mut Output<'_, O>,
 ) {
     let Context { world, plan } = *context;
@@ -177,7 +160,7 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         let value = vertex.throughput
             * light
             * medium.sigma_s(vertex.position)
-            * (phase * kernel.value(distance2) * scale / plan.beam_paths as f32);
+            * (phase * kernel.value(distance2) * plan.per_photon(Technique::Bp2d));
         if out.add(Technique::Bp2d, value, &weight) {
             out.observer.sample(&ObservedSample {
                 technique: Technique::Bp2d,

@@ -96,11 +96,9 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let Some(ray) = scene.camera().ray(film, stream.pair()) else { return walk };
     observer.camera_end(ray.origin, ray.direction, ray.pdf);
     let mut out = Output { layers: &mut walk.layers, counters, observer };
-    let look_ups = plan.look_ups.draw(&mut stream);
     let emission = plan.mis.hit > 0.0 && world.has_emitting_media();
-    let long_beams = plan.has_long_query_beams() && (look_ups.pb2d > 0.0 || look_ups.bb1d > 0.0);
-    let extent =
-        if long_beams || emission || world.has_dense_media() { Extent::ToSurface } else { Extent::ToStop };
+    let to_surface = plan.has_long_query_beams() || emission || world.has_dense_media();
+    let extent = if to_surface { Extent::ToSurface } else { Extent::ToStop };
     let mut stack = world.stack_at_camera(ray.origin);
     let mut origin = ray.origin;
     let mut direction = ray.direction;
@@ -119,7 +117,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         out.counters.boundary_conflicts += scratch.passage.take_conflicts();
         let passage = &scratch.passage;
         estimate::emission_along(context, passage, &edge, &mut out);
-        estimate::along_beam(context, map, &look_ups, passage, &edge, &mut out);
+        estimate::along_beam(context, map, passage, &edge, &mut out);
 
         let arrived = match arrive(scene, passage) {
             Arrival::Vertex(arrived) => arrived,
@@ -173,7 +171,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         if connectible {
             estimate::next_events(context, &vertex, &mut stream, &mut scratch.crossings, &mut out);
             estimate::connections(context, map, &vertex, &mut stream, &mut scratch.crossings, &mut out);
-            estimate::at_point(context, map, &look_ups, &vertex, &mut out);
+            estimate::at_point(context, map, &vertex, &mut out);
         }
 
         let Some(scattered) =

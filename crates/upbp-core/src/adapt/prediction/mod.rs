@@ -26,7 +26,7 @@ pub(crate) const GROUPS: usize = 8;
 /// Light sub-paths are at least so uneven.
 const LEAST_EVENNESS: f64 = 0.1;
 
-/// How many samples of each technique a plan has, relative to the trial's plan; and what part of the camera sub-paths look
+/// How many samples of each technique a plan has, relative to the trial's plan; and what part of the iterations look
 /// photons up, which those numbers contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Counts {
