@@ -7,6 +7,7 @@ use std::path::Path;
 use support::{Estimate, assert_same, channels, renderer};
 use upbp_core::{LightPaths, Radii, Radius, RenderPlan, Settings, TechniqueSet, Techniques, read_exr};
 use upbp_scene::ReadyScene;
+use upbp_scene::description::{Count, Film};
 
 fn settings() -> Settings {
     Settings { deterministic: true, ..Settings::default() }
@@ -61,6 +62,25 @@ fn light_that_only_merges_find_is_not_lost() {
         let stage = renderer(&scene, Settings { seed, ..settings() }).report().plan.stages()[0].clone();
         assert!(stage.techniques.has(upbp_core::Technique::Surf) && stage.light_paths > 0, "{stage}");
     }
+}
+
+/// Kernels of surface photons may be as wide as a pixel, where that is more than usual and nobody asked for a radius.
+#[test]
+fn surface_photons_blur_what_a_pixel_blurs() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/suite/surface_caustic.ron");
+    let first = |settings: Settings, side| {
+        let side = Count::new(side).expect("a positive number");
+        let film = Film { width: side, height: side, crop: None };
+        let scene = ReadyScene::load_with(&path, |description| description.film = film);
+        renderer(&scene.expect("a valid scene"), settings).report().plan.stages()[0].radii.surf
+    };
+    let fixed = || Settings { techniques: "bpt+surf".parse().expect("names"), ..settings() };
+    let usual = first(fixed(), 96);
+    let wide = first(settings(), 96);
+    assert!((1.5..=4.0).contains(&(wide / usual)), "{wide}, usually {usual}");
+    assert_eq!(first(settings(), 960), first(fixed(), 960), "pixels are small");
+    let radii = Radii { surf: Radius::Absolute(0.01), ..Radii::default() };
+    assert_eq!(first(Settings { radii, ..settings() }, 96), 0.01);
 }
 
 /// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.

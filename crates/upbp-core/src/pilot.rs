@@ -52,6 +52,8 @@ pub(crate) struct Pilot {
     pub(crate) beams_per_path: f64,
     /// Pieces that these are cut into for look-ups.
     pub(crate) pieces_per_path: f64,
+    /// Width of a pixel where camera sub-paths first meet what scatters in more than one direction, median; 0 where nothing does.
+    pub(crate) footprint: f32,
     /// Typical distances to the nearest neighbours; `None` where there is nothing.
     pub(crate) surf: Option<Neighbours>,
     /// PP3D.
@@ -109,7 +111,7 @@ pub(crate) fn run<S: Scene>(
         plan = plan_with(light_paths);
         trace_light(world, &plan, &mut light);
     }
-    let queries = camera_queries(world, &plan);
+    let mut queries = camera_queries(world, &plan);
     let beam_paths = f64::from(plan.beam_paths);
     let paths = f64::from(plan.light_paths);
     let near = first_paths(&light.vertices, paths);
@@ -131,6 +133,7 @@ pub(crate) fn run<S: Scene>(
     };
     Pilot {
         vertices_per_path: light.vertices.len() as f64 / paths,
+        footprint: median(&mut queries.footprints),
         surface_per_path: looked_up(plan.looks_up(Technique::Surf), on_surfaces),
         medium_per_path: looked_up(plan.stores_medium_photons(), in_media),
         pieces_per_path: beams.pieces() as f64 / beam_paths,
@@ -185,14 +188,22 @@ struct Queries {
     surfaces: Vec<Vec3>,
     media: Vec<Vec3>,
     edges: Vec<Ray>,
+    /// Widths of pixels.
+    footprints: Vec<f32>,
     last: Vec3,
+    /// Length of the sub-path so far.
+    travelled: f32,
+    /// Width of a pixel per length, until a width is known.
+    pixel: Option<f32>,
 }
 
 impl<B> Observer<B> for Queries {
     type Densities = f64;
 
-    fn camera_end(&mut self, lens: Vec3, _: Vec3, _: f32) {
+    fn camera_end(&mut self, lens: Vec3, _: Vec3, pdf: f32) {
         self.last = lens;
+        self.travelled = 0.0;
+        self.pixel = Some(pdf.sqrt().recip());
     }
 
     fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
@@ -212,6 +223,13 @@ impl<B> Observer<B> for Queries {
             });
         }
         self.last = vertex.position;
+        self.travelled += length;
+        if !vertex.delta
+            && let Some(width) = self.pixel.take().map(|pixel| pixel * self.travelled)
+            && width.is_finite()
+        {
+            self.footprints.push(width);
+        }
     }
 }
 
@@ -238,11 +256,18 @@ fn camera_queries<S: Scene>(world: &World<'_, S>, plan: &Plan) -> Queries {
         queries.surfaces.extend(piece.surfaces);
         queries.media.extend(piece.media);
         queries.edges.extend(piece.edges);
+        queries.footprints.extend(piece.footprints);
     }
     thin(&mut queries.surfaces);
     thin(&mut queries.media);
     thin(&mut queries.edges);
     queries
+}
+
+/// The median; 0 of nothing.
+fn median(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 /// Keeps `QUERIES` elements, evenly.

@@ -1,5 +1,7 @@
 //! From the choice of techniques to a stage of the plan.
 
+use std::ops::RangeInclusive;
+
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Technique, TechniqueSet, World};
 
@@ -9,6 +11,7 @@ use crate::choices::{BEAMS, plan};
 use crate::emitters;
 use crate::memory::LightCounts;
 use crate::pilot::Pilot;
+use crate::radius::{Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths};
 use crate::stage::Stage;
 
@@ -30,11 +33,6 @@ impl Planner {
         pilot: &Pilot,
         review: u32,
     ) -> Stage {
-        /// Numbers of light sub-paths that are tried, relative to one per pixel.
-        const LIGHT_PATHS: [f64; 3] = [0.0625, 0.25, 1.0];
-        const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
-        /// Connections per camera vertex that are tried, relative to one.
-        const CONNECTIONS: [f64; 3] = [0.25, 0.5, 1.0];
         let Self { settings, everything, .. } = self;
         if everything.techniques.without(TechniqueSet::PT).is_empty() {
             return everything.clone();
@@ -42,45 +40,13 @@ impl Planner {
         let of_trial = settings.roulette.unwrap_or(roulette::OF_TRIAL);
         let trial = Stage { roulette: of_trial, ..everything.clone() };
         let plan = plan(world, settings, &trial, adapt::REVIEWS[review as usize]);
-        let fits = |factor: &f64| {
-            let beams = f64::from(everything.beam_paths) * factor;
-            let counts = LightCounts::expected(pilot, everything.light_paths, beams as u32);
-            *factor <= 1.0 || counts.peak_bytes::<S::Bsdf>() < self.bytes as f64
+        let choice = adapt::Choice {
+            everything: &plan,
+            bounds: self.bounds(world, census, pilot, plan.techniques),
+            most_paths: emitters::light_paths(pilot.vertices_per_path),
+            timed: !settings.deterministic,
         };
-        let candidate = adapt::choose(
-            world,
-            &adapt::Choice {
-                everything: &plan,
-                bounds: adapt::Bounds {
-                    techniques: plan.techniques,
-                    always: if census.needs_merges { floor(census.techniques) } else { TechniqueSet::EMPTY },
-                    careful: if world.scene.has_specular_surfaces() {
-                        census.techniques.intersection(TechniqueSet::EMPTY.with(Technique::Surf))
-                    } else {
-                        TechniqueSet::EMPTY
-                    },
-                    light_paths: match settings.light_paths {
-                        LightPaths::Auto => LIGHT_PATHS.to_vec(),
-                        LightPaths::Count(_) => vec![1.0],
-                    },
-                    beam_paths: match settings.beams {
-                        None => BEAM_PATHS.into_iter().filter(fits).collect(),
-                        Some(_) => vec![1.0],
-                    },
-                    connections: match settings.connections {
-                        None => CONNECTIONS.to_vec(),
-                        Some(_) => vec![1.0],
-                    },
-                    roulettes: match settings.roulette {
-                        Some(_) => roulette::TRIAL..roulette::TRIAL + 1,
-                        None => 0..roulette::COUNT,
-                    },
-                },
-                most_paths: emitters::light_paths(pilot.vertices_per_path),
-                timed: !settings.deterministic,
-            },
-            review,
-        );
+        let candidate = adapt::choose(world, &choice, review);
         let count = |planned: u32, factor: f64| ((f64::from(planned) * factor) as u32).max(1);
         let light_paths =
             if candidate.needs_light() { count(everything.light_paths, candidate.light_paths) } else { 0 };
@@ -89,7 +55,6 @@ impl Planner {
         } else {
             0
         };
-        // Fewer photons do not make kernels wider: the blur is not part of the prediction.
         Stage {
             techniques: candidate.techniques,
             light_paths,
@@ -97,7 +62,71 @@ impl Planner {
             connections: everything.connections * candidate.connections as f32,
             roulette: roulette::numbered(candidate.roulette, of_trial),
             look_ups: candidate.look_ups(),
+            radii: RadiusSchedule {
+                surf: (f64::from(everything.radii.surf) * candidate.surf_radius) as f32,
+                ..everything.radii
+            },
             ..everything.clone()
+        }
+    }
+
+    /// What may be chosen: everything that settings do not fix.
+    fn bounds<S: Scene>(
+        &self,
+        world: &World<'_, S>,
+        census: &Census,
+        pilot: &Pilot,
+        techniques: TechniqueSet,
+    ) -> adapt::Bounds {
+        /// Numbers of light sub-paths, relative to one per pixel.
+        const LIGHT_PATHS: [f64; 3] = [0.0625, 0.25, 1.0];
+        const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
+        /// Per camera vertex, relative to one.
+        const CONNECTIONS: [f64; 3] = [0.25, 0.5, 1.0];
+        let Self { settings, everything, .. } = self;
+        let fits = |factor: &f64| {
+            let beams = f64::from(everything.beam_paths) * factor;
+            let counts = LightCounts::expected(pilot, everything.light_paths, beams as u32);
+            *factor <= 1.0 || counts.peak_bytes::<S::Bsdf>() < self.bytes as f64
+        };
+        adapt::Bounds {
+            techniques,
+            always: if census.needs_merges { floor(census.techniques) } else { TechniqueSet::EMPTY },
+            careful: if world.scene.has_specular_surfaces() {
+                census.techniques.intersection(TechniqueSet::EMPTY.with(Technique::Surf))
+            } else {
+                TechniqueSet::EMPTY
+            },
+            light_paths: match settings.light_paths {
+                LightPaths::Auto => LIGHT_PATHS.to_vec(),
+                LightPaths::Count(_) => vec![1.0],
+            },
+            beam_paths: match settings.beams {
+                None => BEAM_PATHS.into_iter().filter(fits).collect(),
+                Some(_) => vec![1.0],
+            },
+            connections: match settings.connections {
+                None => CONNECTIONS.to_vec(),
+                Some(_) => vec![1.0],
+            },
+            surf_radii: self.surf_radii(pilot.footprint),
+            roulettes: match settings.roulette {
+                Some(_) => roulette::TRIAL..roulette::TRIAL + 1,
+                None => 0..roulette::COUNT,
+            },
+        }
+    }
+
+    /// Radii of surface merging, relative to the usual one: that, and the width of a pixel if that is more. It blurs what a pixel blurs
+    /// anyway, so that the prediction, which knows nothing of blur, may be asked.
+    fn surf_radii(&self, footprint: f32) -> Vec<f64> {
+        /// A factor between these is worth a try.
+        const FACTORS: RangeInclusive<f32> = 1.25..=4.0;
+        let factor = (footprint / self.everything.radii.surf).min(*FACTORS.end());
+        if self.settings.radii.surf == Radius::Auto && FACTORS.contains(&factor) {
+            vec![1.0, f64::from(factor)]
+        } else {
+            vec![1.0]
         }
     }
 }

@@ -106,9 +106,10 @@ impl Stream {
     /// One of the two whole numbers next to `mean`, which is the mean of what is drawn.
     #[inline]
     pub fn round(&mut self, mean: f32) -> u32 {
-        let (whole, part) = (mean.trunc(), mean.fract());
+        let whole = mean as u32;
+        let part = mean - whole as f32;
         // Not a random number where there is nothing to decide.
-        whole as u32 + u32::from(part > 0.0 && self.uniform() < part)
+        if part > 0.0 { whole + u32::from(self.uniform() < part) } else { whole }
     }
 
     /// The key of the next decision, while decisions come from the sequences.

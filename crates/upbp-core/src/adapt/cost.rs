@@ -102,7 +102,7 @@ impl Costs {
         let mut camera = PIXEL + walk;
         for technique in candidate.techniques.iter() {
             let i = technique as usize;
-            let photons = match technique {
+            let paths = match technique {
                 Technique::LightTracing => continue,
                 Technique::Bp2d | Technique::Bb1d => candidate.beam_paths,
                 _ => candidate.light_paths,
@@ -111,8 +111,8 @@ impl Costs {
                 Technique::Connect => candidate.connections * work.calls[i][roulette],
                 _ => work.calls[i][roulette],
             };
-            let turns = calls * TURN[i] * self.depth(technique, photons);
-            let each = turns + photons * work.samples[i][roulette] * SAMPLE[i];
+            let turns = calls * TURN[i] * self.depth(technique, paths);
+            let each = turns + candidate.photons(technique) * work.samples[i][roulette] * SAMPLE[i];
             camera += self.techniques[i] * candidate.look_up(technique) * each;
         }
         let mut light = work.light_edges * EDGE[1] * self.light_walk;

@@ -19,6 +19,8 @@ pub(crate) struct Candidate {
     pub(crate) beam_paths: f64,
     /// Connections per camera vertex, likewise.
     pub(crate) connections: f64,
+    /// The radius of surface merging, likewise.
+    pub(crate) surf_radius: f64,
     /// Merges whose photons only some iterations look up.
     pub(crate) seldom: TechniqueSet,
     /// The number of a roulette.
@@ -40,6 +42,8 @@ pub(crate) struct Bounds {
     pub(crate) beam_paths: Vec<f64>,
     /// Connections per camera vertex, likewise. None more than one: a trial does not tell what several at a vertex have in common.
     pub(crate) connections: Vec<f64>,
+    /// Radii of surface merging, likewise.
+    pub(crate) surf_radii: Vec<f64>,
     /// Numbers of roulettes, ascending.
     pub(crate) roulettes: Range<usize>,
 }
@@ -55,6 +59,7 @@ impl Candidate {
             light_paths: 1.0,
             beam_paths: 1.0,
             connections: 1.0,
+            surf_radius: 1.0,
             seldom: TechniqueSet::EMPTY,
             roulette: TRIAL,
         }
@@ -68,6 +73,15 @@ impl Candidate {
     /// As a stage has it.
     pub(crate) fn look_ups(&self) -> LookUps {
         LookUps::by(|technique| if self.seldom.has(technique) { SELDOM } else { NonZeroU32::MIN })
+    }
+
+    /// Photons within reach of a look-up that each of the trial's light sub-paths stands for.
+    pub(crate) fn photons(&self, technique: Technique) -> f64 {
+        match technique {
+            Technique::Surf => self.light_paths * self.surf_radius.powi(2),
+            Technique::Bp2d | Technique::Bb1d => self.beam_paths,
+            _ => self.light_paths,
+        }
     }
 
     /// Whether any technique uses light sub-paths.
@@ -92,9 +106,7 @@ impl Candidate {
             counts.relative[technique as usize] = match technique {
                 Technique::Hit | Technique::Nee => 1.0,
                 Technique::Connect => self.connections,
-                Technique::LightTracing => self.light_paths,
-                Technique::Surf | Technique::Pp3d | Technique::Pb2d => p * self.light_paths,
-                Technique::Bp2d | Technique::Bb1d => p * self.beam_paths,
+                _ => p * self.photons(technique),
             };
         }
         counts
@@ -245,6 +257,9 @@ fn steps(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
     }
     if from.techniques.has(Technique::Bb1d) {
         steps.extend(bounds.beam_paths.iter().map(|&beam_paths| Candidate { beam_paths, ..*from }));
+    }
+    if from.techniques.has(Technique::Surf) {
+        steps.extend(bounds.surf_radii.iter().map(|&surf_radius| Candidate { surf_radius, ..*from }));
     }
     if from.techniques.has(Technique::Connect) {
         steps.extend(bounds.connections.iter().map(|&connections| Candidate { connections, ..*from }));
