@@ -70,13 +70,15 @@ impl Nearest {
         };
         let mut nearest: Vec<f32> =
             queries.par_iter().filter_map(distance_of).filter(|distance| *distance > 0.0).collect();
-        if nearest.is_empty() {
-            return None;
-        }
-        let middle = nearest.len() / 2;
-        let (_, median, _) = nearest.select_nth_unstable_by(middle, f32::total_cmp);
-        Some(Neighbours { distance: f64::from(*median), rank: rank as f64, paths: self.paths, dimension })
+        let distance = f64::from(median(&mut nearest)?);
+        Some(Neighbours { distance, rank: rank as f64, paths: self.paths, dimension })
     }
+}
+
+/// The median, the upper one of an even number.
+pub(crate) fn median(values: &mut [f32]) -> Option<f32> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ use upbp_estimators::{
 use crate::choices::usual_roulette;
 use crate::emitters::pixel;
 use crate::memory::LightCounts;
-use crate::neighbours::{Nearest, Neighbours};
+use crate::neighbours::{Nearest, Neighbours, median};
 use crate::passes::{Lists, light_pass};
 use crate::settings::CheckedSettings;
 
@@ -133,7 +133,7 @@ pub(crate) fn run<S: Scene>(
     };
     Pilot {
         vertices_per_path: light.vertices.len() as f64 / paths,
-        footprint: median(&mut queries.footprints),
+        footprint: median(&mut queries.footprints).unwrap_or(0.0),
         surface_per_path: looked_up(plan.looks_up(Technique::Surf), on_surfaces),
         medium_per_path: looked_up(plan.stores_medium_photons(), in_media),
         pieces_per_path: beams.pieces() as f64 / beam_paths,
@@ -262,12 +262,6 @@ fn camera_queries<S: Scene>(world: &World<'_, S>, plan: &Plan) -> Queries {
     thin(&mut queries.media);
     thin(&mut queries.edges);
     queries
-}
-
-/// The median; 0 of nothing.
-fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 /// Keeps `QUERIES` elements, evenly.

@@ -97,9 +97,9 @@ pub struct PlanChoices {
     pub light_paths: u32,
     /// How many of them leave photon beams; at most `light_paths`.
     pub beam_paths: u32,
-    /// Light vertices that each camera vertex is connected to, on average.
+    /// Light vertices that each camera vertex is connected to, on average: finite, not negative; a fraction is a probability.
     pub connections: f32,
-    /// Points on lights that each camera vertex is connected to, on average.
+    /// Points on lights that each camera vertex is connected to, likewise.
     pub next_events: f32,
     /// Expected number of connectible vertices of a light sub-path. Must be known before the iteration: a figure of
     /// the iteration itself would correlate with its samples.

@@ -5,13 +5,14 @@
 //! model is corrected by the ratio of the time that the trial took for it; ratios are between parts of one run, side by side, so that
 //! a busy machine slows all of them.
 
-use upbp_estimators::Technique;
+use upbp_estimators::{Technique, TechniqueSet};
 
 use super::recorder::TECHNIQUES;
 use super::roulette::TRIAL;
 use super::search::Candidate;
 use super::trial::{Trial, Work};
 use super::watch::WALK;
+use crate::choices::BEAMS;
 
 /// Nanoseconds of one edge of a camera sub-path, and of a light sub-path.
 const EDGE: [f64; 2] = [300.0, 300.0];
@@ -26,6 +27,13 @@ const BUILD_POINT: f64 = 90.0;
 const BUILD_BEAM: f64 = 600.0;
 /// Nanoseconds of adding a pixel to the film.
 const PIXEL: f64 = 40.0;
+
+const LIGHT_TRACING: TechniqueSet = TechniqueSet::EMPTY.with(Technique::LightTracing);
+/// Techniques that look photon points up.
+const PHOTON_POINTS: TechniqueSet =
+    TechniqueSet::EMPTY.with(Technique::Surf).with(Technique::Pp3d).with(Technique::Pb2d);
+/// Techniques whose query is a camera edge, to its very end.
+const ALONG_QUERY_BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Pb2d).with(Technique::Bb1d);
 
 /// How many times as long as in the model the parts of an iteration take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,22 +104,20 @@ impl Costs {
     pub(crate) fn iteration(&self, candidate: &Candidate) -> f64 {
         let work = &self.work;
         let has = |technique| candidate.techniques.has(technique);
-        let beams = has(Technique::Pb2d) || has(Technique::Bb1d);
+        // What part of the iterations run any of some techniques.
+        let any = |techniques: TechniqueSet| {
+            let run = candidate.techniques.intersection(techniques);
+            1.0 - run.iter().map(|technique| 1.0 - candidate.look_up(technique)).product::<f64>()
+        };
         let roulette = candidate.roulette;
-        let walk = work.camera_edges[roulette] * EDGE[0] * self.camera_walk * if beams { 1.0 } else { SHORT };
+        let beyond = SHORT + (1.0 - SHORT) * any(ALONG_QUERY_BEAMS);
+        let walk = work.camera_edges[roulette] * EDGE[0] * self.camera_walk * beyond;
         let mut camera = PIXEL + walk;
-        for technique in candidate.techniques.iter() {
+        for technique in candidate.techniques.without(LIGHT_TRACING).iter() {
             let i = technique as usize;
-            let paths = match technique {
-                Technique::LightTracing => continue,
-                Technique::Bp2d | Technique::Bb1d => candidate.beam_paths,
-                _ => candidate.light_paths,
-            };
-            let calls = match technique {
-                Technique::Connect => candidate.connections * work.calls[i][roulette],
-                _ => work.calls[i][roulette],
-            };
-            let turns = calls * TURN[i] * self.depth(technique, paths);
+            let per_vertex = if technique == Technique::Connect { candidate.connections } else { 1.0 };
+            let calls = per_vertex * work.calls[i][roulette];
+            let turns = calls * TURN[i] * self.depth(technique, candidate.paths(technique));
             let each = turns + candidate.photons(technique) * work.samples[i][roulette] * SAMPLE[i];
             camera += self.techniques[i] * candidate.look_up(technique) * each;
         }
@@ -120,20 +126,9 @@ impl Costs {
             let i = Technique::LightTracing as usize;
             light += work.calls[i][roulette] * TURN[i] * self.techniques[i];
         }
-        // What part of the iterations run any of some techniques.
-        let any = |techniques: &[Technique]| {
-            let none = |left, technique: &Technique| {
-                left * if has(*technique) { 1.0 - candidate.look_up(*technique) } else { 1.0 }
-            };
-            1.0 - techniques.iter().fold(1.0, none)
-        };
-        let points = [Technique::Surf, Technique::Pp3d, Technique::Pb2d];
-        let lines = [Technique::Bp2d, Technique::Bb1d];
-        let stored = if has(Technique::Connect) { 1.0 } else { any(&points) };
-        light = light
-            * any(&[points.as_slice(), &lines, &[Technique::Connect, Technique::LightTracing]].concat())
-            + work.vertices * (stored * STORE + any(&points) * BUILD_POINT);
-        let beams = any(&lines) * candidate.beam_paths * self.planned[1] * work.beams * BUILD_BEAM;
+        let stored = any(PHOTON_POINTS.with(Technique::Connect)) * STORE + any(PHOTON_POINTS) * BUILD_POINT;
+        light = any(TechniqueSet::ALL.without(TechniqueSet::PT)) * light + work.vertices * stored;
+        let beams = any(BEAMS) * candidate.beam_paths * self.planned[1] * work.beams * BUILD_BEAM;
         self.pixels * camera + candidate.light_paths * self.planned[0] * light + beams
     }
 }

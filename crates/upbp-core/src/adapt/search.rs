@@ -10,6 +10,7 @@ use super::cost::Costs;
 use super::prediction::{Counts, GROUPS, Prediction};
 use super::recorder::TECHNIQUES;
 use super::roulette::TRIAL;
+use crate::choices::BEAMS;
 
 /// A plan that may be chosen. Numbers of sub-paths are relative to the trial's plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,13 +76,15 @@ impl Candidate {
         LookUps::by(|technique| if self.seldom.has(technique) { SELDOM } else { NonZeroU32::MIN })
     }
 
-    /// Photons within reach of a look-up that each of the trial's light sub-paths stands for.
+    /// The light sub-paths that a technique uses.
+    pub(crate) fn paths(&self, technique: Technique) -> f64 {
+        if BEAMS.has(technique) { self.beam_paths } else { self.light_paths }
+    }
+
+    /// Photons or beams within reach of a look-up.
     pub(crate) fn photons(&self, technique: Technique) -> f64 {
-        match technique {
-            Technique::Surf => self.light_paths * self.surf_radius.powi(2),
-            Technique::Bp2d | Technique::Bb1d => self.beam_paths,
-            _ => self.light_paths,
-        }
+        let kernel = if technique == Technique::Surf { self.surf_radius.powi(2) } else { 1.0 };
+        kernel * self.paths(technique)
     }
 
     /// Whether any technique uses light sub-paths.
