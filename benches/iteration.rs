@@ -13,9 +13,7 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use upbp_core::{MediumId, Settings, TechniqueSet};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy, VertexKind};
-use upbp_estimators::mis::{
-    BeamExtent, Edge, End, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges,
-};
+use upbp_estimators::mis::{BeamExtent, Edge, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges};
 use upbp_estimators::scene::Walk;
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
@@ -99,6 +97,8 @@ fn plan() -> MisPlan {
         }],
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
+        damping: None,
+        correlation: None,
     }
 }
 
@@ -154,7 +154,8 @@ impl<'a> Ends<'a> {
             rho,
             cos_out,
             site: site(vertex),
-            c: tip.c,
+            leg: tip.leg,
+            reuse: tip.reuse,
             connectible: true,
             in_medium: in_medium(vertex),
         }
@@ -177,6 +178,7 @@ impl<'a> Ends<'a> {
         };
         let edge = Edge {
             distance_squared: edge.distance * edge.distance,
+            nearness: (edge.distance * edge.distance).recip(),
             cos_in,
             forward,
             backward,
@@ -192,10 +194,10 @@ impl<'a> Ends<'a> {
         let vertex = &path.vertices[middle];
         let light = Self::arrive(plan, path, Walk::Light, &self.light[0], middle);
         let camera = Self::arrive(plan, path, Walk::Camera, &self.camera, middle);
-        let factors = plan.volume_factors(MediumId(0), light.c, camera.c, vertex.sin_theta);
+        let factors = plan.volume_factors(MediumId(0), light.leg, camera.leg, vertex.sin_theta);
         let (before_light, before_camera) =
             (light.before(plan, vertex.rho_camera), camera.before(plan, vertex.rho_light));
-        plan.merge_weight(factors.bb1d, factors.sum(), before_light, before_camera).value()
+        plan.merge_weight(factors.bb1d, factors.sum(), before_light, before_camera, camera.reuse).value()
     }
 
     /// The connection of the vertex in fog to the wall before it.
@@ -205,19 +207,16 @@ impl<'a> Ends<'a> {
         let edge = &path.edges[middle - 1];
         let light = Self::arrive(plan, path, Walk::Light, &self.light[1], middle - 1);
         let camera = Self::arrive(plan, path, Walk::Camera, &self.camera, middle);
-        let c = plan.distance_factor(Walk::Light, edge.reach, edge.t_light);
-        let light_end = End {
-            merges: plan.merge_sum(site(a), Walk::Light, light.c, 0.0),
-            before: light.before(plan, a.rho_camera),
-        };
-        let camera_end = End {
-            merges: plan.merge_sum(site(b), Walk::Camera, camera.c, c),
-            before: camera.before(plan, b.rho_light),
-        };
         let square = edge.distance * edge.distance;
+        let leg = |walk, vertex, t| plan.leg(walk, in_medium(vertex), square.recip(), edge.reach, t);
+        let light_end =
+            light.end(plan, Walk::Light, site(a), leg(Walk::Camera, a, edge.t_camera), a.rho_camera);
+        let camera_end =
+            camera.end(plan, Walk::Camera, site(b), leg(Walk::Light, b, edge.t_light), b.rho_light);
         let light_density = b.rho_camera * a.cos_camera / square * edge.t_camera;
         let camera_density = a.rho_light * b.cos_light / square * edge.t_light;
-        plan.connect_weight(light_end, light_density, camera_end, camera_density).value()
+        let reuse = plan.reuse(camera.reuse, b.rho_camera * a.cos_camera / square);
+        plan.connect_weight(light_end, light_density, camera_end, camera_density, reuse).value()
     }
 }
 

@@ -6,6 +6,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use upbp_estimators::mis::{Densities, MergesApart};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::walk::Context;
 use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
@@ -57,7 +58,9 @@ pub(crate) struct SceneEngine<'a, S: Scene> {
     /// None if there is no choice.
     pub(crate) emitters: Option<EmitterChoices>,
     pub(crate) pilot: Pilot,
+    /// Of iterations without correlation, and with it.
     pub(crate) lists: Lists<S::Bsdf>,
+    pub(crate) lists_apart: Lists<S::Bsdf, MergesApart>,
 }
 
 impl<S: Scene> SceneEngine<'_, S> {
@@ -87,39 +90,58 @@ impl<S: Scene> Engine for SceneEngine<'_, S> {
     ) -> Option<Done> {
         self.choose_emitters(plan.light_paths > 0);
         let context = Context { world: &self.world, plan };
-        let mut times = PassTimes::default();
-        let mut clock = Clock::start();
-        pixels.fill(BLACK);
-        let stores = plan.stores_vertices() || plan.stores_beams();
-        let expected = LightCounts::expected(&self.pilot, plan.light_paths, plan.beam_paths);
-        let expected = if stores { expected } else { LightCounts::default() };
-        let lists = &mut self.lists;
-        let mut counters = light_pass(&context, StreamKind::Light, &expected, lists, cancelled, |splats| {
-            add_splats(rect, splats, pixels);
-        });
-        times.light = clock.lap();
-        if cancelled.load(Ordering::Relaxed) {
-            return None;
-        }
-        let map = if stores {
-            LightMap::build(plan, std::mem::take(&mut lists.vertices), std::mem::take(&mut lists.beams))
+        // A stage of the other kind may have left its lists.
+        if plan.mis.correlation.is_some() {
+            self.lists = Lists::default();
+            iterate(&context, &self.pilot, &mut self.lists_apart, rect, pixels, cancelled)
         } else {
-            LightMap::empty()
-        };
-        times.build = clock.lap();
-        counters.add(&camera_pass(&context, &map, rect, pixels, cancelled));
-        times.camera = clock.lap();
-        if cancelled.load(Ordering::Relaxed) {
-            return None;
+            self.lists_apart = Lists::default();
+            iterate(&context, &self.pilot, &mut self.lists, rect, pixels, cancelled)
         }
-        let map_bytes = map.memory_bytes() as u64;
-        *lists = Lists { vertices: map.vertices, beams: map.beams };
-        Some(Done { counters, map_bytes, times })
     }
 
     fn shrink(&mut self) {
         self.lists = Lists::default();
+        self.lists_apart = Lists::default();
     }
+}
+
+fn iterate<S: Scene, D: Densities>(
+    context: &Context<'_, S>,
+    pilot: &Pilot,
+    lists: &mut Lists<S::Bsdf, D>,
+    rect: PixelRect,
+    pixels: &mut [Pixel],
+    cancelled: &AtomicBool,
+) -> Option<Done> {
+    let plan = context.plan;
+    let mut times = PassTimes::default();
+    let mut clock = Clock::start();
+    pixels.fill(BLACK);
+    let stores = plan.stores_vertices() || plan.stores_beams();
+    let expected = LightCounts::expected(pilot, plan.light_paths, plan.beam_paths);
+    let expected = if stores { expected } else { LightCounts::default() };
+    let mut counters = light_pass(context, StreamKind::Light, &expected, lists, cancelled, |splats| {
+        add_splats(rect, splats, pixels);
+    });
+    times.light = clock.lap();
+    if cancelled.load(Ordering::Relaxed) {
+        return None;
+    }
+    let map = if stores {
+        LightMap::build(plan, std::mem::take(&mut lists.vertices), std::mem::take(&mut lists.beams))
+    } else {
+        LightMap::empty()
+    };
+    times.build = clock.lap();
+    counters.add(&camera_pass(context, &map, rect, pixels, cancelled));
+    times.camera = clock.lap();
+    if cancelled.load(Ordering::Relaxed) {
+        return None;
+    }
+    let map_bytes = map.memory_bytes() as u64;
+    *lists = Lists { vertices: map.vertices, beams: map.beams };
+    Some(Done { counters, map_bytes, times })
 }
 
 /// A stop watch.

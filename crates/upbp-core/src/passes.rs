@@ -6,6 +6,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
+use upbp_estimators::mis::Densities;
+use upbp_estimators::observer::Nobody;
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::walk::{trace_camera_path, trace_light_path};
@@ -18,12 +20,12 @@ use crate::memory::LightCounts;
 const LIGHT_CHUNK: u32 = 64;
 
 /// Lists that are used again in the next iteration: the allocator need not find a use for what was given back to it.
-pub(crate) struct Lists<B> {
-    pub(crate) vertices: Vec<LightVertex<B>>,
-    pub(crate) beams: Vec<PhotonBeam>,
+pub(crate) struct Lists<B, D = f64> {
+    pub(crate) vertices: Vec<LightVertex<B, D>>,
+    pub(crate) beams: Vec<PhotonBeam<D>>,
 }
 
-impl<B> Default for Lists<B> {
+impl<B, D> Default for Lists<B, D> {
     fn default() -> Self {
         Self { vertices: Vec::new(), beams: Vec::new() }
     }
@@ -34,11 +36,11 @@ impl<B> Default for Lists<B> {
 ///
 /// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never more than a
 /// fraction of all in two places.
-pub(crate) fn light_pass<S: Scene>(
+pub(crate) fn light_pass<S: Scene, D: Densities>(
     context: &Context<'_, S>,
     kind: StreamKind,
     expected: &LightCounts,
-    lists: &mut Lists<S::Bsdf>,
+    lists: &mut Lists<S::Bsdf, D>,
     cancelled: &AtomicBool,
     mut take_splats: impl FnMut(&[Splat]),
 ) -> Counters {
@@ -47,7 +49,7 @@ pub(crate) fn light_pass<S: Scene>(
     // Enough for each thread that none waits long for the last one.
     let threads = rayon::current_num_threads() as u32;
     let wave = (chunks / 32).clamp(16 * threads, 256 * threads);
-    let mut buffers: Vec<LightChunk<S::Bsdf>> = Vec::new();
+    let mut buffers: Vec<LightChunk<S::Bsdf, D>> = Vec::new();
     buffers.resize_with(wave.min(chunks) as usize, LightChunk::default);
     let mut counters = Counters::default();
     lists.vertices.clear();
@@ -62,8 +64,9 @@ pub(crate) fn light_pass<S: Scene>(
                 return;
             }
             let first = (start + i as u32) * LIGHT_CHUNK;
+            let nobody = &mut Nobody::default();
             for index in first..first.saturating_add(LIGHT_CHUNK).min(paths) {
-                trace_light_path(context, kind, index, scratch, out, &mut ());
+                trace_light_path(context, kind, index, scratch, out, nobody);
             }
         });
         for out in buffers {
@@ -78,9 +81,9 @@ pub(crate) fn light_pass<S: Scene>(
 }
 
 /// Traces one camera sub-path per pixel of `rect` and adds it to `pixels`.
-pub(crate) fn camera_pass<S: Scene>(
+pub(crate) fn camera_pass<S: Scene, D: Densities>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf>,
+    map: &LightMap<S::Bsdf, D>,
     rect: PixelRect,
     pixels: &mut [Pixel],
     cancelled: &AtomicBool,
@@ -105,7 +108,7 @@ pub(crate) fn camera_pass<S: Scene>(
                     index,
                     scratch,
                     &mut counters,
-                    &mut (),
+                    &mut Nobody::default(),
                 );
                 for (sum, value) in pixel.iter_mut().zip(walk.layers) {
                     *sum += value;

@@ -7,7 +7,7 @@ use upbp_estimators::{Technique, TechniqueSet, World};
 
 use crate::adapt::{self, roulette};
 use crate::census::Census;
-use crate::choices::{BEAMS, plan};
+use crate::choices::{BEAMS, correlation, plan};
 use crate::emitters;
 use crate::memory::LightCounts;
 use crate::pilot::Pilot;
@@ -62,6 +62,7 @@ impl Planner {
             connections: everything.connections * candidate.connections as f32,
             roulette: roulette::numbered(candidate.roulette, of_trial),
             look_ups: candidate.look_ups(),
+            correlation: correlation(settings, candidate.techniques, pilot),
             radii: RadiusSchedule {
                 surf: (f64::from(everything.radii.surf) * candidate.surf_radius) as f32,
                 ..everything.radii
@@ -87,7 +88,8 @@ impl Planner {
         let fits = |factor: &f64| {
             let beams = f64::from(everything.beam_paths) * factor;
             let counts = LightCounts::expected(pilot, everything.light_paths, beams as u32);
-            *factor <= 1.0 || counts.peak_bytes::<S::Bsdf>() < self.bytes as f64
+            *factor <= 1.0
+                || counts.peak_bytes::<S::Bsdf>(everything.correlation.is_some()) < self.bytes as f64
         };
         adapt::Bounds {
             techniques,

@@ -17,7 +17,7 @@ use crate::pilot::{self, Pilot};
 use crate::planner::Planner;
 use crate::report::PassTimes;
 use crate::settings::CheckedSettings;
-use crate::stage::RenderPlan;
+use crate::stage::{RenderPlan, Stage};
 use crate::state::{Identity, Record, State, fingerprint};
 use crate::techniques::Techniques;
 
@@ -76,7 +76,8 @@ pub(crate) fn prepare<S: Scene>(
         let light_paths = emitters::light_paths_for(scene.emitters().len(), pilot.vertices_per_path);
         let plan = |techniques| {
             let stage = stage(&world, &settings, techniques, &pilot, [light_paths, light_paths / 8]);
-            choices::plan(&world, &settings, &stage, 0)
+            // Measured with sums as weights, which do not know merges apart.
+            choices::plan(&world, &settings, &Stage { correlation: None, ..stage }, 0)
         };
         let camera = techniques.intersection(TechniqueSet::PT);
         let may_be_alone = matches!(settings.techniques, Techniques::Auto) && camera != techniques;
@@ -98,7 +99,7 @@ pub(crate) fn prepare<S: Scene>(
     let pixels = rect.width.saturating_mul(rect.height);
     for stage in frozen.iter().flat_map(RenderPlan::stages) {
         let counts = LightCounts::expected(&pilot, stage.light_paths, stage.beam_paths);
-        let needed = film_bytes + counts.peak_bytes::<S::Bsdf>() as u64;
+        let needed = film_bytes + counts.peak_bytes::<S::Bsdf>(stage.correlation.is_some()) as u64;
         if needed > budget {
             return Err(RenderError::PlanMemory {
                 from: stage.from,
@@ -132,9 +133,16 @@ pub(crate) fn prepare<S: Scene>(
         Record { times: PassTimes { pilot: start.elapsed(), ..PassTimes::default() }, ..Record::default() };
     let first = identity.plan.stage(0);
     let counts = LightCounts::expected(&pilot, first.light_paths, first.beam_paths);
-    record.expected_bytes = film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>() as u64);
+    record.expected_bytes =
+        film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>(first.correlation.is_some()) as u64);
     Ok(Prepared {
-        engine: Box::new(SceneEngine { world, emitters, pilot, lists: Lists::default() }),
+        engine: Box::new(SceneEngine {
+            world,
+            emitters,
+            pilot,
+            lists: Lists::default(),
+            lists_apart: Lists::default(),
+        }),
         planner,
         state: State { identity, record, film },
     })

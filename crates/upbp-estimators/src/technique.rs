@@ -43,6 +43,15 @@ impl Technique {
         Self::Bb1d,
     ];
 
+    /// Whether it merges light sub-paths with camera sub-paths within a kernel.
+    #[must_use]
+    pub const fn merges(self) -> bool {
+        match self {
+            Self::Hit | Self::Nee | Self::Connect | Self::LightTracing => false,
+            Self::Surf | Self::Pp3d | Self::Pb2d | Self::Bp2d | Self::Bb1d => true,
+        }
+    }
+
     /// The name in settings and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {

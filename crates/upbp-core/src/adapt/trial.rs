@@ -4,7 +4,7 @@
 
 use upbp_estimators::observer::Observer;
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{Counters, Plan, Technique, TechniqueSet, World};
+use upbp_estimators::{Counters, Plan, Technique, World};
 
 use super::grid::Grid;
 use super::recorder::{ByRoulette, MOST_SAMPLES, Recorder, Sample, TECHNIQUES, add, reach};
@@ -125,8 +125,9 @@ pub(crate) fn run<S: Scene>(
         }
     }
     if timed {
-        // The first pass again, with weights as the render has them.
+        // The first pass again, with weights as the render has them without correlation.
         plan.iteration = u64::from(first_pass) + 1;
+        plan.mis.correlation = None;
         let pass = Pass::<Watch>::trace(world, &plan, grid, first_pass, &room)?;
         trial.work.camera_time = Some(time(&pass.camera).map(|t| t / cells as f64));
         let light = time(pass.light.iter().map(|(watch, _)| watch));
@@ -191,7 +192,7 @@ fn work(
         let i = technique as usize;
         let paths = if technique == Technique::LightTracing { light_paths } else { camera_paths };
         calls[i] = calls[i].map(|count| per(count, paths));
-        let merges = !TechniqueSet::BPT.has(technique);
+        let merges = technique.merges();
         let thinning = if merges { trial.thinning(technique) } else { 1.0 };
         samples[i] = samples[i].map(|count| per(count, paths) / thinning);
     }

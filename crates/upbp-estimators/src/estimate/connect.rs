@@ -4,7 +4,6 @@
 //! constant, however long light sub-paths are (`docs/theory.md`, section 6(m)).
 
 use crate::light_map::LightMap;
-use crate::mis::End;
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::random::Stream;
 use crate::scene::{Crossing, Scene, Walk};
@@ -91,29 +90,23 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     // C_{s-1} and L_s: what each walk would have sampled instead of this connection.
     let light_density = camera_side.rho_own * light_side.cos / distance2 * density.forward(far);
     let camera_density = light_side.rho_own * camera_side.cos / distance2 * density.backward(near);
-    let c_at_camera_vertex =
-        if near { mis.distance_factor(Walk::Light, density.reach, density.backward(true)) } else { 0.0 };
-    let c_at_light_vertex =
-        if far { mis.distance_factor(Walk::Camera, density.reach, density.forward(true)) } else { 0.0 };
-    let camera_end = End {
-        merges: mis.merge_sum(
-            vertex.site.merge_site(camera_side.sin_theta),
-            Walk::Camera,
-            vertex.tip.c,
-            c_at_camera_vertex,
-        ),
-        before: vertex.tip.before(mis, camera_side.rho_opposite),
-    };
-    let light_end = End {
-        merges: mis.merge_sum(
-            light.site.merge_site(light_side.sin_theta),
-            Walk::Light,
-            light.tip.c,
-            c_at_light_vertex,
-        ),
-        before: light.tip.before(mis, light_side.rho_opposite),
-    };
-    let weight = mis.connect_weight(light_end, light_density, camera_end, camera_density);
+    let leg = |walk, in_medium, t| mis.leg(walk, in_medium, distance2.recip(), density.reach, t);
+    let camera_end = vertex.tip.end(
+        mis,
+        Walk::Camera,
+        vertex.site.merge_site(camera_side.sin_theta),
+        leg(Walk::Light, near, density.backward(near)),
+        camera_side.rho_opposite,
+    );
+    let light_end = light.tip.end(
+        mis,
+        Walk::Light,
+        light.site.merge_site(light_side.sin_theta),
+        leg(Walk::Camera, far, density.forward(far)),
+        light_side.rho_opposite,
+    );
+    let reuse = mis.reuse(vertex.tip.reuse, camera_side.rho_own * light_side.cos / distance2);
+    let weight = mis.connect_weight(light_end, light_density, camera_end, camera_density, reuse);
     let geometry = camera_side.cos * light_side.cos / distance2;
     let value = vertex.throughput
         * light.throughput

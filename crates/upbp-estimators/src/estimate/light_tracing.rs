@@ -1,6 +1,5 @@
 //! Light tracing: a light vertex and the lens.
 
-use crate::mis::End;
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::random::Stream;
 use crate::scene::{Camera, Crossing, Scene, Walk};
@@ -55,21 +54,11 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     // C_{k-1}: the density of this vertex as the camera would sample it.
     let ray_pdf = f64::from(view.pdf) * scattering.cos / distance2;
     let light_density = ray_pdf * density.backward(in_medium);
-    let c_camera = if in_medium {
-        plan.mis.distance_factor(Walk::Camera, density.reach, density.backward(true))
-    } else {
-        0.0
-    };
-    let end = End {
-        merges: plan.mis.merge_sum(
-            vertex.site.merge_site(scattering.sin_theta),
-            Walk::Light,
-            vertex.tip.c,
-            c_camera,
-        ),
-        before: vertex.tip.before(&plan.mis, scattering.rho_opposite),
-    };
-    let weight = plan.mis.light_tracing_weight(end, light_density);
+    let mis = &plan.mis;
+    let leg = mis.leg(Walk::Camera, in_medium, distance2.recip(), density.reach, density.backward(in_medium));
+    let site = vertex.site.merge_site(scattering.sin_theta);
+    let end = vertex.tip.end(mis, Walk::Light, site, leg, scattering.rho_opposite);
+    let weight = mis.light_tracing_weight(end, light_density);
     let value = vertex.throughput
         * scattering.value
         * density.transmittance

@@ -1,6 +1,5 @@
 //! Next event estimation: a camera vertex and a point chosen on a light.
 
-use crate::mis::End;
 use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
 use crate::random::Stream;
 use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
@@ -83,17 +82,10 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     };
     let camera_density =
         f64::from(incident.pdf_direction) * scattering.cos / distance2 * density.backward(in_medium);
-    let c_light =
-        if in_medium { mis.distance_factor(Walk::Light, density.reach, density.backward(true)) } else { 0.0 };
-    let end = End {
-        merges: mis.merge_sum(
-            vertex.site.merge_site(scattering.sin_theta),
-            Walk::Camera,
-            vertex.tip.c,
-            c_light,
-        ),
-        before: vertex.tip.before(mis, scattering.rho_opposite),
-    };
+    let nearness = f64::from(incident.distance).powi(2).recip();
+    let leg = mis.leg(Walk::Light, in_medium, nearness, density.reach, density.backward(in_medium));
+    let site = vertex.site.merge_site(scattering.sin_theta);
+    let end = vertex.tip.end(mis, Walk::Camera, site, leg, scattering.rho_opposite);
     let weight = mis.nee_weight(pdf, pdf_position, hit_density, end, camera_density);
     let value = vertex.throughput
         * scattering.value

@@ -98,11 +98,11 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     };
     let (kernel, factor, merges) = match &vertex.site {
         Site::Surface(_) => {
-            let factor = mis.pow(mis.surf);
+            let factor = mis.surface_factor(photon.tip.leg, vertex.tip.leg);
             (&plan.kernels.surf, factor, O::Densities::of(technique, factor))
         }
         Site::Medium(medium) => {
-            let factors = mis.volume_factors(*medium, photon.tip.c, vertex.tip.c, scattering.sin_theta);
+            let factors = mis.volume_factors(*medium, photon.tip.leg, vertex.tip.leg, scattering.sin_theta);
             (&plan.kernels.pp3d, factors.pp3d, factors.sum())
         }
     };
@@ -111,6 +111,7 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         merges,
         photon.tip.before(mis, scattering.rho_own),
         vertex.tip.before(mis, scattering.rho_opposite),
+        vertex.tip.reuse,
     );
     let value = vertex.throughput
         * photon.throughput
@@ -124,6 +125,7 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
                 path: photon.path,
                 light: (photon.position, photon.depth),
                 camera: (vertex.position, vertex.site),
+                reuse: vertex.tip.reuse,
             },
             weight,
             value,
@@ -154,9 +156,14 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         let rho = f64::from(phase) * f64::from(survival);
         let sin = f64::from(towards_light.cross(vertex.towards_camera).length()).min(1.0);
         let Some((tip, light)) = beam_tip(context, beam, t) else { return };
-        let factors = mis.volume_factors(medium_id, tip.c, vertex.tip.c, sin);
-        let weight =
-            mis.merge_weight(factors.bp2d, factors.sum(), tip.before(mis, rho), vertex.tip.before(mis, rho));
+        let factors = mis.volume_factors(medium_id, tip.leg, vertex.tip.leg, sin);
+        let weight = mis.merge_weight(
+            factors.bp2d,
+            factors.sum(),
+            tip.before(mis, rho),
+            vertex.tip.before(mis, rho),
+            vertex.tip.reuse,
+        );
         let value = vertex.throughput
             * light
             * medium.sigma_s(vertex.position)
@@ -169,6 +176,7 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
                     path: beam.path,
                     light: (beam.segment.origin + beam.segment.direction * t, beam.depth),
                     camera: (vertex.position, vertex.site),
+                    reuse: vertex.tip.reuse,
                 },
                 weight,
                 value,

@@ -3,7 +3,7 @@
 //! The balance heuristic over all techniques that can produce a path, where a merge counts with
 //! `n · V_K · (distance factors) · (densities of both sub-paths)`: `docs/theory.md`, sections 3 and 4. A sub-path vertex
 //! carries two numbers ([`Tip`]) from which the weight of any technique that ends there follows in constant time, or two
-//! numbers per technique ([`ByTechnique`]) from which the weights of any other sample counts follow;
+//! numbers each for merges and the rest ([`MergesApart`]) where correlation is accounted for, or per technique ([`ByTechnique`]), from which the weights of any other sample counts follow;
 //! [`oracle`] enumerates the same weights the slow, obvious way, and the tests hold one to the other.
 
 mod densities;
@@ -12,8 +12,8 @@ mod plan;
 mod recursion;
 mod weights;
 
-pub use densities::{ByTechnique, Densities, Weight};
-pub use plan::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
+pub use densities::{ByTechnique, Densities, MergesApart, Weight};
+pub use plan::{BeamExtent, Damping, Heuristic, Leg, MisPlan, VolumeMerges};
 pub use recursion::{Edge, MergeSite, Pending, Tip};
 pub use weights::End;
 

@@ -12,6 +12,17 @@ pub enum Walk {
     Camera,
 }
 
+impl Walk {
+    /// The walk from the other end.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Light => Self::Camera,
+            Self::Camera => Self::Light,
+        }
+    }
+}
+
 /// The refractive indices on the two sides of a surface where a path meets it.
 ///
 /// They follow from the bodies that the path is in (`docs/theory.md`, section 1.7), so that a glass in

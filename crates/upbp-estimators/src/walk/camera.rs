@@ -87,6 +87,10 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     counters: &mut Counters,
     observer: &mut O,
 ) -> CameraWalk {
+    debug_assert!(
+        context.plan.mis.correlation.is_none() || O::Densities::KNOWS_MERGES,
+        "correlation needs densities that know merges apart"
+    );
     let mut walk = CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT] };
     let Context { world, plan } = *context;
     let scene = world.scene;

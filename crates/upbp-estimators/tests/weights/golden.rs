@@ -76,6 +76,8 @@ fn golden_plan(query_beams: BeamExtent) -> MisPlan {
         }],
         photon_beams: BeamExtent::Short,
         query_beams,
+        damping: None,
+        correlation: None,
     }
 }
 

@@ -4,13 +4,13 @@ mod abstract_paths;
 mod golden;
 mod recursion;
 
-use abstract_paths::{TECHNIQUES, masked, modes, path, plan};
+use abstract_paths::{TECHNIQUES, damped, dampings, masked, modes, path, plan};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use recursion::{Recursion, is_ok};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
-use upbp_estimators::mis::{ByTechnique, Densities, Heuristic, MisPlan, VolumeMerges};
+use upbp_estimators::mis::{ByTechnique, Densities, Heuristic, MergesApart, MisPlan, VolumeMerges};
 
 /// Every strategy that the kinds of the vertices allow, and the bit of its technique.
 fn strategies(path: &Path) -> Vec<(Way, u32)> {
@@ -49,9 +49,9 @@ impl Reached {
     ///
     /// A weight is known to the rounding of the sum that it is a part of: differences count relative to the
     /// weight down to `1e-200`, below which squares of densities leave the range of normal numbers.
-    fn compare(&mut self, plan: &MisPlan, path: &Path, mask: u32) -> Result<(), TestCaseError> {
+    fn compare<D: Densities>(&mut self, plan: &MisPlan, path: &Path, mask: u32) -> Result<(), TestCaseError> {
         let expected = path.weights(plan);
-        let recursion = Recursion::<f64>::new(plan, path);
+        let recursion = Recursion::<D>::new(plan, path);
         let mut sum = 0.0;
         for &(way, weight) in &expected {
             let found = recursion.weight(way).value();
@@ -91,21 +91,30 @@ impl Reached {
         let recursion = Recursion::<ByTechnique>::new(plan, path);
         let bits = strategies(path);
         let mut parts = [0.0; TECHNIQUES as usize];
+        let mut damped_again = 0.0;
         for (way, weight) in &expected {
             let (_, bit) = bits.iter().find(|(other, _)| other == way).expect("a strategy");
             parts[*bit as usize] += weight;
+            if let Way::Surf(i) | Way::Pp3d(i) | Way::Pb2d(i) | Way::Bp2d(i) | Way::Bb1d(i) = *way {
+                damped_again += weight * plan.pow(path.reuse(plan, i));
+            }
         }
         for &(way, weight) in expected.iter().filter(|(_, weight)| *weight > 1e-200) {
             let found = recursion.weight(way);
             let difference = (found.value() / weight - 1.0).abs();
             prop_assert!(difference <= 1e-10, "{way:?}: {found:?}, expected {weight}");
-            for (bit, (density, part)) in found.all.0.iter().zip(parts).enumerate() {
+            for (bit, (density, part)) in found.all.of.iter().zip(parts).enumerate() {
                 let found = density / found.all.total();
                 prop_assert!(
                     (found - part).abs() <= 1e-10 * part + 1e-200,
                     "{way:?}, {bit}: {found}, {part}"
                 );
             }
+            let again = found.all.merges_damped_again / found.all.total();
+            prop_assert!(
+                (again - damped_again).abs() <= 1e-10 * damped_again + 1e-200,
+                "{way:?}: {again}, {damped_again}"
+            );
             self.weights += 1;
             self.difference = self.difference.max(difference);
         }
@@ -151,7 +160,25 @@ fn recursion_equals_the_enumeration_for_all_masks() {
     let mut masks = masks();
     for_all_ranges("sums", |reached, plan, path| {
         for mask in masks.by_ref().take(16).chain([(1 << TECHNIQUES) - 1]) {
-            reached.compare(&masked(plan, mask), path, mask).unwrap();
+            reached.compare::<f64>(&masked(plan, mask), path, mask).unwrap();
+        }
+    });
+}
+
+#[test]
+fn damped_and_correlated_merges_equal_the_enumeration() {
+    let mut runner = TestRunner::deterministic();
+    let mut masks = masks();
+    let strategy = dampings(2.0);
+    for_all_ranges("damped", |reached, plan, path| {
+        let (damping, correlation) = strategy.new_tree(&mut runner).unwrap().current();
+        let plan = damped(plan, damping, correlation);
+        for mask in masks.by_ref().take(2).chain([(1 << TECHNIQUES) - 1]) {
+            let plan = masked(&plan, mask);
+            reached.compare::<MergesApart>(&plan, path, mask).unwrap();
+            reached.compare_by_technique(&plan, path).unwrap();
+            // A sum of all knows of lengths, but not of what camera sub-paths have in common.
+            reached.compare::<f64>(&MisPlan { correlation: None, ..plan }, path, mask).unwrap();
         }
     });
 }
@@ -176,7 +203,7 @@ fn the_balance_heuristic_stands_long_paths_of_wild_densities() {
         let (heuristic, photon_beams, query_beams) = modes().nth(case as usize % 4).unwrap();
         let plan = MisPlan { heuristic, photon_beams, query_beams, ..plan };
         let mask = case * 189 % (1 << TECHNIQUES);
-        reached.compare(&masked(&plan, mask), &path, mask).unwrap();
+        reached.compare::<f64>(&masked(&plan, mask), &path, mask).unwrap();
     }
     reached.report("k <= 12, e^±16, balance");
 }
@@ -211,7 +238,7 @@ proptest! {
     ) {
         for (heuristic, photon_beams, query_beams) in modes() {
             let plan = masked(&MisPlan { heuristic, photon_beams, query_beams, ..plan.clone() }, mask);
-            Reached::default().compare(&plan, &path, mask)?;
+            Reached::default().compare::<f64>(&plan, &path, mask)?;
         }
     }
 

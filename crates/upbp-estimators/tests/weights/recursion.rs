@@ -2,7 +2,9 @@
 
 use upbp_estimators::Technique;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
-use upbp_estimators::mis::{Densities, Edge, End, MergeSite, MisPlan, Pending, Tip, VolumeMerges, Weight};
+use upbp_estimators::mis::{
+    Densities, Edge, End, Leg, MergeSite, MisPlan, Pending, Tip, VolumeMerges, Weight,
+};
 use upbp_estimators::scene::Walk;
 
 /// Weights by the recursion, with exactly the calls that the walks make.
@@ -36,6 +38,10 @@ fn distance_squared(edge: &PathEdge) -> f64 {
     if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 }
 }
 
+fn nearness(edge: &PathEdge) -> f64 {
+    (edge.distance * edge.distance).recip()
+}
+
 /// What a vertex passes on after it has scattered.
 fn pend<D: Densities>(
     plan: &MisPlan,
@@ -45,13 +51,14 @@ fn pend<D: Densities>(
     rho_opposite: f64,
     cos_out: f64,
 ) -> Pending<D> {
-    let tip = if is_ok(vertex) { *tip } else { Tip { connect: D::ZERO, ..*tip } };
+    let tip = if is_ok(vertex) { *tip } else { Tip { connect: D::ZERO, spread: f64::INFINITY, ..*tip } };
     Pending {
         before: tip.before(plan, rho_opposite),
         rho,
         cos_out,
         site: site(vertex),
-        c: tip.c,
+        leg: tip.leg,
+        reuse: tip.reuse,
         connectible: is_ok(vertex),
         in_medium: in_medium(vertex),
     }
@@ -60,7 +67,8 @@ fn pend<D: Densities>(
 impl<'a, D: Densities> Recursion<'a, D> {
     pub(crate) fn new(plan: &'a MisPlan, path: &'a Path) -> Self {
         let (k, v) = (path.length(), &path.vertices);
-        let nowhere = Tip { connect: D::ZERO, below: D::ZERO, c: 0.0 };
+        let nowhere =
+            Tip { connect: D::ZERO, below: D::ZERO, leg: Leg::default(), spread: f64::INFINITY, reuse: 1.0 };
         let mut light = vec![nowhere; k + 1];
         let mut pending =
             Pending::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
@@ -68,6 +76,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
             let e = &path.edges[i - 1];
             let edge = Edge {
                 distance_squared: distance_squared(e),
+                nearness: nearness(e),
                 cos_in: v[i].cos_light,
                 forward: e.t_light,
                 backward: e.t_camera,
@@ -91,6 +100,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
             let e = &path.edges[i];
             let edge = Edge {
                 distance_squared: distance_squared(e),
+                nearness: nearness(e),
                 cos_in: v[i].cos_camera,
                 forward: e.t_camera,
                 backward: e.t_light,
@@ -118,27 +128,15 @@ impl<'a, D: Densities> Recursion<'a, D> {
     /// The end of the light sub-path at vertex `i`, with the edge that the camera's side would arrive by.
     fn light_end(&self, i: usize) -> End<D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i]);
-        let c = match vertex.kind {
-            VertexKind::Medium(_) => self.plan.distance_factor(Walk::Camera, edge.reach, edge.t_camera),
-            _ => 0.0,
-        };
-        End {
-            merges: self.plan.merge_sum(site(vertex), Walk::Light, self.light[i].c, c),
-            before: self.light[i].before(self.plan, vertex.rho_camera),
-        }
+        let leg = self.plan.leg(Walk::Camera, in_medium(vertex), nearness(edge), edge.reach, edge.t_camera);
+        self.light[i].end(self.plan, Walk::Light, site(vertex), leg, vertex.rho_camera)
     }
 
     /// The end of the camera sub-path at vertex `i`, with the edge that the light's side would arrive by.
     fn camera_end(&self, i: usize) -> End<D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i - 1]);
-        let c = match vertex.kind {
-            VertexKind::Medium(_) => self.plan.distance_factor(Walk::Light, edge.reach, edge.t_light),
-            _ => 0.0,
-        };
-        End {
-            merges: self.plan.merge_sum(site(vertex), Walk::Camera, self.camera[i].c, c),
-            before: self.camera[i].before(self.plan, vertex.rho_light),
-        }
+        let leg = self.plan.leg(Walk::Light, in_medium(vertex), nearness(edge), edge.reach, edge.t_light);
+        self.camera[i].end(self.plan, Walk::Camera, site(vertex), leg, vertex.rho_light)
     }
 
     /// `L_i`, given that vertex `i − 1` scatters towards it.
@@ -157,15 +155,15 @@ impl<'a, D: Densities> Recursion<'a, D> {
         let vertex = &self.path.vertices[i];
         let (light, camera) = (&self.light[i], &self.camera[i]);
         let (factor, merges) = if let VertexKind::Medium(medium) = vertex.kind {
-            let factors = self.plan.volume_factors(medium, light.c, camera.c, vertex.sin_theta);
+            let factors = self.plan.volume_factors(medium, light.leg, camera.leg, vertex.sin_theta);
             (factor(&factors), factors.sum())
         } else {
-            let factor = self.plan.pow(self.plan.surf);
+            let factor = self.plan.surface_factor(light.leg, camera.leg);
             (factor, D::of(Technique::Surf, factor))
         };
         let before_light = light.before(self.plan, vertex.rho_camera);
         let before_camera = camera.before(self.plan, vertex.rho_light);
-        self.plan.merge_weight(factor, merges, before_light, before_camera)
+        self.plan.merge_weight(factor, merges, before_light, before_camera, camera.reuse)
     }
 
     pub(crate) fn weight(&self, way: Way) -> Weight<D> {
@@ -187,6 +185,11 @@ impl<'a, D: Densities> Recursion<'a, D> {
                 self.camera_density(s - 1),
                 self.camera_end(s),
                 self.light_density(s),
+                plan.reuse(
+                    self.camera[s].reuse,
+                    path.vertices[s].rho_camera * path.vertices[s - 1].cos_camera
+                        / distance_squared(&path.edges[s - 1]),
+                ),
             ),
             Way::LightTracing => plan.light_tracing_weight(self.light_end(k - 1), self.camera_density(k - 1)),
             Way::Surf(i) => self.merge(i, |_| 0.0),

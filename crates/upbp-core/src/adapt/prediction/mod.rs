@@ -89,9 +89,11 @@ impl Prediction {
         // The difference of two noisy numbers may be anything.
         let mut variance = std::array::from_fn(|group| f64::max(all[group], LEAST_PART * single[group]));
         for (_, cell, splat) in trial.splats() {
-            let second_moment = trial.second_moment(splat) / f64::from(view.share(&splat.shares));
+            let square = trial.undamped_second_moment(splat) as f32;
+            let second_moment = f64::from(view.share(&splat.shares).single(square, splat.damped[1]));
             variance[group(cell)] += self.evenness * trial.per_splat() * second_moment;
         }
+        // Not a number where no technique of the plan finds a path.
         variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
     }
 
@@ -181,6 +183,11 @@ impl Trial {
     /// The square of a sample, as much of it as all samples of the plan would have.
     fn second_moment(&self, sample: &Sample) -> f64 {
         f64::from(sample.value.length_squared()) * self.thinning(sample.technique)
+    }
+
+    /// The same as if its density was not damped: samples of different techniques on the same path then tell the same.
+    fn undamped_second_moment(&self, sample: &Sample) -> f64 {
+        self.second_moment(sample) / f64::from(sample.damped[0])
     }
 
     /// The part of a splat in a mean over pixels.

@@ -27,9 +27,11 @@ struct Seen {
     /// How much more it weighs than in the trial, by the number of a roulette: walks get to it less often.
     rarity: [f32; COUNT],
     value: Vec3,
-    /// Its square, of as many samples as the plan has.
+    /// Its square, of as many samples as the plan has and as if its density was not damped.
     square: f32,
     shares: [f32; TECHNIQUES],
+    /// How much merges of its path are damped on average.
+    damped: f32,
 }
 
 impl Looks {
@@ -49,8 +51,9 @@ impl Looks {
                     albedos: sample.albedos,
                     rarity: std::array::from_fn(|number| relative_reach(number, sample.albedos).recip()),
                     value: sample.value,
-                    square: trial.second_moment(sample) as f32,
+                    square: trial.undamped_second_moment(sample) as f32,
                     shares: sample.shares,
+                    damped: sample.damped[1],
                 }));
             }
             looks.seen[start..].sort_by(|a, b| a.albedos.total_cmp(&b.albedos));
@@ -120,10 +123,10 @@ impl<'a> View<'a> {
         self.found.resize(light_paths as usize, Found::default());
         for seen in samples {
             let i = seen.technique as usize;
-            let per_share = self.share(&seen.shares).recip();
+            let share = self.share(&seen.shares);
             let rarity = seen.rarity[self.roulette];
-            result.single += f64::from(rarity * seen.square * per_share);
-            let weight = self.relative[i] * per_share;
+            result.single += f64::from(rarity * share.single(seen.square, seen.damped));
+            let weight = self.relative[i] / share.all();
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
                 continue;
@@ -148,13 +151,34 @@ impl<'a> View<'a> {
         result
     }
 
-    /// The densities of the plan at a sample's path, relative to the trial's.
+    /// The densities of the plan at a sample's path.
     #[inline]
-    pub(super) fn share(&self, shares: &[f32; TECHNIQUES]) -> f32 {
+    pub(super) fn share(&self, shares: &[f32; TECHNIQUES]) -> Share {
         let [a, b, c, d, e, f, g, h, i]: [f32; TECHNIQUES] =
             std::array::from_fn(|i| shares[i] * self.relative[i]);
         // Not one after the other: the search has nothing else to wait for.
-        (((a + b) + (c + d)) + ((e + f) + (g + h))) + i
+        Share { paths: (a + b) + (c + d), merges: ((e + f) + (g + h)) + i }
+    }
+}
+
+/// Densities relative to those of the trial: of merges, and of all other techniques.
+pub(super) struct Share {
+    paths: f32,
+    merges: f32,
+}
+
+impl Share {
+    #[inline]
+    fn all(&self) -> f32 {
+        self.paths + self.merges
+    }
+
+    /// What the second moment of single samples is by one whose square is `square` and whose merges are damped so much on average: by them once
+    /// in the weights, twice in their squares.
+    #[inline]
+    pub(super) fn single(&self, square: f32, damped: f32) -> f32 {
+        let all = self.all();
+        square / all * ((self.paths + damped * self.merges) / all)
     }
 }
 

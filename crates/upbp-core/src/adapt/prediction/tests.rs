@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 use proptest::prelude::*;
+use upbp_estimators::Technique;
 use upbp_estimators::scene::PixelRect;
-use upbp_estimators::{Technique, TechniqueSet};
 
 use super::super::roulette::{COUNT, OF_TRIAL, TRIAL, numbered, relative_reach};
 use super::super::trial::Work;
@@ -22,20 +22,24 @@ fn uniform(i: usize, sequence: u32) -> f64 {
     (x >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// `∫ 3x² dx = 1` over the unit interval, by one sample of density 1 and one of density `2x`, as if they were an emission
-/// hit and a connection.
-fn trial() -> Trial {
+/// `∫ 3x² dx = 1` over the unit interval, by one sample of density 1, as if it was an emission hit, and one of density `2x` by another technique,
+/// which is damped in the weights.
+fn trial_of(other: Technique, damping: fn(f64) -> f64) -> Trial {
     let cells = (SIDE * SIDE) as usize;
     let passes = PASSES as usize;
     let mut samples = Vec::new();
     let mut ends = Vec::new();
     for i in 0..cells * passes {
-        for (technique, x) in [(Technique::Hit, uniform(i, 0)), (Technique::Connect, uniform(i, 1).sqrt())] {
+        for (technique, x) in [(Technique::Hit, uniform(i, 0)), (other, uniform(i, 1).sqrt())] {
+            let damped = damping(x);
+            let sum = 1.0 + 2.0 * x * damped;
             let mut shares = [0.0; TECHNIQUES];
-            shares[Technique::Hit as usize] = (1.0 / (1.0 + 2.0 * x)) as f32;
-            shares[Technique::Connect as usize] = (2.0 * x / (1.0 + 2.0 * x)) as f32;
-            let value = Vec3::splat((3.0 * x * x / (1.0 + 2.0 * x)) as f32);
-            samples.push(Sample { technique, merged: None, albedos: 1.0, value, shares });
+            shares[Technique::Hit as usize] = (1.0 / sum) as f32;
+            shares[other as usize] = (2.0 * x * damped / sum) as f32;
+            let own = if technique == other { damped } else { 1.0 };
+            let value = Vec3::splat((3.0 * x * x * own / sum) as f32);
+            let damped = [own, damped].map(|factor| factor as f32);
+            samples.push(Sample { technique, merged: None, albedos: 1.0, value, shares, damped });
         }
         ends.push(samples.len() as u32);
     }
@@ -53,40 +57,62 @@ fn trial() -> Trial {
     }
 }
 
+fn trial() -> Trial {
+    trial_of(Technique::Connect, |_| 1.0)
+}
+
 fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
     let n = 100_000;
     (0..n).map(|i| f((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)
 }
 
+/// A number for each place of the unit interval.
+type Function<'a> = &'a dyn Fn(f64) -> f64;
+
+/// A technique, and what it is damped by.
+type Damped = (Technique, fn(f64) -> f64);
+
 #[test]
 fn variances_are_those_of_the_estimators() {
-    let trial = trial();
-    let prediction =
-        Prediction::new(trial, &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE));
     let f = |x: f64| 3.0 * x * x;
     // The picture is 1 everywhere.
     let relative = 1.0 / (1.0 + DARKNESS);
-    for (hit, connect) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-        let mut counts = Counts {
-            relative: [0.0; TECHNIQUES],
-            paths: [1.0; 2],
-            look_ups: [1.0; TECHNIQUES],
-            roulette: TRIAL,
-        };
-        counts.relative[Technique::Hit as usize] = hit;
-        counts.relative[Technique::Connect as usize] = connect;
-        // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n.
-        let sum = |x: f64| hit + connect * 2.0 * x;
-        let part = |n: f64, p: fn(f64) -> f64| {
-            if n == 0.0 {
-                return 0.0;
-            }
-            let mean = quadrature(|x| n * p(x) * f(x) / sum(x));
-            quadrature(|x| n * p(x) * (f(x) / sum(x)).powi(2)) - mean * mean / n
-        };
-        let expected = relative * (part(hit, |_| 1.0) + part(connect, |x| 2.0 * x));
-        let found: f64 = prediction.relative_variance(&counts).iter().sum();
-        assert!((found / expected - 1.0).abs() < 0.1, "{hit}, {connect}: {found}, expected {expected}");
+    let dampings: [Damped; 4] = [
+        (Technique::Connect, |_| 1.0),
+        (Technique::Surf, |_| 1.0),
+        (Technique::Surf, |x| 0.2 + 0.5 * x),
+        (Technique::Surf, |x| 1e-9 * x),
+    ];
+    for (case, (other, damping)) in dampings.into_iter().enumerate() {
+        let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
+        let prediction = Prediction::new(trial_of(other, damping), &grid);
+        for [hits, others] in [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
+            let mut counts = Counts {
+                relative: [0.0; TECHNIQUES],
+                paths: [1.0; 2],
+                look_ups: [1.0; TECHNIQUES],
+                roulette: TRIAL,
+            };
+            counts.relative[Technique::Hit as usize] = hits;
+            counts.relative[other as usize] = others;
+            // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n, where w is the part of n p, damped, in a sum.
+            let part = |n: f64, p: Function<'_>, damping: Function<'_>, sum: Function<'_>| {
+                if n == 0.0 {
+                    return 0.0;
+                }
+                let contribution = |x: f64| damping(x) * f(x) / sum(x);
+                let mean = quadrature(|x| n * p(x) * contribution(x));
+                quadrature(|x| n * p(x) * contribution(x).powi(2)) - mean * mean / n
+            };
+            let sum = |x: f64| hits + others * 2.0 * x * damping(x);
+            let expected = relative
+                * (part(hits, &|_| 1.0, &|_| 1.0, &sum) + part(others, &|x| 2.0 * x, &damping, &sum));
+            let found: f64 = prediction.relative_variance(&counts).iter().sum();
+            assert!(
+                (found / expected - 1.0).abs() < 0.1,
+                "{case}, {hits}, {others}: {found}, expected {expected}"
+            );
+        }
     }
 }
 
@@ -113,7 +139,8 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
             }
             let merged = Some(path as u32);
             samples.extend(
-                [Sample { technique: Technique::Pb2d, merged, albedos: 1.0, value, shares }; PHOTONS],
+                [Sample { technique: Technique::Pb2d, merged, albedos: 1.0, value, shares, damped: [1.0; 2] };
+                    PHOTONS],
             );
         }
         ends.push(samples.len() as u32);
@@ -147,7 +174,14 @@ fn variances_know_where_walks_end() {
     for i in 0..(SIDE * SIDE * PASSES) as usize {
         let mut find = |albedos, value| {
             let value = Vec3::splat(value);
-            samples.push(Sample { technique: Technique::Hit, merged: None, albedos, value, shares });
+            samples.push(Sample {
+                technique: Technique::Hit,
+                merged: None,
+                albedos,
+                value,
+                shares,
+                damped: [1.0; 2],
+            });
         };
         find(1.0, 1.0);
         if uniform(i, 4) < f64::from(reached) {
@@ -232,10 +266,11 @@ fn sample() -> impl Strategy<Value = Sample> {
             let sum: f32 = densities.iter().sum();
             Sample {
                 technique,
-                merged: (!TechniqueSet::BPT.has(technique)).then_some(path),
+                merged: (technique.merges()).then_some(path),
                 albedos,
                 value: value.into(),
                 shares: densities.map(|density| density / sum),
+                damped: [1.0; 2],
             }
         })
 }
@@ -252,7 +287,7 @@ proptest! {
         let seldom: [bool; TECHNIQUES] = seldom;
         samples.sort_by_key(|sample| sample.merged);
         let look_ups: [f64; TECHNIQUES] = std::array::from_fn(|i| {
-            if seldom[i] && !TechniqueSet::BPT.has(Technique::ALL[i]) { 0.25 } else { 1.0 }
+            if seldom[i] && Technique::ALL[i].merges() { 0.25 } else { 1.0 }
         });
         let counts = Counts { relative: look_ups.map(|p| 0.5 + p), paths, look_ups, roulette };
         let expected = products(&samples, thinning, &counts);
