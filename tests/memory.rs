@@ -14,7 +14,8 @@ use upbp_scene::description::Count;
 
 const MIB: f64 = 1_048_576.0;
 
-/// A case: what is allowed in MiB, how many light vertices are wanted, and which part of the light sub-paths leaves beams.
+/// A case: what is allowed in MiB, how many light vertices are wanted, which part of the light sub-paths leaves beams, and whether weights know
+/// of correlation.
 const CASE: &str = "UPBP_MEMORY_CASE";
 
 /// A number of bytes out of `/proc/self/status`.
@@ -25,18 +26,19 @@ fn status(name: &str) -> f64 {
     kib * 1024.0
 }
 
-fn settings(light_paths: u32, beams: f64, memory: u32) -> Settings {
+fn settings(light_paths: u32, beams: f64, correlation: bool, memory: u32) -> Settings {
     Settings {
         beams: (beams > 0.0).then_some((beams * f64::from(light_paths)) as u32),
         techniques: "all".parse().expect("technique names"),
         light_paths: LightPaths::Count(light_paths),
+        correlation,
         memory,
         ..Settings::default()
     }
 }
 
 /// Renders two iterations; prints what was expected and what it took, bytes, and the number of light vertices.
-fn measure(memory: u32, vertices: f64, beams: f64) {
+fn measure(memory: u32, vertices: f64, beams: f64, correlation: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cornell_media.ron");
     let side = Count::new(64).expect("a positive count");
     let scene = ReadyScene::load_with(path, |description| {
@@ -47,7 +49,7 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a thread pool");
     pool.install(|| {
         let renderer = |paths, memory| {
-            let checked = settings(paths, beams, memory).validate().expect("valid settings");
+            let checked = settings(paths, beams, correlation, memory).validate().expect("valid settings");
             scene.renderer(checked).expect("a renderer")
         };
         // A pilot first: what it leaves with the allocator and the threads does not grow with what is rendered.
@@ -67,13 +69,13 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
 }
 
 /// Runs a case in a process of its own: expected and measured bytes, vertices.
-fn run(memory: u32, vertices: f64, beams: f64) -> [f64; 2] {
+fn run(memory: u32, vertices: f64, beams: f64, correlation: bool) -> [f64; 2] {
     let output = Command::new(std::env::current_exe().expect("this test"))
         .args(["--nocapture", "--exact", "memory_is_what_was_expected"])
         // What is measured is what the render holds: by itself the GNU allocator keeps some MiB of what was freed, now more,
         // now less.
         .envs([("MALLOC_MMAP_THRESHOLD_", "131072"), ("MALLOC_TRIM_THRESHOLD_", "131072")])
-        .env(CASE, format!("{memory} {vertices} {beams}"))
+        .env(CASE, format!("{memory} {vertices} {beams} {}", u32::from(correlation)))
         .output()
         .expect("this test runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -95,21 +97,22 @@ fn run(memory: u32, vertices: f64, beams: f64) -> [f64; 2] {
 fn memory_is_what_was_expected() {
     if let Ok(case) = std::env::var(CASE) {
         let numbers: Vec<f64> = case.split(' ').map(|word| word.parse().expect("a number")).collect();
-        return measure(numbers[0] as u32, numbers[1], numbers[2]);
+        return measure(numbers[0] as u32, numbers[1], numbers[2], numbers[3] > 0.0);
     }
     let close = |[expected, measured]: [f64; 2]| {
         assert!((measured / expected - 1.0).abs() < 0.1, "expected {expected} bytes, measured {measured}");
     };
     if let Ok(vertices) = std::env::var("UPBP_VERTICES") {
-        close(run(1 << 20, vertices.parse().expect("a number"), 0.0));
+        close(run(1 << 20, vertices.parse().expect("a number"), 0.0, false));
         return;
     }
     // As many beams as the pilot finds useful, and one for every second sub-path.
-    close(run(1 << 20, 1e5, 0.0));
-    close(run(1 << 20, 1e6, 0.0));
-    close(run(1 << 20, 1e5, 0.5));
+    close(run(1 << 20, 1e5, 0.0, false));
+    close(run(1 << 20, 1e6, 0.0, false));
+    close(run(1 << 20, 1e5, 0.5, false));
+    close(run(1 << 20, 1e5, 0.5, true));
     // As much as is allowed, no more and not much less.
-    let [expected, measured] = run(150, 1e7, 0.0);
+    let [expected, measured] = run(150, 1e7, 0.0, false);
     close([expected, measured]);
     close([150.0 * MIB, measured]);
 }
