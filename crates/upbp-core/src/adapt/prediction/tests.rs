@@ -266,7 +266,7 @@ fn sample() -> impl Strategy<Value = Sample> {
             let sum: f32 = densities.iter().sum();
             Sample {
                 technique,
-                merged: (technique.merges()).then_some(path),
+                merged: technique.merges().then_some(path),
                 albedos,
                 value: value.into(),
                 shares: densities.map(|density| density / sum),
