@@ -38,11 +38,16 @@ impl Planner {
             return everything.clone();
         }
         let of_trial = settings.roulette.unwrap_or(roulette::OF_TRIAL);
-        let trial = Stage { roulette: of_trial, ..everything.clone() };
+        let widest = self.widest(pilot.footprint);
+        let radii = |relative: f64| {
+            let surf = (f64::from(everything.radii.surf) * widest * relative) as f32;
+            RadiusSchedule { surf, ..everything.radii }
+        };
+        let trial = Stage { roulette: of_trial, radii: radii(1.0), ..everything.clone() };
         let plan = plan(world, settings, &trial, adapt::REVIEWS[review as usize]);
         let choice = adapt::Choice {
             everything: &plan,
-            bounds: self.bounds(world, census, pilot, plan.techniques),
+            bounds: self.bounds(world, census, pilot, plan.techniques, widest),
             most_paths: emitters::light_paths(pilot.vertices_per_path),
             timed: !settings.deterministic,
         };
@@ -63,10 +68,7 @@ impl Planner {
             roulette: roulette::numbered(candidate.roulette, of_trial),
             look_ups: candidate.look_ups(),
             correlation: correlation(settings, candidate.techniques, pilot),
-            radii: RadiusSchedule {
-                surf: (f64::from(everything.radii.surf) * candidate.surf_radius) as f32,
-                ..everything.radii
-            },
+            radii: radii(candidate.surf_radius),
             ..everything.clone()
         }
     }
@@ -78,6 +80,7 @@ impl Planner {
         census: &Census,
         pilot: &Pilot,
         techniques: TechniqueSet,
+        widest: f64,
     ) -> adapt::Bounds {
         /// Numbers of light sub-paths, relative to one per pixel.
         const LIGHT_PATHS: [f64; 3] = [0.0625, 0.25, 1.0];
@@ -111,7 +114,7 @@ impl Planner {
                 None => CONNECTIONS.to_vec(),
                 Some(_) => vec![1.0],
             },
-            surf_radii: self.surf_radii(pilot.footprint),
+            surf_radii: if widest > 1.0 { vec![1.0 / widest, 1.0] } else { vec![1.0] },
             roulettes: match settings.roulette {
                 Some(_) => roulette::TRIAL..roulette::TRIAL + 1,
                 None => 0..roulette::COUNT,
@@ -119,17 +122,15 @@ impl Planner {
         }
     }
 
-    /// Radii of surface merging, relative to the usual one: that, and the width of a pixel if that is more. It blurs what a pixel blurs
-    /// anyway, so that the prediction, which knows nothing of blur, may be asked.
-    fn surf_radii(&self, footprint: f32) -> Vec<f64> {
+    /// The widest radius of surface merging, relative to the usual one: the width of a pixel if that is more. It blurs what a pixel
+    /// blurs anyway, so that the prediction, which knows nothing of blur, may be asked. Trials have this radius: they tell what
+    /// fewer photons at a vertex would do, but not what more would.
+    fn widest(&self, footprint: f32) -> f64 {
         /// A factor between these is worth a try.
         const FACTORS: RangeInclusive<f32> = 1.25..=4.0;
         let factor = (footprint / self.everything.radii.surf).min(*FACTORS.end());
-        if self.settings.radii.surf == Radius::Auto && FACTORS.contains(&factor) {
-            vec![1.0, f64::from(factor)]
-        } else {
-            vec![1.0]
-        }
+        let tried = self.settings.radii.surf == Radius::Auto && FACTORS.contains(&factor);
+        f64::from(if tried { factor } else { 1.0 })
     }
 }
 

@@ -43,7 +43,7 @@ pub(crate) struct Bounds {
     pub(crate) beam_paths: Vec<f64>,
     /// Connections per camera vertex, likewise. None more than one: a trial does not tell what several at a vertex have in common.
     pub(crate) connections: Vec<f64>,
-    /// Radii of surface merging, likewise.
+    /// Radii of surface merging, likewise; ascending, the usual one first.
     pub(crate) surf_radii: Vec<f64>,
     /// Numbers of roulettes, ascending.
     pub(crate) roulettes: Range<usize>,
@@ -53,14 +53,14 @@ pub(crate) struct Bounds {
 const SELDOM: NonZeroU32 = NonZeroU32::new(8).unwrap();
 
 impl Candidate {
-    /// All that is possible, as much of it as there may be.
+    /// All that is possible, as much of it as there may be, with the usual radius.
     pub(crate) fn everything(bounds: &Bounds) -> Self {
         Self {
             techniques: bounds.techniques,
             light_paths: 1.0,
             beam_paths: 1.0,
             connections: 1.0,
-            surf_radius: 1.0,
+            surf_radius: bounds.surf_radii.first().copied().unwrap_or(1.0),
             seldom: TechniqueSet::EMPTY,
             roulette: TRIAL,
         }
@@ -173,28 +173,30 @@ impl Judge<'_> {
 }
 
 /// The best candidate that small steps from some sensible ones lead to. A step must make the product smaller by the factor
-/// `gain`: predictions are noisy, and the least of many is so by chance. Where the ways end there are only a few, none of which is
-/// to be preferred.
+/// `gain`: predictions are noisy, and the least of many is so by chance. So must what everything leads to, against what simpler
+/// starts lead to: it may keep techniques of which each alone costs too little for a step.
 pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
     let mut judge = Judge { prediction, costs, known: Vec::new() };
-    let everything = Candidate::everything(bounds);
-    let mut best: Option<Judged> = None;
-    for start in starts(bounds, everything) {
-        let mut at = judge.judge(&[start])[0];
-        loop {
-            let steps = judge.judge(&steps(&at.candidate, bounds));
-            let better = steps.into_iter().filter(|step| step.beats(&at, gain));
-            match better.min_by(|a, b| a.product().total_cmp(&b.product())) {
-                Some(next) => at = next,
-                None => break,
-            }
-        }
-        at = with_roulette(&mut judge, at, bounds);
-        if best.is_none_or(|best| at.product() < best.product()) {
-            best = Some(at);
+    let [camera, paths, everything] = starts(bounds, Candidate::everything(bounds)).map(|start| {
+        let end = descend(&mut judge, start, bounds, gain);
+        with_roulette(&mut judge, end, bounds)
+    });
+    let simpler = if paths.product() < camera.product() { paths } else { camera };
+    let best = if everything.beats(&simpler, gain) { everything } else { simpler };
+    insured(best.candidate, costs, bounds)
+}
+
+/// Goes the steepest way as long as there are steps down.
+fn descend(judge: &mut Judge<'_>, start: Candidate, bounds: &Bounds, gain: f64) -> Judged {
+    let mut at = judge.judge(&[start])[0];
+    loop {
+        let steps = judge.judge(&steps(&at.candidate, bounds));
+        let better = steps.into_iter().filter(|step| step.beats(&at, gain));
+        match better.min_by(|a, b| a.product().total_cmp(&b.product())) {
+            Some(next) => at = next,
+            None => return at,
         }
     }
-    insured(best.map_or(everything, |best| best.candidate), costs, bounds)
 }
 
 /// The same with the roulette that ends least walks of those that are nearly as good as the best. Random numbers of camera sub-paths are
