@@ -173,25 +173,30 @@ impl Judge<'_> {
 }
 
 /// The best candidate that small steps from some sensible ones lead to. A step must make the product smaller by the factor
-/// `gain`: predictions are noisy, and the least of many is so by chance. So must what everything leads to, against what simpler
-/// starts lead to: it may keep techniques of which each alone costs too little for a step.
+/// `gain`: predictions are noisy, and the least of many is so by chance. Where the ways end there are only a few, none of which is
+/// to be preferred.
 pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
     let mut judge = Judge { prediction, costs, known: Vec::new() };
-    let [camera, paths, everything] = starts(bounds, Candidate::everything(bounds)).map(|start| {
+    let everything = Candidate::everything(bounds);
+    let ends = starts(bounds, everything).map(|start| {
         let end = descend(&mut judge, start, bounds, gain);
         with_roulette(&mut judge, end, bounds)
     });
-    let simpler = if paths.product() < camera.product() { paths } else { camera };
-    let best = if everything.beats(&simpler, gain) { everything } else { simpler };
-    insured(best.candidate, costs, bounds)
+    let best = ends.into_iter().min_by(|a, b| a.product().total_cmp(&b.product()));
+    insured(best.map_or(everything, |best| best.candidate), costs, bounds)
 }
 
 /// Goes the steepest way as long as there are steps down.
 fn descend(judge: &mut Judge<'_>, start: Candidate, bounds: &Bounds, gain: f64) -> Judged {
+    /// A wider radius must gain more: its blur is not predicted.
+    const WIDER: f64 = 0.8;
     let mut at = judge.judge(&[start])[0];
     loop {
         let steps = judge.judge(&steps(&at.candidate, bounds));
-        let better = steps.into_iter().filter(|step| step.beats(&at, gain));
+        let needed = |step: &Judged| {
+            if step.candidate.surf_radius > at.candidate.surf_radius { WIDER.min(gain) } else { gain }
+        };
+        let better = steps.into_iter().filter(|step| step.beats(&at, needed(step)));
         match better.min_by(|a, b| a.product().total_cmp(&b.product())) {
             Some(next) => at = next,
             None => return at,
