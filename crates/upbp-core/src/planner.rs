@@ -110,6 +110,7 @@ impl Planner {
                 None => BEAM_PATHS.into_iter().filter(fits).collect(),
                 Some(_) => vec![1.0],
             },
+            paths_per_beam_path: f64::from(everything.light_paths) / f64::from(everything.beam_paths.max(1)),
             connections: match settings.connections {
                 None => CONNECTIONS.to_vec(),
                 Some(_) => vec![1.0],

@@ -16,9 +16,9 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// Draws that are stratified: about four vertices of a path.
 const STRATIFIED_DRAWS: u32 = 24;
-/// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the lens, and the first
-/// distance in a medium or, where there is none, what is drawn next.
-const COMMON_DRAWS: u32 = 3;
+/// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the lens, the first
+/// distance in a medium, and the next event there, an emitter and a point on it. Without a medium, what is drawn next.
+const COMMON_DRAWS: u32 = 5;
 
 /// What a stream is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

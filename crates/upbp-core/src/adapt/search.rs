@@ -41,6 +41,8 @@ pub(crate) struct Bounds {
     pub(crate) light_paths: Vec<f64>,
     /// The same of those with photon beams.
     pub(crate) beam_paths: Vec<f64>,
+    /// The light sub-paths of the trial's plan over those of them with beams.
+    pub(crate) paths_per_beam_path: f64,
     /// Connections per camera vertex, likewise. None more than one: a trial does not tell what several at a vertex have in common.
     pub(crate) connections: Vec<f64>,
     /// Radii of surface merging, likewise; ascending, the usual one first.
@@ -64,6 +66,14 @@ impl Candidate {
             seldom: TechniqueSet::EMPTY,
             roulette: TRIAL,
         }
+    }
+
+    /// The same with beams from no more light sub-paths than there are.
+    fn possible(self, bounds: &Bounds) -> Self {
+        let most = self.light_paths * bounds.paths_per_beam_path;
+        let beam_paths =
+            if self.techniques.intersects(BEAMS) { self.beam_paths.min(most) } else { self.beam_paths };
+        Self { beam_paths, ..self }
     }
 
     /// The part of the iterations that make the look-up of a technique.
@@ -173,8 +183,8 @@ impl Judge<'_> {
 }
 
 /// The best candidate that small steps from some sensible ones lead to. A step must make the product smaller by the factor
-/// `gain`: predictions are noisy, and the least of many is so by chance. Where the ways end there are only a few, none of which is
-/// to be preferred.
+/// `gain`: predictions are noisy, and the least of many is so by chance. Where the ways end there are only a few. None is to be
+/// preferred, but that without light sub-paths, if no other is better by more than its uncertainty.
 pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
     let mut judge = Judge { prediction, costs, known: Vec::new() };
     let everything = Candidate::everything(bounds);
@@ -182,19 +192,25 @@ pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain
         let end = descend(&mut judge, start, bounds, gain);
         with_roulette(&mut judge, end, bounds)
     });
-    let best = ends.into_iter().min_by(|a, b| a.product().total_cmp(&b.product()));
-    insured(best.map_or(everything, |best| best.candidate), costs, bounds)
+    let [camera, paths, all] = ends;
+    let less = |a: Judged, b: Judged| if b.product() < a.product() { b } else { a };
+    let least = less(less(camera, paths), all);
+    let best = if camera.candidate.needs_light() || least.beats(&camera, 1.0) { least } else { camera };
+    insured(best.candidate, costs, bounds)
 }
 
 /// Goes the steepest way as long as there are steps down.
 fn descend(judge: &mut Judge<'_>, start: Candidate, bounds: &Bounds, gain: f64) -> Judged {
-    /// A wider radius must gain more: its blur is not predicted.
-    const WIDER: f64 = 0.8;
+    /// What is wider or more than usual must gain more: the blur of a wider radius is not predicted, and of more beams than a trial
+    /// has too much is.
+    const BEYOND: f64 = 0.8;
     let mut at = judge.judge(&[start])[0];
     loop {
         let steps = judge.judge(&steps(&at.candidate, bounds));
         let needed = |step: &Judged| {
-            if step.candidate.surf_radius > at.candidate.surf_radius { WIDER.min(gain) } else { gain }
+            let wider = step.candidate.surf_radius > at.candidate.surf_radius;
+            let more = step.candidate.beam_paths > at.candidate.beam_paths.max(1.0);
+            if wider || more { BEYOND.min(gain) } else { gain }
         };
         let better = steps.into_iter().filter(|step| step.beats(&at, needed(step)));
         match better.min_by(|a, b| a.product().total_cmp(&b.product())) {
@@ -242,7 +258,7 @@ fn starts(bounds: &Bounds, everything: Candidate) -> [Candidate; 3] {
     let camera = Candidate { techniques: with(TechniqueSet::PT), light_paths: least, ..everything };
     let seldom = bounds.careful.without(bounds.always);
     let paths = Candidate { techniques: with(TechniqueSet::BPT.union(bounds.careful)), seldom, ..everything };
-    [camera, paths, everything]
+    [camera, paths, everything].map(|start| start.possible(bounds))
 }
 
 /// All that differ from a candidate in one thing.
@@ -274,6 +290,45 @@ fn steps(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
     if from.techniques.has(Technique::Connect) {
         steps.extend(bounds.connections.iter().map(|&connections| Candidate { connections, ..*from }));
     }
-    steps.retain(|step| step != from);
-    steps
+    steps.into_iter().map(|step| step.possible(bounds)).filter(|step| step != from).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+
+    #[test]
+    fn beams_come_from_light_sub_paths() {
+        let bounds = Bounds {
+            techniques: TechniqueSet::ALL,
+            always: TechniqueSet::EMPTY,
+            careful: TechniqueSet::EMPTY,
+            light_paths: vec![0.0625, 0.25, 1.0],
+            beam_paths: vec![0.25, 1.0, 4.0],
+            paths_per_beam_path: 2.0,
+            connections: vec![1.0],
+            surf_radii: vec![1.0],
+            roulettes: TRIAL..TRIAL + 1,
+        };
+        let mut found = starts(&bounds, Candidate::everything(&bounds)).to_vec();
+        let mut next = VecDeque::from(found.clone());
+        let mut fewer = 0;
+        while let Some(from) = next.pop_front().filter(|_| found.len() < 2000) {
+            for step in steps(&from, &bounds) {
+                if found.contains(&step) {
+                    continue;
+                }
+                assert!(
+                    !step.techniques.intersects(BEAMS) || step.beam_paths <= 2.0 * step.light_paths,
+                    "{step:?}"
+                );
+                fewer += u32::from(!bounds.beam_paths.contains(&step.beam_paths));
+                found.push(step);
+                next.push_back(step);
+            }
+        }
+        assert!(fewer > 0, "nothing to hold back in {} candidates", found.len());
+    }
 }

@@ -91,15 +91,11 @@ pub(super) struct View<'a> {
     common: [f32; TECHNIQUES],
     /// As many pairs of photons of one light sub-path as the plan has, less those of the trial: by points and by beams.
     more: [f32; 2],
-    /// Sums of what was found of a light sub-path.
-    found: Vec<Found>,
-}
-
-/// Sums of samples: by class and, where look-ups are seldom, by technique.
-#[derive(Clone, Copy, Default)]
-struct Found {
-    by_class: [Vec3; 2],
-    by_technique: [Vec3; TECHNIQUES],
+    /// Whether any look-up is seldom.
+    seldom: bool,
+    /// Sums of what was found of a light sub-path: by class and, where look-ups are seldom, by technique.
+    by_class: Vec<[Vec3; 2]>,
+    by_technique: Vec<[Vec3; TECHNIQUES]>,
 }
 
 impl<'a> View<'a> {
@@ -110,44 +106,62 @@ impl<'a> View<'a> {
             relative: counts.relative.map(|count| count as f32),
             common: counts.look_ups.map(|p| (1.0 / p - 1.0) as f32),
             more: [0, 1].map(|i| (trial.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
-            found: Vec::new(),
+            seldom: counts.look_ups.iter().any(|p| *p < 1.0),
+            by_class: Vec::new(),
+            by_technique: Vec::new(),
         }
     }
 
     /// A look at what one camera sub-path found.
     pub(super) fn look(&mut self, look: usize) -> Look {
+        if self.seldom { self.look_at::<true>(look) } else { self.look_at::<false>(look) }
+    }
+
+    fn look_at<const SELDOM: bool>(&mut self, look: usize) -> Look {
         let mut result = Look::default();
-        let mut all = Found::default();
+        let mut all = [Vec3::ZERO; 2];
+        let mut all_by_technique = [Vec3::ZERO; TECHNIQUES];
         let (samples, light_paths) = self.looks.of(look);
-        self.found.clear();
-        self.found.resize(light_paths as usize, Found::default());
+        self.by_class.clear();
+        self.by_class.resize(light_paths as usize, all);
+        if SELDOM {
+            self.by_technique.clear();
+            self.by_technique.resize(light_paths as usize, all_by_technique);
+        }
         for seen in samples {
             let i = seen.technique as usize;
             let share = self.share(&seen.shares);
             let rarity = seen.rarity[self.roulette];
             result.single += f64::from(rarity * share.single(seen.square, seen.damped));
-            let weight = self.relative[i] / share.all();
+            let weight = self.relative[i] * share.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
                 continue;
             }
             let y = seen.value * weight;
-            let [points, beams] = all.by_class;
-            let mut others = points + beams + self.common[i] * all.by_technique[i];
-            all.add(seen.technique, y, self.common[i]);
+            let own = class(seen.technique);
+            let mut others = all[0] + all[1];
+            all[own] += y;
+            if SELDOM {
+                others += self.common[i] * all_by_technique[i];
+                all_by_technique[i] += y;
+            }
             if let Some(path) = seen.light_path {
-                let found = &mut self.found[path.get() as usize - 1];
-                let [points, beams] = found.by_class;
-                let own = class(seen.technique);
-                others += self.more[0] * points + self.more[own] * beams;
-                others += self.more[own] * self.common[i] * found.by_technique[i];
-                found.add(seen.technique, y, self.common[i]);
+                let path = path.get() as usize - 1;
+                let found = &mut self.by_class[path];
+                others += self.more[0] * found[0] + self.more[own] * found[1];
+                found[own] += y;
+                if SELDOM {
+                    let found = &mut self.by_technique[path][i];
+                    others += self.more[own] * self.common[i] * *found;
+                    *found += y;
+                }
             }
             // A pair is there as often as walks get to the deeper of both, which came before, and each weighs as if it was as often
             // as walks get to it: what is left is how rare the other is.
             result.products += f64::from(2.0 * rarity * y.dot(others));
         }
-        result.sum = (all.by_class[0] + all.by_class[1]).as_dvec3();
+        result.sum = (all[0] + all[1]).as_dvec3();
         result
     }
 
@@ -156,8 +170,9 @@ impl<'a> View<'a> {
     pub(super) fn share(&self, shares: &[f32; TECHNIQUES]) -> Share {
         let [a, b, c, d, e, f, g, h, i]: [f32; TECHNIQUES] =
             std::array::from_fn(|i| shares[i] * self.relative[i]);
-        // Not one after the other: the search has nothing else to wait for.
-        Share { paths: (a + b) + (c + d), merges: ((e + f) + (g + h)) + i }
+        // Not one after the other, and one division: the search has nothing else to wait for.
+        let (paths, merges) = ((a + b) + (c + d), ((e + f) + (g + h)) + i);
+        Share { paths, merges, inverse: 1.0 / (paths + merges) }
     }
 }
 
@@ -165,30 +180,16 @@ impl<'a> View<'a> {
 pub(super) struct Share {
     paths: f32,
     merges: f32,
+    /// One over the sum of both.
+    inverse: f32,
 }
 
 impl Share {
-    #[inline]
-    fn all(&self) -> f32 {
-        self.paths + self.merges
-    }
-
     /// What the second moment of single samples is by one whose square is `square` and whose merges are damped so much on average: by them once
     /// in the weights, twice in their squares.
     #[inline]
     pub(super) fn single(&self, square: f32, damped: f32) -> f32 {
-        let all = self.all();
-        square / all * ((self.paths + damped * self.merges) / all)
-    }
-}
-
-impl Found {
-    #[inline]
-    fn add(&mut self, technique: Technique, y: Vec3, common: f32) {
-        self.by_class[class(technique)] += y;
-        if common > 0.0 {
-            self.by_technique[technique as usize] += y;
-        }
+        square * self.inverse * ((self.paths + damped * self.merges) * self.inverse)
     }
 }
 
