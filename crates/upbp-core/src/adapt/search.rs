@@ -232,22 +232,24 @@ fn with_roulette(judge: &mut Judge<'_>, at: Judged, bounds: &Bounds) -> Judged {
     all.into_iter().find(|judged| judged.product() <= NEARLY * least).unwrap_or(at)
 }
 
-/// A candidate with what may find light that the trial missed, if it has light sub-paths: in all iterations where this costs
-/// little, else in some.
+/// A candidate with what may find light that the trial missed, if it has light sub-paths: in all iterations and with the widest
+/// radius where this costs little, since such light is bright in few photons, else in all with the radius at hand, else in some.
 fn insured(best: Candidate, costs: &Costs, bounds: &Bounds) -> Candidate {
     /// The factor by which an iteration may take longer.
     const PREMIUM: f64 = 1.05;
-    if !best.needs_light() {
+    if !best.needs_light() || bounds.careful.is_empty() {
         return best;
     }
     let techniques = best.techniques.union(bounds.careful);
     let missing = bounds.careful.without(best.techniques).union(best.seldom.intersection(bounds.careful));
     let always = Candidate { techniques, seldom: best.seldom.without(missing), ..best };
-    if costs.iteration(&always) <= PREMIUM * costs.iteration(&best) {
-        always
-    } else {
-        Candidate { techniques, seldom: best.seldom.union(missing), ..best }
-    }
+    let widest = Candidate { surf_radius: bounds.surf_radii.last().copied().unwrap_or(1.0), ..always };
+    let most = PREMIUM * costs.iteration(&best);
+    [widest, always].into_iter().find(|candidate| costs.iteration(candidate) <= most).unwrap_or(Candidate {
+        techniques,
+        seldom: best.seldom.union(missing),
+        ..best
+    })
 }
 
 /// Where to begin, the simplest first: with camera sub-paths alone, with paths alone, and with everything.
