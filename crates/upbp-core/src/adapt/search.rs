@@ -187,22 +187,20 @@ impl Judge<'_> {
 /// preferred, but that without light sub-paths, if no other is better by more than its uncertainty.
 pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
     let mut judge = Judge { prediction, costs, known: Vec::new() };
-    let everything = Candidate::everything(bounds);
-    let ends = starts(bounds, everything).map(|start| {
+    let [camera, paths, everything] = starts(bounds, Candidate::everything(bounds)).map(|start| {
         let end = descend(&mut judge, start, bounds, gain);
         with_roulette(&mut judge, end, bounds)
     });
-    let [camera, paths, all] = ends;
     let less = |a: Judged, b: Judged| if b.product() < a.product() { b } else { a };
-    let least = less(less(camera, paths), all);
+    let least = less(less(camera, paths), everything);
     let best = if camera.candidate.needs_light() || least.beats(&camera, 1.0) { least } else { camera };
     insured(best.candidate, costs, bounds)
 }
 
 /// Goes the steepest way as long as there are steps down.
 fn descend(judge: &mut Judge<'_>, start: Candidate, bounds: &Bounds, gain: f64) -> Judged {
-    /// What is wider or more than usual must gain more: the blur of a wider radius is not predicted, and of more beams than a trial
-    /// has too much is.
+    /// What a wider radius and more beams than the trial has must gain: the blur of the one is not predicted, and the gain by the
+    /// others is predicted too large.
     const BEYOND: f64 = 0.8;
     let mut at = judge.judge(&[start])[0];
     loop {
