@@ -102,6 +102,12 @@ impl Candidate {
         !self.techniques.without(TechniqueSet::PT).is_empty()
     }
 
+    /// How many times its light sub-paths are a quarter of another's, if both have some.
+    fn quarterings(&self, other: &Self) -> f64 {
+        let both = self.needs_light() && other.needs_light();
+        if both { (other.light_paths / self.light_paths).log(4.0) } else { 0.0 }
+    }
+
     fn counts(&self) -> Counts {
         let paths = [self.light_paths, self.beam_paths];
         let mut counts = Counts {
@@ -184,14 +190,19 @@ impl Judge<'_> {
 
 /// The best candidate that small steps from some sensible ones lead to. A step must make the product smaller by the factor
 /// `gain`: predictions are noisy, and the least of many is so by chance. Where the ways end there are only a few. None is to be
-/// preferred, but that without light sub-paths, if no other is better by more than its uncertainty.
+/// preferred, but that without light sub-paths, if no other is better by more than its uncertainty, and those with more light
+/// sub-paths to those with fewer, by `gain` for each quartering: what fewer lose is in few samples, of which most trials see too little.
 pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
     let mut judge = Judge { prediction, costs, known: Vec::new() };
+    let less = |a: Judged, b: Judged| {
+        let needed = gain.powf(b.candidate.quarterings(&a.candidate));
+        if b.product() < needed * a.product() { b } else { a }
+    };
     let [camera, paths, everything] = starts(bounds, Candidate::everything(bounds)).map(|start| {
         let end = descend(&mut judge, start, bounds, gain);
+        let end = judge.judge(&numbers_of_light_paths(&end.candidate, bounds)).into_iter().fold(end, less);
         with_roulette(&mut judge, end, bounds)
     });
-    let less = |a: Judged, b: Judged| if b.product() < a.product() { b } else { a };
     let least = less(less(camera, paths), everything);
     let best = if camera.candidate.needs_light() || least.beats(&camera, 1.0) { least } else { camera };
     insured(best.candidate, costs, bounds)
@@ -278,9 +289,7 @@ fn steps(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
             ..*from
         }));
     }
-    if from.needs_light() {
-        steps.extend(bounds.light_paths.iter().map(|&light_paths| Candidate { light_paths, ..*from }));
-    }
+    steps.extend(numbers_of_light_paths(from, bounds));
     if from.techniques.has(Technique::Bb1d) {
         steps.extend(bounds.beam_paths.iter().map(|&beam_paths| Candidate { beam_paths, ..*from }));
     }
@@ -291,6 +300,12 @@ fn steps(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
         steps.extend(bounds.connections.iter().map(|&connections| Candidate { connections, ..*from }));
     }
     steps.into_iter().map(|step| step.possible(bounds)).filter(|step| step != from).collect()
+}
+
+/// The same with other numbers of light sub-paths, if it has any.
+fn numbers_of_light_paths(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
+    let numbers = if from.needs_light() { bounds.light_paths.as_slice() } else { &[] };
+    numbers.iter().map(|&light_paths| Candidate { light_paths, ..*from }.possible(bounds)).collect()
 }
 
 #[cfg(test)]

@@ -25,8 +25,6 @@ pub(crate) struct Trial {
     pub(crate) ends: Vec<u32>,
     /// Splats by cell. Light sub-paths fill the whole picture.
     pub(crate) splats: Vec<(u32, Sample)>,
-    /// Behind the last one of each pass.
-    pub(crate) splat_passes: Vec<usize>,
     /// Light sub-paths per pass over those that the plan has, and the same of those with beams.
     pub(crate) thinning: [f64; 2],
     /// Light sub-paths of the plan, and of them those with beams.
@@ -85,7 +83,6 @@ pub(crate) fn run<S: Scene>(
         samples: Vec::new(),
         ends: Vec::new(),
         splats: Vec::new(),
-        splat_passes: Vec::new(),
         thinning: [part(paths, plan.light_paths), part(beam_paths, plan.beam_paths)],
         planned: [plan.light_paths, plan.beam_paths].map(f64::from),
         pixels: grid.pixels(),
@@ -108,7 +105,6 @@ pub(crate) fn run<S: Scene>(
             let cells = splats.iter().map(|splat| grid.cell(splat.pixel));
             trial.splats.extend(cells.zip(recorder.samples.iter().copied()));
         }
-        trial.splat_passes.push(trial.splats.len());
     }
     let per_path = |pass_paths: u32| f64::from(pass_paths * PASSES);
     trial.work = work(&passes, (cells * PASSES as usize) as f64, [paths, beam_paths].map(per_path), &trial);

@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use super::grid::Grid;
 use super::recorder::{Sample, TECHNIQUES};
-use super::trial::{PASSES, Trial};
+use super::trial::Trial;
 use limits::{reductions, relative_to, surroundings};
 use pairs::{Looks, View};
 
@@ -23,8 +23,6 @@ const LEAST_PART: f64 = 0.05;
 
 /// Parts that a variance is given in, so that its own error can be told.
 pub(crate) const GROUPS: usize = 8;
-/// Light sub-paths are at least so uneven.
-const LEAST_EVENNESS: f64 = 0.1;
 
 /// How many samples of each technique a plan has, relative to the trial's plan; and what part of the iterations look
 /// photons up, which those numbers contain.
@@ -42,7 +40,6 @@ pub(crate) struct Counts {
 pub(crate) struct Prediction {
     /// Splats and counts; values are relative to the radiance around them.
     trial: Trial,
-    evenness: f64,
     looks: Looks,
 }
 
@@ -52,7 +49,7 @@ impl Prediction {
         trial.make_relative(&relative_to(&surroundings(&trial.means(), grid.columns())));
         let per_look = 1.0 / (trial.cells * trial.passes) as f64;
         let mut parts: Vec<f64> = trial.samples.iter().map(|s| per_look * trial.second_moment(s)).collect();
-        parts.extend(trial.splats().map(|(_, _, splat)| trial.per_splat() * trial.second_moment(splat)));
+        parts.extend(trial.splats.iter().map(|(_, splat)| trial.per_splat() * trial.second_moment(splat)));
         let by_sample = reductions(&parts);
         let splats = trial.splats.iter_mut().map(|(_, splat)| splat);
         for (sample, reduction) in trial.samples.iter_mut().chain(splats).zip(by_sample) {
@@ -68,10 +65,9 @@ impl Prediction {
             let range = trial.range(cell, pass);
             trial.samples[range].iter_mut().for_each(|sample| sample.value *= reduction);
         }
-        let evenness = splat_evenness(&trial);
         let looks = Looks::new(&trial);
         trial.samples = Vec::new();
-        Self { trial, evenness, looks }
+        Self { trial, looks }
     }
 
     /// The relative variance of an iteration of a plan with these counts, mean over pixels and channels, in parts due to groups of
@@ -88,10 +84,10 @@ impl Prediction {
         }
         // The difference of two noisy numbers may be anything.
         let mut variance = std::array::from_fn(|group| f64::max(all[group], LEAST_PART * single[group]));
-        for (_, cell, splat) in trial.splats() {
+        for (cell, splat) in &trial.splats {
             let square = trial.undamped_second_moment(splat) as f32;
             let second_moment = f64::from(view.share(&splat.shares).single(square, splat.damped[1]));
-            variance[group(cell)] += self.evenness * trial.per_splat() * second_moment;
+            variance[group(*cell as usize)] += trial.per_splat() * second_moment;
         }
         // Not a number where no technique of the plan finds a path.
         variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
@@ -115,20 +111,6 @@ impl Prediction {
     }
 }
 
-/// The variance of the light that splats bring to a cell between passes, relative to what it would be if light sub-paths were
-/// independent: they are stratified among each other, and a cell gets as many splats of a pass as a pixel of an iteration.
-fn splat_evenness(trial: &Trial) -> f64 {
-    let mut sums = vec![[DVec3::ZERO; PASSES as usize]; trial.cells];
-    let mut independent = 0.0;
-    for (pass, cell, splat) in trial.splats() {
-        sums[cell][pass] += splat.value.as_dvec3();
-        independent += f64::from(splat.value.length_squared());
-    }
-    // Two passes: the squared difference is twice the variance of one, and the sum of squares over both is twice its own.
-    let apart: f64 = sums.iter().map(|[first, second]| first.distance_squared(*second)).sum();
-    if independent > 0.0 { (apart / independent).clamp(LEAST_EVENNESS, 1.0) } else { 1.0 }
-}
-
 /// Groups are spread over the picture.
 const fn group(cell: usize) -> usize {
     ((cell as u32).wrapping_mul(2_654_435_761) >> 29) as usize % GROUPS
@@ -141,12 +123,6 @@ impl Trial {
         start as usize..self.ends[group] as usize
     }
 
-    /// Splats with their passes and cells.
-    fn splats(&self) -> impl Iterator<Item = (usize, usize, &Sample)> {
-        let pass = |i| self.splat_passes.partition_point(|end| *end <= i);
-        self.splats.iter().enumerate().map(move |(i, (cell, splat))| (pass(i), *cell as usize, splat))
-    }
-
     /// The mean radiance of each cell.
     fn means(&self) -> Vec<DVec3> {
         let passes = self.passes as f64;
@@ -155,8 +131,8 @@ impl Trial {
             samples.map(|sample| sample.value.as_dvec3()).sum::<DVec3>() / passes
         };
         let mut means: Vec<DVec3> = (0..self.cells).map(of_cell).collect();
-        for (_, cell, splat) in self.splats() {
-            means[cell] += splat.value.as_dvec3() * self.per_splat() * self.cells as f64;
+        for (cell, splat) in &self.splats {
+            means[*cell as usize] += splat.value.as_dvec3() * self.per_splat() * self.cells as f64;
         }
         means
     }

@@ -6,7 +6,7 @@ use upbp_estimators::Technique;
 use upbp_estimators::scene::PixelRect;
 
 use super::super::roulette::{COUNT, OF_TRIAL, TRIAL, numbered, relative_reach};
-use super::super::trial::Work;
+use super::super::trial::{PASSES, Work};
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
 
@@ -49,7 +49,6 @@ fn trial_of(other: Technique, damping: fn(f64) -> f64) -> Trial {
         samples,
         ends,
         splats: Vec::new(),
-        splat_passes: vec![0; passes],
         thinning: [1.0; 2],
         planned: [1.0; 2],
         pixels: cells as f64,
