@@ -102,7 +102,7 @@ impl Candidate {
         !self.techniques.without(TechniqueSet::PT).is_empty()
     }
 
-    /// How many times its light sub-paths are a quarter of another's, if both have some.
+    /// How often another's light sub-paths have to be quartered to be as few as its own; zero unless both have some.
     fn quarterings(&self, other: &Self) -> f64 {
         let both = self.needs_light() && other.needs_light();
         if both { (other.light_paths / self.light_paths).log(4.0) } else { 0.0 }
