@@ -19,7 +19,7 @@ use limits::{reductions, relative_to, surroundings};
 use pairs::{Looks, View};
 
 /// The least variance, relative to the second moments of single samples.
-const LEAST_PART: f64 = 0.05;
+const LEAST_PART: f32 = 0.05;
 
 /// Parts that a variance is given in, so that its own error can be told.
 pub(crate) const GROUPS: usize = 8;
@@ -75,15 +75,15 @@ impl Prediction {
     pub(crate) fn relative_variance(&self, counts: &Counts) -> [f64; GROUPS] {
         let trial = &self.trial;
         let mut view = View::new(trial, &self.looks, counts);
-        let mut single = [0.0; GROUPS];
+        let mut least = [0.0; GROUPS];
         let mut all = [0.0; GROUPS];
         for cell in 0..trial.cells {
             let sums = self.of_cell(cell, &mut view);
-            single[group(cell)] += sums[0] / trial.cells as f64;
+            least[group(cell)] += sums[0] / trial.cells as f64;
             all[group(cell)] += sums[1] / trial.cells as f64;
         }
         // The difference of two noisy numbers may be anything.
-        let mut variance = std::array::from_fn(|group| f64::max(all[group], LEAST_PART * single[group]));
+        let mut variance: [f64; GROUPS] = std::array::from_fn(|group| f64::max(all[group], least[group]));
         for (cell, splat) in &trial.splats {
             let square = trial.undamped_second_moment(splat) as f32;
             let second_moment = f64::from(view.share(&splat.shares).single(square, splat.damped[1]));
@@ -93,21 +93,22 @@ impl Prediction {
         variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
     }
 
-    /// Its second moments of single samples, and all of its variance.
+    /// The least that its variance can be, and its variance.
     fn of_cell(&self, cell: usize, view: &mut View<'_>) -> [f64; 2] {
         let passes = self.trial.passes as f64;
-        let (mut single, mut products) = (0.0, 0.0);
+        let (mut single, mut least, mut products) = (0.0, 0.0, 0.0);
         let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
         for pass in 0..self.trial.passes {
             let look = view.look(cell * self.trial.passes + pass);
             single += look.single;
+            least += look.least;
             products += look.products;
             sum += look.sum;
             squares += look.sum.length_squared();
         }
         // The square of the mean from products of different passes, which have no part of their own variance.
         let mean_square = (sum.length_squared() - squares) / (passes * (passes - 1.0));
-        [single / passes, (single + products) / passes - mean_square]
+        [least / passes, (single + products) / passes - mean_square]
     }
 }
 

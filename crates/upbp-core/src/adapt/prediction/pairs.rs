@@ -8,7 +8,7 @@ use upbp_estimators::Technique;
 use super::super::recorder::{Sample, TECHNIQUES};
 use super::super::roulette::{COUNT, relative_reach};
 use super::super::trial::Trial;
-use super::Counts;
+use super::{Counts, LEAST_PART};
 
 /// The samples of a trial, ready for being looked at by many plans.
 pub(super) struct Looks {
@@ -75,6 +75,8 @@ impl Looks {
 pub(super) struct Look {
     /// Second moments of single samples.
     pub(super) single: f64,
+    /// What of those is variance in any case.
+    pub(super) least: f64,
     /// Products of all pairs of different samples.
     pub(super) products: f64,
     /// All samples.
@@ -133,6 +135,7 @@ impl<'a> View<'a> {
             let share = self.share(&seen.shares);
             let rarity = seen.rarity[self.roulette];
             result.single += f64::from(rarity * share.single(seen.square, seen.damped));
+            result.least += f64::from(rarity * share.least(seen.square, seen.damped));
             let weight = self.relative[i] * share.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
@@ -171,14 +174,17 @@ impl<'a> View<'a> {
         let [a, b, c, d, e, f, g, h, i]: [f32; TECHNIQUES] =
             std::array::from_fn(|i| shares[i] * self.relative[i]);
         // Not one after the other, and one division: the search has nothing else to wait for.
-        let (paths, merges) = ((a + b) + (c + d), ((e + f) + (g + h)) + i);
-        Share { paths, merges, inverse: 1.0 / (paths + merges) }
+        let (camera, merges) = ((a + b) + c, ((e + f) + (g + h)) + i);
+        let paths = camera + d;
+        Share { paths, splats: d, merges, inverse: 1.0 / (paths + merges) }
     }
 }
 
 /// Densities relative to those of the trial: of merges, and of all other techniques.
 pub(super) struct Share {
     paths: f32,
+    /// Of the other techniques, light tracing.
+    splats: f32,
     merges: f32,
     /// One over the sum of both.
     inverse: f32,
@@ -190,6 +196,14 @@ impl Share {
     #[inline]
     pub(super) fn single(&self, square: f32, damped: f32) -> f32 {
         square * self.inverse * ((self.paths + damped * self.merges) * self.inverse)
+    }
+
+    /// What of it is variance in any case: photons and splats come from independent light sub-paths, so that the square of the mean that is
+    /// subtracted from theirs is divided by the number of those; of camera sub-paths' own samples it may be nearly all.
+    #[inline]
+    pub(super) fn least(&self, square: f32, damped: f32) -> f32 {
+        let paths = LEAST_PART * (self.paths - self.splats) + self.splats;
+        square * self.inverse * ((paths + damped * self.merges) * self.inverse)
     }
 }
 

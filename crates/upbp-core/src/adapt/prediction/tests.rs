@@ -197,7 +197,7 @@ fn variances_know_where_walks_end() {
         let found: f64 = prediction.relative_variance(&counts).iter().sum();
         let reach = f64::from(numbered(roulette, OF_TRIAL).reach(ALBEDO));
         let squares = 1.0 + 1.0 / reach;
-        let expected = (1.0 / reach - 1.0).max(LEAST_PART * squares) / (4.0 * (1.0 + DARKNESS));
+        let expected = (1.0 / reach - 1.0).max(f64::from(LEAST_PART) * squares) / (4.0 * (1.0 + DARKNESS));
         assert!((found / expected - 1.0).abs() < 0.1, "{roulette}: {found}, expected {expected}");
     }
 }
