@@ -93,6 +93,8 @@ pub(super) struct View<'a> {
     common: [f32; TECHNIQUES],
     /// As many pairs of photons of one light sub-path as the plan has, less those of the trial: by points and by beams.
     more: [f32; 2],
+    /// The least part of second moments that is variance: of camera sub-paths' own samples, and of those of light sub-paths.
+    least: [f32; 2],
     /// Whether any look-up is seldom.
     seldom: bool,
     /// Sums of what was found of a light sub-path: by class and, where look-ups are seldom, by technique.
@@ -102,12 +104,16 @@ pub(super) struct View<'a> {
 
 impl<'a> View<'a> {
     pub(super) fn new(trial: &Trial, looks: &'a Looks, counts: &Counts) -> Self {
+        // Merges have no fewer than those with beams.
+        let light_paths =
+            f64::min(trial.planned[0] * counts.paths[0], trial.planned[1] * counts.paths[1]).max(1.0);
         Self {
             looks,
             roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
             common: counts.look_ups.map(|p| (1.0 / p - 1.0) as f32),
             more: [0, 1].map(|i| (trial.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
+            least: [LEAST_PART, LEAST_PART.max(1.0 - (1.0 / light_paths) as f32)],
             seldom: counts.look_ups.iter().any(|p| *p < 1.0),
             by_class: Vec::new(),
             by_technique: Vec::new(),
@@ -135,7 +141,7 @@ impl<'a> View<'a> {
             let share = self.share(&seen.shares);
             let rarity = seen.rarity[self.roulette];
             result.single += f64::from(rarity * share.single(seen.square, seen.damped));
-            result.least += f64::from(rarity * share.least(seen.square, seen.damped));
+            result.least += f64::from(rarity * share.least(self.least, seen.square, seen.damped));
             let weight = self.relative[i] * share.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
@@ -198,12 +204,12 @@ impl Share {
         square * self.inverse * ((self.paths + damped * self.merges) * self.inverse)
     }
 
-    /// What of it is variance in any case: photons and splats come from independent light sub-paths, so that the square of the mean that is
-    /// subtracted from theirs is divided by the number of those; of camera sub-paths' own samples it may be nearly all.
+    /// What of it is variance in any case, by the least parts: photons and splats come from independent light sub-paths, so that the square
+    /// of the mean that is subtracted from theirs is divided by the number of those; of camera sub-paths' own samples it may be nearly all.
     #[inline]
-    pub(super) fn least(&self, square: f32, damped: f32) -> f32 {
-        let paths = LEAST_PART * (self.paths - self.splats) + self.splats;
-        square * self.inverse * ((paths + damped * self.merges) * self.inverse)
+    pub(super) fn least(&self, [camera, light]: [f32; 2], square: f32, damped: f32) -> f32 {
+        let of_light = light * (self.splats + damped * self.merges);
+        square * self.inverse * ((camera * (self.paths - self.splats) + of_light) * self.inverse)
     }
 }
 
