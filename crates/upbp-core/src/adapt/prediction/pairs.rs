@@ -104,9 +104,9 @@ pub(super) struct View<'a> {
 
 impl<'a> View<'a> {
     pub(super) fn new(trial: &Trial, looks: &'a Looks, counts: &Counts) -> Self {
-        // Merges have no fewer than those with beams.
-        let light_paths =
-            f64::min(trial.planned[0] * counts.paths[0], trial.planned[1] * counts.paths[1]).max(1.0);
+        // No merge has fewer of them than there are with beams, if there are any.
+        let paths = |i: usize| trial.planned[i] * counts.paths[i];
+        let light_paths = if paths(1) > 0.0 { paths(0).min(paths(1)) } else { paths(0) }.max(1.0);
         Self {
             looks,
             roulette: counts.roulette,
