@@ -148,6 +148,12 @@ impl Judged {
         self.variance.iter().sum::<f64>() * self.cost
     }
 
+    /// This, unless the other's product is less: by `gain` for each time that the other's light sub-paths are quartered.
+    fn or_less(self, other: Self, gain: f64) -> Self {
+        let needed = gain.powf(other.candidate.quarterings(&self.candidate));
+        if other.product() < needed * self.product() { other } else { self }
+    }
+
     /// Whether the product is less than `gain` times the other's, and by more than the uncertainty of that.
     fn beats(&self, other: &Self, gain: f64) -> bool {
         if other.product().is_infinite() {
@@ -194,10 +200,7 @@ impl Judge<'_> {
 /// sub-paths to those with fewer, by `gain` for each quartering: what fewer lose is in few samples, of which most trials see too little.
 pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
     let mut judge = Judge { prediction, costs, known: Vec::new() };
-    let less = |a: Judged, b: Judged| {
-        let needed = gain.powf(b.candidate.quarterings(&a.candidate));
-        if b.product() < needed * a.product() { b } else { a }
-    };
+    let less = |a: Judged, b: Judged| a.or_less(b, gain);
     let [camera, paths, everything] = starts(bounds, Candidate::everything(bounds)).map(|start| {
         let end = descend(&mut judge, start, bounds, gain);
         let end = judge.judge(&numbers_of_light_paths(&end.candidate, bounds)).into_iter().fold(end, less);
@@ -313,6 +316,37 @@ mod tests {
     use std::collections::VecDeque;
 
     use super::*;
+
+    #[test]
+    fn fewer_light_sub_paths_must_gain_more() {
+        let judged = |techniques, light_paths, cost| Judged {
+            candidate: Candidate {
+                techniques,
+                light_paths,
+                beam_paths: 1.0,
+                connections: 1.0,
+                surf_radius: 1.0,
+                seldom: TechniqueSet::EMPTY,
+                roulette: TRIAL,
+            },
+            variance: [1.0; GROUPS],
+            cost,
+        };
+        let gain = 0.9;
+        let chosen = |a: Judged, b: Judged| {
+            let least = a.or_less(b, gain);
+            assert_eq!(least.cost, b.or_less(a, gain).cost, "whichever comes first");
+            least.cost
+        };
+        let all = judged(TechniqueSet::BPT, 1.0, 1.0);
+        for (fewer, needed) in [(0.25, gain), (0.0625, gain * gain)] {
+            assert_eq!(chosen(all, judged(TechniqueSet::BPT, fewer, 1.01 * needed)), 1.0);
+            assert_eq!(chosen(all, judged(TechniqueSet::BPT, fewer, 0.99 * needed)), 0.99 * needed);
+        }
+        // What has none is compared as it is.
+        assert_eq!(chosen(all, judged(TechniqueSet::PT, 0.0625, 0.99)), 0.99);
+        assert_eq!(chosen(all, judged(TechniqueSet::PT, 0.0625, 1.01)), 1.0);
+    }
 
     #[test]
     fn beams_come_from_light_sub_paths() {

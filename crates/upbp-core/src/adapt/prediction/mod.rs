@@ -15,11 +15,12 @@ use glam::DVec3;
 use super::grid::Grid;
 use super::recorder::{Sample, TECHNIQUES};
 use super::trial::Trial;
+use crate::choices::BEAMS;
 use limits::{reductions, relative_to, surroundings};
 use pairs::{Looks, View};
 
 /// The least variance, relative to the second moments of single samples.
-const LEAST_PART: f32 = 0.05;
+const LEAST_PART: f64 = 0.05;
 
 /// Parts that a variance is given in, so that its own error can be told.
 pub(crate) const GROUPS: usize = 8;
@@ -34,6 +35,14 @@ pub(crate) struct Counts {
     pub(crate) look_ups: [f64; TECHNIQUES],
     /// The number of the roulette.
     pub(crate) roulette: usize,
+}
+
+impl Counts {
+    /// The fewest light sub-paths that merges of the plan come from: those with beams, if it has any.
+    fn light_paths(&self, trial: &Trial) -> f64 {
+        let beams = BEAMS.iter().any(|technique| self.relative[technique as usize] > 0.0);
+        (trial.planned[usize::from(beams)] * self.paths[usize::from(beams)]).max(1.0)
+    }
 }
 
 /// A trial, made ready for predictions.
@@ -75,15 +84,12 @@ impl Prediction {
     pub(crate) fn relative_variance(&self, counts: &Counts) -> [f64; GROUPS] {
         let trial = &self.trial;
         let mut view = View::new(trial, &self.looks, counts);
-        let mut least = [0.0; GROUPS];
-        let mut all = [0.0; GROUPS];
+        let light_paths = counts.light_paths(trial);
+        let mut groups = [Moments::default(); GROUPS];
         for cell in 0..trial.cells {
-            let sums = self.of_cell(cell, &mut view);
-            least[group(cell)] += sums[0] / trial.cells as f64;
-            all[group(cell)] += sums[1] / trial.cells as f64;
+            groups[group(cell)].add(&self.of_cell(cell, &mut view));
         }
-        // The difference of two noisy numbers may be anything.
-        let mut variance: [f64; GROUPS] = std::array::from_fn(|group| f64::max(all[group], least[group]));
+        let mut variance = groups.map(|moments| moments.variance(light_paths) / trial.cells as f64);
         for (cell, splat) in &trial.splats {
             let square = trial.undamped_second_moment(splat) as f32;
             let second_moment = f64::from(view.share(&splat.shares).single(square, splat.damped[1]));
@@ -93,22 +99,51 @@ impl Prediction {
         variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
     }
 
-    /// The least that its variance can be, and its variance.
-    fn of_cell(&self, cell: usize, view: &mut View<'_>) -> [f64; 2] {
+    /// What samples of a cell say.
+    fn of_cell(&self, cell: usize, view: &mut View<'_>) -> Moments {
         let passes = self.trial.passes as f64;
-        let (mut single, mut least, mut products) = (0.0, 0.0, 0.0);
+        let mut moments = Moments::default();
         let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
         for pass in 0..self.trial.passes {
             let look = view.look(cell * self.trial.passes + pass);
-            single += look.single;
-            least += look.least;
-            products += look.products;
+            moments.single += look.single / passes;
+            moments.light += look.light / passes;
+            moments.pairs += look.products / passes;
             sum += look.sum;
             squares += look.sum.length_squared();
         }
-        // The square of the mean from products of different passes, which have no part of their own variance.
-        let mean_square = (sum.length_squared() - squares) / (passes * (passes - 1.0));
-        [least / passes, (single + products) / passes - mean_square]
+        // Products of different passes have no part of their own variance.
+        moments.mean_square = (sum.length_squared() - squares) / (passes * (passes - 1.0));
+        moments
+    }
+}
+
+/// Moments of what camera sub-paths find.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    /// Second moments of single samples.
+    single: f64,
+    /// What of those is due to light sub-paths.
+    light: f64,
+    /// Products of pairs of samples.
+    pairs: f64,
+    mean_square: f64,
+}
+
+impl Moments {
+    fn add(&mut self, more: &Self) {
+        self.single += more.single;
+        self.light += more.light;
+        self.pairs += more.pairs;
+        self.mean_square += more.mean_square;
+    }
+
+    /// The variance. As the difference of noisy numbers it may be anything, but not less than if nothing was due to camera sub-paths: that of
+    /// independent light sub-paths is their second moment less the square of the mean over their number, and pairs only add to it.
+    fn variance(&self, light_paths: f64) -> f64 {
+        let of_light = self.light - self.mean_square / light_paths;
+        let least = LEAST_PART * (self.single - self.light) + of_light;
+        (self.single + self.pairs - self.mean_square).max(least).max(LEAST_PART * self.single)
     }
 }
 

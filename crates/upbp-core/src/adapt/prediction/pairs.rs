@@ -8,7 +8,7 @@ use upbp_estimators::Technique;
 use super::super::recorder::{Sample, TECHNIQUES};
 use super::super::roulette::{COUNT, relative_reach};
 use super::super::trial::Trial;
-use super::{Counts, LEAST_PART};
+use super::Counts;
 
 /// The samples of a trial, ready for being looked at by many plans.
 pub(super) struct Looks {
@@ -75,8 +75,8 @@ impl Looks {
 pub(super) struct Look {
     /// Second moments of single samples.
     pub(super) single: f64,
-    /// What of those is variance in any case.
-    pub(super) least: f64,
+    /// What of those is due to light sub-paths: to splats and merges.
+    pub(super) light: f64,
     /// Products of all pairs of different samples.
     pub(super) products: f64,
     /// All samples.
@@ -93,8 +93,6 @@ pub(super) struct View<'a> {
     common: [f32; TECHNIQUES],
     /// As many pairs of photons of one light sub-path as the plan has, less those of the trial: by points and by beams.
     more: [f32; 2],
-    /// The least part of second moments that is variance: of camera sub-paths' own samples, and of those of light sub-paths.
-    least: [f32; 2],
     /// Whether any look-up is seldom.
     seldom: bool,
     /// Sums of what was found of a light sub-path: by class and, where look-ups are seldom, by technique.
@@ -104,16 +102,12 @@ pub(super) struct View<'a> {
 
 impl<'a> View<'a> {
     pub(super) fn new(trial: &Trial, looks: &'a Looks, counts: &Counts) -> Self {
-        // No merge has fewer of them than there are with beams, if there are any.
-        let paths = |i: usize| trial.planned[i] * counts.paths[i];
-        let light_paths = if paths(1) > 0.0 { paths(0).min(paths(1)) } else { paths(0) }.max(1.0);
         Self {
             looks,
             roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
             common: counts.look_ups.map(|p| (1.0 / p - 1.0) as f32),
             more: [0, 1].map(|i| (trial.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
-            least: [LEAST_PART, LEAST_PART.max(1.0 - (1.0 / light_paths) as f32)],
             seldom: counts.look_ups.iter().any(|p| *p < 1.0),
             by_class: Vec::new(),
             by_technique: Vec::new(),
@@ -141,7 +135,7 @@ impl<'a> View<'a> {
             let share = self.share(&seen.shares);
             let rarity = seen.rarity[self.roulette];
             result.single += f64::from(rarity * share.single(seen.square, seen.damped));
-            result.least += f64::from(rarity * share.least(self.least, seen.square, seen.damped));
+            result.light += f64::from(rarity * share.light(seen.square, seen.damped));
             let weight = self.relative[i] * share.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
@@ -181,18 +175,16 @@ impl<'a> View<'a> {
             std::array::from_fn(|i| shares[i] * self.relative[i]);
         // Not one after the other, and one division: the search has nothing else to wait for.
         let (camera, merges) = ((a + b) + c, ((e + f) + (g + h)) + i);
-        let paths = camera + d;
-        Share { paths, splats: d, merges, inverse: 1.0 / (paths + merges) }
+        Share { camera, splats: d, merges, inverse: 1.0 / ((camera + d) + merges) }
     }
 }
 
-/// Densities relative to those of the trial: of merges, and of all other techniques.
+/// Densities relative to those of the trial: of camera sub-paths' own samples, of light tracing, and of merges.
 pub(super) struct Share {
-    paths: f32,
-    /// Of the other techniques, light tracing.
+    camera: f32,
     splats: f32,
     merges: f32,
-    /// One over the sum of both.
+    /// One over the sum of all.
     inverse: f32,
 }
 
@@ -201,15 +193,13 @@ impl Share {
     /// in the weights, twice in their squares.
     #[inline]
     pub(super) fn single(&self, square: f32, damped: f32) -> f32 {
-        square * self.inverse * ((self.paths + damped * self.merges) * self.inverse)
+        square * self.inverse * ((self.camera + self.splats + damped * self.merges) * self.inverse)
     }
 
-    /// What of it is variance in any case, by the least parts: photons and splats come from independent light sub-paths, so that the square
-    /// of the mean that is subtracted from theirs is divided by the number of those; of camera sub-paths' own samples it may be nearly all.
+    /// What of it is due to splats and merges.
     #[inline]
-    pub(super) fn least(&self, [camera, light]: [f32; 2], square: f32, damped: f32) -> f32 {
-        let of_light = light * (self.splats + damped * self.merges);
-        square * self.inverse * ((camera * (self.paths - self.splats) + of_light) * self.inverse)
+    fn light(&self, square: f32, damped: f32) -> f32 {
+        square * self.inverse * ((self.splats + damped * self.merges) * self.inverse)
     }
 }
 

@@ -162,6 +162,47 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
     }
 }
 
+/// A trial that has few photons, and by chance of as much from pass to pass as if they did not vary, does not make them vary less than
+/// independent ones.
+#[test]
+fn photons_vary_at_least_as_independent_ones_do() {
+    const PLANNED: f64 = 1000.0;
+    const TRACED: f64 = 10.0;
+    let mut shares = [0.0; TECHNIQUES];
+    shares[Technique::Bb1d as usize] = 1.0;
+    let photon = Sample {
+        technique: Technique::Bb1d,
+        merged: Some(0),
+        albedos: 1.0,
+        value: Vec3::ONE,
+        shares,
+        damped: [1.0; 2],
+    };
+    let looks = (SIDE * SIDE * PASSES) as usize;
+    let trial = Trial {
+        samples: vec![photon; looks],
+        ends: (1..=looks as u32).collect(),
+        thinning: [TRACED / PLANNED; 2],
+        planned: [PLANNED; 2],
+        ..trial()
+    };
+    let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
+    let prediction = Prediction::new(trial, &grid);
+    for paths in [0.25, 1.0] {
+        let mut counts = Counts {
+            relative: [0.0; TECHNIQUES],
+            paths: [paths; 2],
+            look_ups: [1.0; TECHNIQUES],
+            roulette: TRIAL,
+        };
+        counts.relative[Technique::Bb1d as usize] = paths;
+        let found: f64 = prediction.relative_variance(&counts).iter().sum();
+        // So many light sub-paths, each of which comes by with probability 1 / TRACED.
+        let expected = (TRACED - 1.0) / (paths * PLANNED) / (1.0 + DARKNESS);
+        assert!((found / expected - 1.0).abs() < 1e-3, "{paths}: {found}, expected {expected}");
+    }
+}
+
 /// A vertex that always finds 1, and past an albedo of 0.3 another that finds as much.
 #[test]
 fn variances_know_where_walks_end() {
@@ -197,7 +238,7 @@ fn variances_know_where_walks_end() {
         let found: f64 = prediction.relative_variance(&counts).iter().sum();
         let reach = f64::from(numbered(roulette, OF_TRIAL).reach(ALBEDO));
         let squares = 1.0 + 1.0 / reach;
-        let expected = (1.0 / reach - 1.0).max(f64::from(LEAST_PART) * squares) / (4.0 * (1.0 + DARKNESS));
+        let expected = (1.0 / reach - 1.0).max(LEAST_PART * squares) / (4.0 * (1.0 + DARKNESS));
         assert!((found / expected - 1.0).abs() < 0.1, "{roulette}: {found}, expected {expected}");
     }
 }
