@@ -56,6 +56,20 @@ fn trial_of(other: Technique, damping: fn(f64) -> f64) -> Trial {
     }
 }
 
+/// Samples of some techniques, and light sub-paths, relative to those of the plan.
+fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts {
+    let mut counts = Counts {
+        relative: [0.0; TECHNIQUES],
+        paths: [paths; 2],
+        look_ups: [1.0; TECHNIQUES],
+        roulette: TRIAL,
+    };
+    for (technique, number) in relative {
+        counts.relative[technique as usize] = number;
+    }
+    counts
+}
+
 fn trial() -> Trial {
     trial_of(Technique::Connect, |_| 1.0)
 }
@@ -86,14 +100,7 @@ fn variances_are_those_of_the_estimators() {
         let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
         let prediction = Prediction::new(trial_of(other, damping), &grid);
         for [hits, others] in [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
-            let mut counts = Counts {
-                relative: [0.0; TECHNIQUES],
-                paths: [1.0; 2],
-                look_ups: [1.0; TECHNIQUES],
-                roulette: TRIAL,
-            };
-            counts.relative[Technique::Hit as usize] = hits;
-            counts.relative[other as usize] = others;
+            let counts = counts([(Technique::Hit, hits), (other, others)], 1.0);
             // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n, where w is the part of n p, damped, in a sum.
             let part = |n: f64, p: Function<'_>, damping: Function<'_>, sum: Function<'_>| {
                 if n == 0.0 {
@@ -149,14 +156,8 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
     let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
     let prediction = Prediction::new(trial, &grid);
     for paths in [0.25, 1.0, 4.0] {
-        let mut counts = Counts {
-            relative: [0.0; TECHNIQUES],
-            paths: [paths; 2],
-            look_ups: [1.0; TECHNIQUES],
-            roulette: TRIAL,
-        };
-        counts.relative[Technique::Pb2d as usize] = paths;
-        let found: f64 = prediction.relative_variance(&counts).iter().sum();
+        let found: f64 =
+            prediction.relative_variance(&counts([(Technique::Pb2d, paths)], paths)).iter().sum();
         let expected = (RARE - 1.0) / (paths * PLANNED) / (1.0 + DARKNESS);
         assert!((found / expected - 1.0).abs() < 0.1, "{paths}: {found}, expected {expected}");
     }
@@ -189,14 +190,8 @@ fn photons_vary_at_least_as_independent_ones_do() {
     let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
     let prediction = Prediction::new(trial, &grid);
     for paths in [0.25, 1.0] {
-        let mut counts = Counts {
-            relative: [0.0; TECHNIQUES],
-            paths: [paths; 2],
-            look_ups: [1.0; TECHNIQUES],
-            roulette: TRIAL,
-        };
-        counts.relative[Technique::Bb1d as usize] = paths;
-        let found: f64 = prediction.relative_variance(&counts).iter().sum();
+        let found: f64 =
+            prediction.relative_variance(&counts([(Technique::Bb1d, paths)], paths)).iter().sum();
         // So many light sub-paths, each of which comes by with probability 1 / TRACED.
         let expected = (TRACED - 1.0) / (paths * PLANNED) / (1.0 + DARKNESS);
         assert!((found / expected - 1.0).abs() < 1e-3, "{paths}: {found}, expected {expected}");
@@ -232,9 +227,7 @@ fn variances_know_where_walks_end() {
     let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
     let prediction = Prediction::new(Trial { samples, ends, ..trial() }, &grid);
     for roulette in 0..COUNT {
-        let mut counts =
-            Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES], roulette };
-        counts.relative[Technique::Hit as usize] = 1.0;
+        let counts = Counts { roulette, ..counts([(Technique::Hit, 1.0)], 1.0) };
         let found: f64 = prediction.relative_variance(&counts).iter().sum();
         let reach = f64::from(numbered(roulette, OF_TRIAL).reach(ALBEDO));
         let squares = 1.0 + 1.0 / reach;
@@ -254,9 +247,7 @@ fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
     }
     let prediction =
         Prediction::new(trial, &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE));
-    let mut counts =
-        Counts { relative: [0.0; TECHNIQUES], paths: [1.0; 2], look_ups: [1.0; TECHNIQUES], roulette: TRIAL };
-    counts.relative[Technique::Hit as usize] = 1.0;
+    let counts = counts([(Technique::Hit, 1.0)], 1.0);
     assert!(prediction.relative_variance(&counts).iter().sum::<f64>().is_infinite());
 }
 
