@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         write_png(&folder.join(format!("{name}.png")), &renderer.film().image(), 1.0)?;
         if name == "all" {
             for layer in renderer.film().layers() {
-                if let Some(image) = renderer.film().layer(*layer) {
+                if let Some(image) = renderer.film().layer(layer) {
                     write_png(&folder.join(format!("layer_{}.png", layer.name())), &image, 1.0)?;
                 }
             }

@@ -5,12 +5,17 @@ mod support;
 use std::path::Path;
 
 use support::{Estimate, assert_same, channels, renderer};
-use upbp_core::{LightPaths, Radii, Radius, RenderPlan, Settings, TechniqueSet, Techniques, read_exr};
+use upbp_core::{LightPaths, Radii, Radius, RenderPlan, Settings, Start, TechniqueSet, Techniques, read_exr};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::{Count, Film};
 
 fn settings() -> Settings {
     Settings { deterministic: true, ..Settings::default() }
+}
+
+/// By a plan that is given.
+fn by(plan: RenderPlan) -> Start<'static> {
+    Start { plan: Some(plan), ..Start::default() }
 }
 
 fn shipped(name: &str) -> ReadyScene {
@@ -132,7 +137,7 @@ fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
         .collect();
     let render = |seed, plan: &RenderPlan| {
         let settings = Settings { seed, ..settings() }.validate().expect("valid settings");
-        let mut renderer = scene.renderer_with_plan(settings, plan.clone()).expect("a plan of this scene");
+        let mut renderer = scene.start_renderer(settings, by(plan.clone())).expect("a plan of this scene");
         for _ in 0..8 {
             assert!(renderer.iterate());
         }
@@ -198,7 +203,7 @@ fn a_frozen_plan_makes_the_same_iterations() {
     let plan = RenderPlan::from_ron(&first.state().identity().plan.to_string()).expect("a plan");
     let checked = || measured.clone().validate().expect("valid settings");
     let part = |range: std::ops::Range<u64>| {
-        let mut renderer = scene.renderer_with_plan(checked(), plan.clone()).expect("the plan fits");
+        let mut renderer = scene.start_renderer(checked(), by(plan.clone())).expect("the plan fits");
         renderer.set_range(range);
         while renderer.iterate() {}
         renderer.state().clone()
@@ -232,7 +237,7 @@ fn a_state_is_taken_up_whatever_was_chosen_since() {
             plan = RenderPlan::from_ron(&both).expect("two stages");
         }
         let run = |iterations| {
-            let mut renderer = scene.renderer_with_plan(auto(), plan.clone()).expect("a plan for it");
+            let mut renderer = scene.start_renderer(auto(), by(plan.clone())).expect("a plan for it");
             (0..iterations).for_each(|_| assert!(renderer.iterate()));
             renderer
         };
@@ -251,9 +256,9 @@ fn a_plan_that_does_not_fit_is_refused() {
     let checked = || settings().validate().expect("valid settings");
     let greedy = plan.to_string().replace("light_paths: 4096,", "light_paths: 4000000000,");
     let greedy = RenderPlan::from_ron(&greedy).expect("a plan");
-    let error = fog.renderer_with_plan(checked(), greedy).map(|_| ()).expect_err("too much").to_string();
+    let error = fog.start_renderer(checked(), by(greedy)).map(|_| ()).expect_err("too much").to_string();
     assert!(error.starts_with("plan, stage from iteration 0: needs") && error.contains("2048"), "{error}");
     let matt = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
-    let error = matt.renderer_with_plan(checked(), plan).map(|_| ()).expect_err("no media here").to_string();
+    let error = matt.start_renderer(checked(), by(plan)).map(|_| ()).expect_err("no media here").to_string();
     assert!(error.contains("pb2d") && error.contains("cannot be used"), "{error}");
 }

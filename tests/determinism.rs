@@ -31,7 +31,7 @@ fn bits(threads: usize, techniques: &str) -> Vec<u32> {
             assert!(renderer.iterate());
         }
         let film = renderer.film();
-        let layers = film.layers().iter().filter_map(|layer| film.layer(*layer));
+        let layers = film.layers().filter_map(|layer| film.layer(layer));
         layers
             .chain([film.image(), film.variance()])
             .flat_map(|i| i.pixels)
@@ -188,7 +188,7 @@ fn what_does_not_belong_together_is_refused_by_name() {
     }
     // What has no influence may differ.
     let mut merged = base.clone();
-    merged.merge(render(|s| s.memory = 3000, b"room", 2)).expect("the same render");
+    merged.merge(render(|s| s.memory = Some(3000), b"room", 2)).expect("the same render");
     assert_eq!(merged.film().iteration_set().to_string(), "0..4");
 
     let error = merged.merge(render(|_| (), b"room", 3)).expect_err("an overlap");

@@ -17,13 +17,12 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use upbp_core::{
-    OutputError, RenderPlan, Renderer, Settings, State, StateError, StopReason, check_writable, read_exr,
+    OutputError, RenderPlan, Renderer, Settings, Start, State, StateError, StopReason, check_writable, read_exr,
     remove_leftovers, write_text,
 };
 use upbp_scene::ReadyScene;
 
 use exit::{Failure, finish, say};
-use interrupt::Interrupt;
 use options::Options;
 use render::{Beside, render};
 
@@ -38,17 +37,14 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Failure> {
-    let interrupt = Interrupt::install().map_err(Failure::input)?;
+    let canceller = interrupt::install().map_err(Failure::input)?;
     let path = options.scene.clone().unwrap_or_else(shipped_scene);
     let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
     let scene = load(&path, options).map_err(Failure::input)?;
     let reference = options.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
     let plan = options.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
-    let mut renderer = match plan {
-        None => scene.renderer(settings),
-        Some(plan) => scene.renderer_with_plan(settings, plan),
-    }
-    .map_err(Failure::input)?;
+    let start = Start { plan, canceller, seconds: options.stop().seconds, progress: None };
+    let mut renderer = scene.start_renderer(settings, start).map_err(Failure::input)?;
     renderer
         .identify_scene(&format!("{} ({:016x})", path.display(), scene.hash()), &scene.hash().to_le_bytes());
     let rect = renderer.film().rect();
@@ -87,7 +83,6 @@ fn run(options: &Options) -> Result<(), Failure> {
         remove_leftovers(output);
     }
 
-    interrupt.stops(renderer.canceller());
     let beside = Beside {
         reference: reference.as_ref(),
         state: options.state.as_deref().map(|path| (path, options.save_every())),

@@ -79,7 +79,7 @@ pub(crate) struct Options {
     /// Time between two savings of the state; what is lost in a crash is no more than this and an iteration
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, requires = "state")]
     save_every: f64,
-    /// Memory for film, light vertices, photon beams and their look-ups, MiB [default: 2048]
+    /// Memory for film, light vertices, photon beams and their look-ups, MiB [default: half of what is free]
     #[arg(long, value_name = "MIB")]
     memory: Option<u32>,
     /// Check scene and settings, render nothing
@@ -129,8 +129,8 @@ impl Options {
         if self.beams.is_some() {
             settings.beams = self.beams;
         }
-        if let Some(memory) = self.memory {
-            settings.memory = memory;
+        if self.memory.is_some() {
+            settings.memory = self.memory;
         }
         if self.fixed_radius {
             settings.progressive = false;

@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut renderer = Renderer::new(&room, settings.clone().validate()?)?;
     let stop = Stop { seconds: Some(20.0), ..Stop::default() };
     renderer.render(&stop, |now| {
-        println!("{:3.0} %, estimated relMSE {:.2e}", 100.0 * now.fraction, now.estimated_error);
+        println!("{:3.0} %, estimated relMSE {}", 100.0 * now.fraction, now.estimated_error);
         ControlFlow::Continue(())
     });
     let report = renderer.report();

@@ -16,17 +16,18 @@ pub(crate) const BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Bp2d)
 /// The largest first radius of photon beams, relative to the scene's.
 const LARGEST_BEAM_RADIUS: f32 = 3e-3;
 
-/// A stage with all of `techniques`, for a film of `pixels` and what may take `bytes` beside it.
+/// A stage with all of `techniques`, with at most so many light sub-paths unless they are counted by the settings, and what may take `bytes`
+/// beside the film.
 pub(crate) fn everything<S: Scene>(
     world: &World<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
     pilot: &Pilot,
-    pixels: u32,
+    most_light_paths: u32,
     bytes: u64,
 ) -> Stage {
     let wanted = match settings.light_paths {
-        LightPaths::Auto => pixels,
+        LightPaths::Auto => most_light_paths,
         LightPaths::Count(count) => count,
     };
     let wanted_beams = settings

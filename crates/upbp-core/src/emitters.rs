@@ -12,6 +12,9 @@ use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, EmitterShares, LightMap, Plan, StreamKind, World};
 
+use crate::budget::Budget;
+use crate::stop::Halt;
+
 /// Camera sub-paths, if there are many emitters.
 const CAMERA_PATHS: u64 = 2048;
 /// Light sub-paths, unless they are long or emitters are few.
@@ -49,11 +52,21 @@ pub(crate) struct EmitterChoices {
 }
 
 impl EmitterChoices {
-    /// Measured under a plan, and under one without light sub-paths if there may be such stages.
-    pub(crate) fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan, alone: Option<&Plan>) -> Self {
-        let (by_light_paths, next_event) = measure(world, plan);
-        let next_event_alone = alone.map_or_else(|| next_event.clone(), |plan| measure(world, plan).1);
-        Self { by_light_paths, next_event, next_event_alone }
+    /// Measured under a plan, and under one without light sub-paths if there may be such stages. `None` if it was cancelled.
+    pub(crate) fn measure<S: Scene>(
+        world: &World<'_, S>,
+        plan: &Plan,
+        alone: Option<&Plan>,
+        budget: &Budget<'_>,
+    ) -> Option<Self> {
+        let budget = if alone.is_some() { budget.part(0.5) } else { *budget };
+        let measure = |plan| budget.largest(true, |part, halt| measure(world, plan, part, halt));
+        let (by_light_paths, next_event) = measure(plan)?;
+        let next_event_alone = match alone {
+            Some(plan) => measure(plan)?.1,
+            None => next_event.clone(),
+        };
+        Some(Self { by_light_paths, next_event, next_event_alone })
     }
 
     /// Chooses emitters as a stage with or without light sub-paths does.
@@ -63,8 +76,18 @@ impl EmitterChoices {
     }
 }
 
-/// What every emitter brings under `plan`: by light sub-paths, by next events.
-fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, EmitterShares) {
+/// What every emitter brings under `plan`: by light sub-paths, by next events. A part of the sub-paths is traced. `None` if it was halted.
+fn measure<S: Scene>(
+    world: &World<'_, S>,
+    plan: &Plan,
+    part: f64,
+    halt: &Halt<'_>,
+) -> Option<(EmitterShares, EmitterShares)> {
+    let mut plan = plan.clone();
+    // Fewer light sub-paths, each of which counts for more; weights as in the plan.
+    let fewer = |count: u32| (part * f64::from(count)).ceil() as u32;
+    (plan.light_paths, plan.beam_paths) = (fewer(plan.light_paths), fewer(plan.beam_paths));
+    let plan = &plan;
     let context = Context { world, plan };
     // The whole film: a crop shows the same camera samples.
     let (width, height) = world.scene.camera().resolution();
@@ -89,12 +112,15 @@ fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, Emitt
             let mut seen = Seen { first: range.start, starts: vec![None; range.len()], ..Seen::default() };
             let mut out = LightChunk::default();
             for index in range {
+                if halt.now() {
+                    return None;
+                }
                 let observer: &mut DynObserver<'_, S::Bsdf> = &mut seen;
                 trace_light_path(&context, StreamKind::PilotLight, index, scratch, &mut out, observer);
             }
-            (out, seen)
+            Some((out, seen))
         })
-        .collect();
+        .collect::<Option<_>>()?;
     let mut starts = Vec::with_capacity(paths as usize);
     let mut vertices = Vec::new();
     let mut beams = Vec::new();
@@ -110,20 +136,23 @@ fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, Emitt
         LightMap::empty()
     };
 
-    let camera_paths = (enough(emitters) * CAMERA_PATHS as f64) as u64;
+    let camera_paths = (part * enough(emitters) * CAMERA_PATHS as f64).ceil() as u64;
     let walks: Vec<_> = (0..camera_paths.div_ceil(u64::from(CHUNK)))
         .into_par_iter()
         .map_init(Scratch::default, |scratch, chunk| {
             let mut seen = Seen::default();
-            for index in chunk * u64::from(CHUNK)..(chunk + 1) * u64::from(CHUNK) {
+            for index in chunk * u64::from(CHUNK)..((chunk + 1) * u64::from(CHUNK)).min(camera_paths) {
+                if halt.now() {
+                    return None;
+                }
                 let (pixel, counters) = (pixel(film, index), &mut Counters::default());
                 let kind = StreamKind::PilotCamera;
                 let observer: &mut DynObserver<'_, S::Bsdf> = &mut seen;
                 trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);
             }
-            seen
+            Some(seen)
         })
-        .collect();
+        .collect::<Option<_>>()?;
     // Light tracing fills the whole picture, camera sub-paths a part of it.
     let scale = pixels as f64 / camera_paths as f64;
     for seen in walks {
@@ -132,7 +161,7 @@ fn measure<S: Scene>(world: &World<'_, S>, plan: &Plan) -> (EmitterShares, Emitt
             next_event.add(emitter, contribution, scale);
         }
     }
-    (emission.shares(), next_event.shares())
+    Some((emission.shares(), next_event.shares()))
 }
 
 /// A pixel of a sequence that is spread over the picture by a step that is prime to almost every width.

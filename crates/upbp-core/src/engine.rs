@@ -3,14 +3,16 @@
 //! What touches the scene is compiled for each type of scene; the scheduler, which gets here a few times per iteration, films and files
 //! are compiled once.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
 use upbp_estimators::mis::{Densities, MergesApart};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::walk::Context;
 use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
 
+use crate::budget::Budget;
 use crate::census::Census;
 use crate::choices;
 use crate::emitters::EmitterChoices;
@@ -22,33 +24,55 @@ use crate::planner::Planner;
 use crate::report::PassTimes;
 use crate::settings::Settings;
 use crate::stage::Stage;
+use crate::stop::{Canceller, Halt};
 
 /// A scene at work.
 pub(crate) trait Engine: Send + Sync {
-    /// The stage that follows from a review. Emitters are chosen as in stages with light sub-paths from then on.
-    fn stage(&mut self, planner: &Planner, census: &Census, review: u32) -> Stage;
+    /// The stage that follows from a review, which may take so many seconds. Emitters are chosen as in stages with light sub-paths from
+    /// then on.
+    fn stage(
+        &mut self,
+        planner: &Planner,
+        census: &Census,
+        review: u32,
+        canceller: &Canceller,
+        seconds: Option<f64>,
+    ) -> Stage;
 
     /// What an iteration of a stage does.
     fn plan(&self, settings: &Settings, stage: &Stage, iteration: u64) -> Plan;
 
-    /// One iteration, into `pixels` of `rect`. `None` if it was cancelled: then the pixels mean nothing.
-    fn iterate(
+    /// The light sub-paths of an iteration, which are kept for its camera sub-paths; `pixels` of `rect` become what is splatted there.
+    /// `None` if it was halted: then the pixels mean nothing.
+    fn trace_light(
         &mut self,
         plan: &Plan,
         rect: PixelRect,
         pixels: &mut [Pixel],
-        cancelled: &AtomicBool,
-    ) -> Option<Done>;
+        halt: &Halt<'_>,
+    ) -> Option<LightDone>;
+
+    /// The camera sub-paths of the pixels of some sets, added to `pixels`. Light sub-paths come first. `None` if it was halted: then the
+    /// pixels of these sets mean nothing.
+    fn trace_camera(
+        &self,
+        plan: &Plan,
+        rect: PixelRect,
+        sets: &Range<u32>,
+        pixels: &mut [Pixel],
+        halt: &Halt<'_>,
+    ) -> Option<Counters>;
 
     /// Gives back memory that is kept from one iteration to the next.
     fn shrink(&mut self);
 }
 
-/// What an iteration did.
-pub(crate) struct Done {
+/// What the light sub-paths of an iteration did.
+pub(crate) struct LightDone {
     pub(crate) counters: Counters,
     /// Of the look-up structures.
     pub(crate) map_bytes: u64,
+    /// Of tracing, and of building the look-up structures.
     pub(crate) times: PassTimes,
 }
 
@@ -58,9 +82,15 @@ pub(crate) struct SceneEngine<'a, S: Scene> {
     /// None if there is no choice.
     pub(crate) emitters: Option<EmitterChoices>,
     pub(crate) pilot: Pilot,
-    /// Of iterations without correlation, and with it.
-    pub(crate) lists: Lists<S::Bsdf>,
-    pub(crate) lists_apart: Lists<S::Bsdf, MergesApart>,
+    pub(crate) map: Map<S::Bsdf>,
+}
+
+/// What the light sub-paths of an iteration left.
+pub(crate) enum Map<B> {
+    /// For weights that add all techniques up.
+    Plain(LightMap<B>),
+    /// For weights that know correlation.
+    Apart(LightMap<B, MergesApart>),
 }
 
 impl<S: Scene> SceneEngine<'_, S> {
@@ -72,88 +102,102 @@ impl<S: Scene> SceneEngine<'_, S> {
 }
 
 impl<S: Scene> Engine for SceneEngine<'_, S> {
-    fn stage(&mut self, planner: &Planner, census: &Census, review: u32) -> Stage {
+    fn stage(
+        &mut self,
+        planner: &Planner,
+        census: &Census,
+        review: u32,
+        canceller: &Canceller,
+        seconds: Option<f64>,
+    ) -> Stage {
         self.choose_emitters(true);
-        planner.stage(&self.world, census, &self.pilot, review)
+        planner.stage(&self.world, census, &self.pilot, review, &Budget::new(canceller, seconds))
     }
 
     fn plan(&self, settings: &Settings, stage: &Stage, iteration: u64) -> Plan {
         choices::plan(&self.world, settings, stage, iteration)
     }
 
-    fn iterate(
+    fn trace_light(
         &mut self,
         plan: &Plan,
         rect: PixelRect,
         pixels: &mut [Pixel],
-        cancelled: &AtomicBool,
-    ) -> Option<Done> {
+        halt: &Halt<'_>,
+    ) -> Option<LightDone> {
         self.choose_emitters(plan.light_paths > 0);
         let context = Context { world: &self.world, plan };
-        // A stage of the other kind may have left its lists.
+        // The lists of the iteration before are used again, unless a stage of the other kind has left them.
+        let map = std::mem::replace(&mut self.map, Map::Plain(LightMap::empty()));
         if plan.mis.correlation.is_some() {
-            self.lists = Lists::default();
-            iterate(&context, &self.pilot, &mut self.lists_apart, rect, pixels, cancelled)
+            let lists = if let Map::Apart(map) = map { Lists::of(map) } else { Lists::default() };
+            let (map, done) = trace_light(&context, &self.pilot, lists, rect, pixels, halt)?;
+            self.map = Map::Apart(map);
+            Some(done)
         } else {
-            self.lists_apart = Lists::default();
-            iterate(&context, &self.pilot, &mut self.lists, rect, pixels, cancelled)
+            let lists = if let Map::Plain(map) = map { Lists::of(map) } else { Lists::default() };
+            let (map, done) = trace_light(&context, &self.pilot, lists, rect, pixels, halt)?;
+            self.map = Map::Plain(map);
+            Some(done)
+        }
+    }
+
+    fn trace_camera(
+        &self,
+        plan: &Plan,
+        rect: PixelRect,
+        sets: &Range<u32>,
+        pixels: &mut [Pixel],
+        halt: &Halt<'_>,
+    ) -> Option<Counters> {
+        let context = Context { world: &self.world, plan };
+        match &self.map {
+            Map::Plain(map) => camera_pass(&context, map, rect, sets, pixels, halt),
+            Map::Apart(map) => camera_pass(&context, map, rect, sets, pixels, halt),
         }
     }
 
     fn shrink(&mut self) {
-        self.lists = Lists::default();
-        self.lists_apart = Lists::default();
+        self.map = Map::Plain(LightMap::empty());
     }
 }
 
-fn iterate<S: Scene, D: Densities>(
+fn trace_light<S: Scene, D: Densities>(
     context: &Context<'_, S>,
     pilot: &Pilot,
-    lists: &mut Lists<S::Bsdf, D>,
+    mut lists: Lists<S::Bsdf, D>,
     rect: PixelRect,
     pixels: &mut [Pixel],
-    cancelled: &AtomicBool,
-) -> Option<Done> {
+    halt: &Halt<'_>,
+) -> Option<(LightMap<S::Bsdf, D>, LightDone)> {
     let plan = context.plan;
     let mut times = PassTimes::default();
     let mut clock = Clock::start();
-    pixels.fill(BLACK);
+    pixels.par_iter_mut().with_min_len(1024).for_each(|pixel| *pixel = BLACK);
     let stores = plan.stores_vertices() || plan.stores_beams();
     let expected = LightCounts::expected(pilot, plan.light_paths, plan.beam_paths);
     let expected = if stores { expected } else { LightCounts::default() };
-    let mut counters = light_pass(context, StreamKind::Light, &expected, lists, cancelled, |splats| {
+    let counters = light_pass(context, StreamKind::Light, &expected, &mut lists, halt, |splats| {
         add_splats(rect, splats, pixels);
-    });
+    })?;
     times.light = clock.lap();
-    if cancelled.load(Ordering::Relaxed) {
-        return None;
-    }
-    let map = if stores {
-        LightMap::build(plan, std::mem::take(&mut lists.vertices), std::mem::take(&mut lists.beams))
-    } else {
-        LightMap::empty()
-    };
+    let map =
+        if stores { LightMap::build(plan, lists.vertices, lists.beams) } else { LightMap::empty() };
     times.build = clock.lap();
-    counters.add(&camera_pass(context, &map, rect, pixels, cancelled));
-    times.camera = clock.lap();
-    if cancelled.load(Ordering::Relaxed) {
-        return None;
-    }
     let map_bytes = map.memory_bytes() as u64;
-    *lists = Lists { vertices: map.vertices, beams: map.beams };
-    Some(Done { counters, map_bytes, times })
+    Some((map, LightDone { counters, map_bytes, times }))
 }
 
 /// A stop watch.
-struct Clock(Instant);
+pub(crate) struct Clock(Instant);
 
 impl Clock {
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self(Instant::now())
     }
 
     /// Time since the last call.
-    fn lap(&mut self) -> Duration {
+    pub(crate) fn lap(&mut self) -> Duration {
         let now = Instant::now();
         let time = now.duration_since(self.0);
         self.0 = now;

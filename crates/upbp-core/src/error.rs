@@ -17,12 +17,14 @@ pub struct SettingsError {
     pub found: String,
 }
 
-/// A render that cannot start.
+/// A render that does not start.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
     /// A plan whose light sub-paths leave more than the memory budget has room for.
-    #[error("plan, stage from iteration {from}: needs {needed} MiB, the setting `memory` allows {budget}")]
+    #[error(
+        "plan, stage from iteration {from}: needs {needed} MiB, the setting `memory` (--memory) allows {budget}"
+    )]
     PlanMemory {
         /// The first iteration of the stage.
         from: u64,
@@ -43,6 +45,9 @@ pub enum RenderError {
         /// Those that are not.
         techniques: TechniqueSet,
     },
+    /// Its canceller was used before there was anything to show.
+    #[error("cancelled before the first iteration")]
+    Cancelled,
     /// A setting.
     #[error(transparent)]
     Settings(#[from] SettingsError),
@@ -50,7 +55,10 @@ pub enum RenderError {
     #[error("scene: {0}")]
     World(#[from] WorldError),
     /// The film, with what writing it takes, does not fit.
-    #[error("film of {width} x {height} pixels: its {needed} MiB exceed the memory budget of {budget} MiB")]
+    #[error(
+        "film of {width} x {height} pixels: its {needed} MiB exceed the {budget} MiB that the setting `memory` (--memory) allows; \
+         a smaller film (--size) or fewer techniques (--techniques) take less"
+    )]
     Memory {
         /// Width in pixels.
         width: u32,

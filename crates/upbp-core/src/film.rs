@@ -1,27 +1,39 @@
 //! The film: running sums of all iterations, one layer per technique.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use rayon::prelude::*;
 use upbp_estimators::scene::PixelRect;
-use upbp_estimators::{Layer, Spectrum, TechniqueSet};
+use upbp_estimators::{Layer, Spectrum, TechniqueSet, half};
 
+use crate::error_estimate::{ErrorEstimate, ErrorMap, HalfImage};
+use crate::interleave::{self, SETS, set_of, stand_ins};
 use crate::iterations::{IterationSet, MAX_ITERATIONS};
-use crate::sum::Sum3;
+use crate::sum::{self, Sum3};
 
 /// A pixel of one iteration: radiance by layer.
 pub type Pixel = [Spectrum; Layer::COUNT];
 
 /// Sums over a set of iterations, to the last bit the same in whatever order they were added. A mean is too small by less than
 /// 2⁻³⁶ of the largest iteration of that pixel.
+///
+/// The even and the odd iterations are two halves with no random decision in common: what they differ in tells the error.
+///
+/// Of an iteration that was stopped a film may hold a part: some sets of pixels that are spread evenly. A pixel without any samples shows
+/// a neighbour's.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Film {
     rect: PixelRect,
-    /// The layers that are kept, in order.
-    layers: Vec<Layer>,
-    /// Sums of radiance, `layers.len()` per pixel.
-    sums: Vec<Sum3>,
-    /// Sums of the squares of each iteration's whole radiance, one per pixel.
+    /// In the order of [`Layer`]; a sum per pixel.
+    layers: Vec<(Layer, Vec<Sum3>)>,
+    /// Sums of the even iterations, all layers together.
+    even: Vec<Sum3>,
+    /// Sums of the squares of each iteration's whole radiance.
     squares: Vec<Sum3>,
     iterations: IterationSet,
+    /// Iterations that are there in part, with the number of [sets of pixels](interleave) that are.
+    parts: BTreeMap<u64, u32>,
 }
 
 /// A picture: three values per pixel, row by row from the top.
@@ -35,18 +47,27 @@ pub struct Image {
     pub pixels: Vec<[f32; 3]>,
 }
 
+/// Sums of nothing, one per pixel.
+fn black(rect: PixelRect) -> Vec<Sum3> {
+    vec![sum::ZERO; pixels(rect)]
+}
+
+const fn pixels(rect: PixelRect) -> usize {
+    rect.width as usize * rect.height as usize
+}
+
 impl Film {
     /// A black film for the layers of `techniques`.
     #[must_use]
     pub fn new(rect: PixelRect, techniques: TechniqueSet) -> Self {
-        let layers = Self::layers_of(techniques);
-        let pixels = rect.width as usize * rect.height as usize;
+        let layers = Self::layers_of(techniques).into_iter().map(|layer| (layer, black(rect))).collect();
         Self {
             rect,
-            sums: vec![Sum3::ZERO; pixels * layers.len()],
-            squares: vec![Sum3::ZERO; pixels],
             layers,
+            even: black(rect),
+            squares: black(rect),
             iterations: IterationSet::default(),
+            parts: BTreeMap::new(),
         }
     }
 
@@ -60,15 +81,15 @@ impl Film {
     /// Bytes that a film takes, with the buffer of one iteration.
     #[must_use]
     pub fn memory_bytes(rect: PixelRect, techniques: TechniqueSet) -> u64 {
-        let pixel = (Self::layers_of(techniques).len() + 1) * size_of::<Sum3>() + size_of::<Pixel>();
-        u64::from(rect.width) * u64::from(rect.height) * pixel as u64
+        let pixel = (Self::layers_of(techniques).len() + 2) * size_of::<Sum3>() + size_of::<Pixel>();
+        pixels(rect) as u64 * pixel as u64
     }
 
-    /// Bytes that writing a film as an image takes besides: the picture, the layers and the variance in single precision, and one
-    /// more while it is copied or compressed.
+    /// Bytes that writing a film as an image takes besides: the picture, the layers, two halves, variance and error in single precision,
+    /// and one more while it is copied or compressed.
     pub(crate) fn output_bytes(rect: PixelRect, techniques: TechniqueSet) -> u64 {
-        let pixel = (Self::layers_of(techniques).len() + 3) * size_of::<[f32; 3]>();
-        u64::from(rect.width) * u64::from(rect.height) * pixel as u64
+        let pixel = (Self::layers_of(techniques).len() + 6) * size_of::<[f32; 3]>();
+        pixels(rect) as u64 * pixel as u64
     }
 
     /// The part of the camera's film that this is.
@@ -77,13 +98,29 @@ impl Film {
         self.rect
     }
 
-    /// The layers that are kept.
-    #[must_use]
-    pub fn layers(&self) -> &[Layer] {
-        &self.layers
+    /// The layers that are kept, in order.
+    pub fn layers(&self) -> impl ExactSizeIterator<Item = Layer> + '_ {
+        self.layers.iter().map(|(layer, _)| *layer)
     }
 
-    /// Number of iterations.
+    /// Keeps the layers of `techniques` from now on, too.
+    pub(crate) fn keep(&mut self, techniques: TechniqueSet) {
+        for layer in Self::layers_of(techniques) {
+            self.keep_layer(layer);
+        }
+    }
+
+    /// The sums of a layer, which is kept from now on.
+    fn keep_layer(&mut self, layer: Layer) -> &mut Vec<Sum3> {
+        let at = self.layers.binary_search_by_key(&(layer as usize), |(own, _)| *own as usize);
+        let at = at.unwrap_or_else(|at| {
+            self.layers.insert(at, (layer, black(self.rect)));
+            at
+        });
+        &mut self.layers[at].1
+    }
+
+    /// Number of iterations that are there as a whole.
     #[must_use]
     pub fn iterations(&self) -> u64 {
         self.iterations.len()
@@ -95,168 +132,256 @@ impl Film {
         &self.iterations
     }
 
+    /// Iterations that are there in part, with the number of sets of pixels, of 256, that are.
+    #[must_use]
+    pub const fn parts(&self) -> &BTreeMap<u64, u32> {
+        &self.parts
+    }
+
+    /// Whether there is nothing on the film, not even a part of an iteration.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.iterations.is_empty() && self.parts.is_empty()
+    }
+
+    /// The first iteration of which there is something.
+    pub(crate) fn first(&self) -> Option<u64> {
+        let whole = self.iterations.ranges().first().map(|range| range.start);
+        whole.into_iter().chain(self.parts.keys().next().copied()).min()
+    }
+
+    /// The sets of pixels of an iteration that are missing.
+    pub(crate) fn missing(&self, iteration: u64) -> Range<u32> {
+        let whole = self.iterations.count_in(&(iteration..iteration + 1)) > 0;
+        let done = if whole { SETS } else { self.parts.get(&iteration).copied().unwrap_or(0) };
+        done..SETS
+    }
+
+    /// The first iteration that this film and another have both, if only in part.
+    pub(crate) fn overlap(&self, other: &Self) -> Option<Range<u64>> {
+        let part = |a: &Self, b: &Self| {
+            let common = |iteration: &&u64| b.missing(**iteration).start > 0;
+            a.parts.keys().find(common).map(|iteration| *iteration..iteration + 1)
+        };
+        let parts = part(self, other).into_iter().chain(part(other, self));
+        parts.chain(self.iterations.overlap(&other.iterations)).min_by_key(|range| range.start)
+    }
+
     /// Adds an iteration, one value per pixel. Returns how many of the values were not finite or negative; they count as zero.
     ///
     /// # Panics
-    /// If `pixels` has another size than the film, or the film holds the iteration already, or its index is not below
+    /// If `pixels` has another size than the film, or the film holds some of the iteration already, or its index is not below
     /// [`MAX_ITERATIONS`].
     pub fn add(&mut self, iteration: u64, pixels: &[Pixel]) -> u64 {
-        assert_eq!(pixels.len(), self.squares.len(), "an iteration has the film's size");
+        self.add_part(iteration, interleave::ALL, pixels)
+    }
+
+    /// Adds the pixels of some sets: those that follow on what is there of the iteration.
+    pub(crate) fn add_part(&mut self, iteration: u64, sets: Range<u32>, pixels: &[Pixel]) -> u64 {
+        assert_eq!(pixels.len(), self.even.len(), "an iteration has the film's size");
         assert!(iteration < MAX_ITERATIONS, "iteration {iteration}");
-        let range = iteration..iteration + 1;
-        assert_eq!(self.iterations.count_in(&range), 0, "iteration {iteration} is added once");
-        let Self { layers, sums, squares, .. } = self;
-        let dropped = if layers.is_empty() {
-            0
-        } else {
-            sums.par_chunks_mut(layers.len())
-                .zip(squares)
-                .zip(pixels)
-                .with_min_len(256)
-                .map(|((sums, square), pixel)| add_pixel(layers, sums, square, pixel))
-                .sum()
+        assert_eq!(self.missing(iteration).start, sets.start, "iteration {iteration} is added once");
+        let width = self.rect.width as usize;
+        let add = |sums: &mut [Sum3], value: &(dyn Fn(&Pixel) -> ([f64; 3], u64) + Sync)| -> u64 {
+            let rows = sums.par_chunks_mut(width).zip(pixels.par_chunks(width)).enumerate();
+            rows.map(|(y, (sums, pixels))| {
+                let mut dropped = 0;
+                for (x, (own, pixel)) in sums.iter_mut().zip(pixels).enumerate() {
+                    if sets.contains(&set_of(x, y)) {
+                        let (value, left_out) = value(pixel);
+                        sum::add(own, value);
+                        dropped += left_out;
+                    }
+                }
+                dropped
+            })
+            .sum()
         };
-        self.iterations.insert(iteration);
+        let mut dropped = 0;
+        for (layer, sums) in &mut self.layers {
+            dropped += add(sums, &|pixel| usable(pixel[*layer as usize]));
+        }
+        let layers: Vec<_> = self.layers.iter().map(|(layer, _)| *layer as usize).collect();
+        let total = |pixel: &Pixel| {
+            layers.iter().fold([0.0; 3], |total, layer| plus(total, usable(pixel[*layer]).0))
+        };
+        if half(iteration).0 == 0 {
+            add(&mut self.even, &|pixel| (total(pixel), 0));
+        }
+        add(&mut self.squares, &|pixel| (total(pixel).map(|value| value * value), 0));
+        if sets.end == SETS {
+            self.parts.remove(&iteration);
+            self.iterations.insert(iteration);
+        } else {
+            self.parts.insert(iteration, sets.end);
+        }
         dropped
     }
 
-    /// Adds another film of the same size and layers that holds other iterations.
+    /// Adds another film of the same size that holds other iterations.
     pub(crate) fn merge(&mut self, other: &Self) {
-        debug_assert_eq!((self.rect, &self.layers), (other.rect, &other.layers));
-        debug_assert_eq!(self.iterations.overlap(&other.iterations), None);
-        self.sums.par_iter_mut().zip(&other.sums).for_each(|(own, sum)| own.merge(sum));
-        self.squares.par_iter_mut().zip(&other.squares).for_each(|(own, sum)| own.merge(sum));
+        debug_assert_eq!(self.rect, other.rect);
+        debug_assert_eq!(self.overlap(other), None);
+        for (layer, sums) in &other.layers {
+            self.keep_layer(*layer).par_iter_mut().zip(sums).for_each(|(own, other)| sum::merge(own, other));
+        }
+        self.even.par_iter_mut().zip(&other.even).for_each(|(own, other)| sum::merge(own, other));
+        self.squares.par_iter_mut().zip(&other.squares).for_each(|(own, other)| sum::merge(own, other));
         self.iterations.union(&other.iterations);
+        self.parts.extend(&other.parts);
     }
 
-    /// The sums of a row of pixels: those of radiance, then those of squares.
-    pub(crate) fn row(&self, row: usize) -> (&[Sum3], &[Sum3]) {
+    /// The sums of a row of pixels: those of each layer, of the even iterations, of the squares.
+    pub(crate) fn row(&self, row: usize) -> impl Iterator<Item = &Sum3> {
         let width = self.rect.width as usize;
-        let pixels = row * width..(row + 1) * width;
-        let n = self.layers.len();
-        (&self.sums[pixels.start * n..pixels.end * n], &self.squares[pixels])
+        let all = self.layers.iter().map(|(_, sums)| sums).chain([&self.even, &self.squares]);
+        all.flat_map(move |sums| &sums[row * width..(row + 1) * width])
     }
 
-    /// A film from its parts; sums as many as belong to the size.
-    pub(crate) fn from_parts(
+    /// A film without its sums, which [`push_row`](Self::push_row) adds.
+    pub(crate) fn without_sums(
         rect: PixelRect,
         techniques: TechniqueSet,
         iterations: IterationSet,
-        sums: Vec<Sum3>,
-        squares: Vec<Sum3>,
+        parts: BTreeMap<u64, u32>,
     ) -> Self {
-        Self { rect, layers: Self::layers_of(techniques), sums, squares, iterations }
+        let layers = Self::layers_of(techniques).into_iter().map(|layer| (layer, Vec::new())).collect();
+        Self { rect, layers, even: Vec::new(), squares: Vec::new(), iterations, parts }
+    }
+
+    /// The lists of sums, in the order of [`row`](Self::row), to be filled row by row.
+    pub(crate) fn lists(&mut self) -> impl Iterator<Item = &mut Vec<Sum3>> {
+        self.layers.iter_mut().map(|(_, sums)| sums).chain([&mut self.even, &mut self.squares])
     }
 
     /// The mean of all iterations, all layers together.
     #[must_use]
     pub fn image(&self) -> Image {
-        let scale = 1.0 / self.iterations().max(1) as f64;
-        self.collect(|i| self.total(i).map(|v| (v * scale) as f32))
+        self.collect(|i, [even, odd]| self.total(i).map(|v| v / (even + odd)))
     }
 
     /// The mean of one layer, `None` if it is not kept.
     #[must_use]
     pub fn layer(&self, layer: Layer) -> Option<Image> {
-        let at = self.layers.iter().position(|l| *l == layer)?;
-        let scale = 1.0 / self.iterations().max(1) as f64;
-        Some(self.collect(|i| self.sums[i * self.layers.len() + at].values().map(|v| (v * scale) as f32)))
+        let (_, sums) = self.layers.iter().find(|(own, _)| *own == layer)?;
+        Some(self.collect(|i, [even, odd]| sum::values(&sums[i]).map(|v| v / (even + odd))))
     }
 
-    /// The variance of the mean, from the spread of the iterations; infinite with fewer than two.
+    /// The means of the even and of the odd iterations, which are independent of each other. `None` while some pixel has samples of one
+    /// half only.
+    #[must_use]
+    pub fn halves(&self) -> Option<[Image; 2]> {
+        if self.counts().as_flattened().contains(&0.0) {
+            return None;
+        }
+        let even = self.collect(|i, [even, _]| sum::values(&self.even[i]).map(|v| v / even));
+        let odd: u64 = self.collect(|i, [_, odd]| {
+            let (total, even) = (self.total(i), sum::values(&self.even[i]));
+            // Sums are cut off far below their last digits in single precision: so may be their difference, below zero.
+            std::array::from_fn(|c| ((total[c] - even[c]) / odd).max(0.0))
+        });
+        Some([even, odd])
+    }
+
+    /// The variance of the mean, from the spread of the iterations; infinite with fewer than two. Overstates what stratified random
+    /// numbers leave of it, evenly among neighbours; [`error_map`](Self::error_map) does not.
     #[must_use]
     pub fn variance(&self) -> Image {
-        self.collect(|i| self.variance_of_mean(i).map(|v| v as f32))
+        self.collect(|i, [even, odd]| {
+            let n = even + odd;
+            if n < 2.0 {
+                return [f64::INFINITY; 3];
+            }
+            let (total, squares) = (self.total(i), sum::values(&self.squares[i]));
+            std::array::from_fn(|c| {
+                let mean = total[c] / n;
+                ((squares[c] / n - mean * mean) / (n - 1.0)).max(0.0)
+            })
+        })
     }
 
-    /// Estimated error of the image: mean over pixels and channels of `variance / (value² + 0.01)`, the relMSE that a
-    /// comparison with the converged image would give. Does not see bias, and overstates what stratified random numbers
-    /// leave of the variance. Infinite with fewer than two iterations.
+    /// Estimated error of every pixel, from the two halves. `None` while some pixel has samples of one half only.
     #[must_use]
-    pub fn estimated_error(&self) -> f64 {
-        if self.iterations() < 2 || self.squares.is_empty() {
-            return f64::INFINITY;
-        }
-        let scale = 1.0 / self.iterations() as f64;
-        // Pieces of fixed size, added in their order.
-        let pieces: Vec<f64> = (0..self.squares.len())
-            .into_par_iter()
-            .chunks(1024)
-            .map(|pixels| {
-                let error = |i| {
-                    let (total, variance) = (self.total(i), self.variance_of_mean(i));
-                    (0..3).map(|c| variance[c] / ((total[c] * scale).powi(2) + 0.01)).sum::<f64>()
-                };
-                pixels.into_iter().map(error).sum()
-            })
-            .collect();
-        pieces.into_iter().sum::<f64>() / (3 * self.squares.len()) as f64
+    pub fn error_map(&self) -> Option<ErrorMap> {
+        let halves = self.halves()?;
+        // Pixels of a part may have one more.
+        let odd: u64 = self.iterations.ranges().iter().map(|range| range.end / 2 - range.start / 2).sum();
+        let iterations = [self.iterations() - odd, odd];
+        let [even, odd] =
+            [0, 1].map(|i| HalfImage { image: &halves[i].pixels, seen: None, iterations: iterations[i].max(1) });
+        Some(ErrorMap::new(self.rect.width as usize, [even, odd]))
+    }
+
+    /// Estimated error of the image, from the two halves.
+    #[must_use]
+    pub fn estimated_error(&self) -> ErrorEstimate {
+        self.error_map().map_or(ErrorEstimate::UNKNOWN, |map| map.estimate())
     }
 
     /// Mean over the image of each kept layer, relative to the whole, by luminance.
     #[must_use]
     pub fn shares(&self) -> Vec<(Layer, f64)> {
-        let mut sums = vec![0.0; self.layers.len()];
-        for pixel in self.sums.chunks(self.layers.len().max(1)) {
-            for (sum, value) in sums.iter_mut().zip(pixel.iter().map(Sum3::values)) {
-                *sum += 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2];
-            }
-        }
+        let luminance = |sum: &Sum3| {
+            let [r, g, b] = sum::values(sum);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        let sums: Vec<f64> =
+            self.layers.iter().map(|(_, sums)| sums.iter().map(luminance).sum::<f64>()).collect();
         let total: f64 = sums.iter().sum();
         let relative = |sum: f64| if total > 0.0 { sum / total } else { 0.0 };
-        self.layers.iter().zip(sums).map(|(layer, sum)| (*layer, relative(sum))).collect()
+        self.layers().zip(sums).map(|(layer, sum)| (layer, relative(sum))).collect()
     }
 
     fn total(&self, pixel: usize) -> [f64; 3] {
-        let n = self.layers.len();
-        let mut total = [0.0; 3];
-        for sum in &self.sums[pixel * n..(pixel + 1) * n] {
-            for (total, value) in total.iter_mut().zip(sum.values()) {
-                *total += value;
+        self.layers.iter().fold([0.0; 3], |total, (_, sums)| plus(total, sum::values(&sums[pixel])))
+    }
+
+    /// Even and odd iterations of the pixels of each set.
+    pub(crate) fn counts(&self) -> Vec<[f64; 2]> {
+        let even = |end: u64| end.div_ceil(2);
+        let whole = self.iterations.ranges().iter().fold([0, 0], |[evens, odds], range| {
+            let more = even(range.end) - even(range.start);
+            [evens + more, odds + range.end - range.start - more]
+        });
+        let count = |set| {
+            let mut counts = whole;
+            for (iteration, _) in self.parts.iter().filter(|(_, done)| set < **done) {
+                counts[half(*iteration).0] += 1;
             }
-        }
-        total
+            counts.map(|count| count as f64)
+        };
+        (0..SETS).map(count).collect()
     }
 
-    fn variance_of_mean(&self, pixel: usize) -> [f64; 3] {
-        if self.iterations() < 2 {
-            return [f64::INFINITY; 3];
-        }
-        let n = self.iterations() as f64;
-        let (total, squares) = (self.total(pixel), self.squares[pixel].values());
-        std::array::from_fn(|c| {
-            let mean = total[c] / n;
-            ((squares[c] / n - mean * mean) / (n - 1.0)).max(0.0)
-        })
-    }
-
-    fn collect(&self, value: impl Fn(usize) -> [f32; 3]) -> Image {
-        let pixels = (0..self.squares.len()).map(value).collect();
+    /// Picture of what `value` says of a pixel by its index and the counts of its halves; black while there is nothing.
+    fn collect(&self, value: impl Fn(usize, [f64; 2]) -> [f64; 3] + Sync) -> Image {
+        let (counts, width) = (self.counts(), self.rect.width as usize);
+        let place = |i: usize| (i % width, i / width);
+        let count = |(x, y)| counts[set_of(x, y) as usize];
+        let has_samples = |place: &(usize, usize)| count(*place) != [0.0; 2];
+        let pixel = |i| {
+            let own = place(i);
+            let shown = std::iter::once(own).chain(stand_ins(own.0, own.1)).find(has_samples);
+            shown.map_or([0.0; 3], |(x, y)| value(y * width + x, count((x, y))).map(|v| v as f32))
+        };
+        let pixels = (0..self.even.len()).into_par_iter().with_min_len(1024).map(pixel).collect();
         Image { width: self.rect.width, height: self.rect.height, pixels }
     }
 }
 
-/// Adds a pixel of an iteration; returns the number of values that had to be left out.
-fn add_pixel(layers: &[Layer], sums: &mut [Sum3], square: &mut Sum3, pixel: &Pixel) -> u64 {
+fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// A radiance as numbers that a sum takes, and how many had to be left out.
+fn usable(radiance: Spectrum) -> ([f64; 3], u64) {
     let mut dropped = 0;
-    let mut total = [0.0_f64; 3];
-    for (sum, layer) in sums.iter_mut().zip(layers) {
-        // A plan rarely has all techniques.
-        if pixel[*layer as usize].is_black() {
-            continue;
-        }
-        let values = pixel[*layer as usize].to_array().map(|value| {
-            let usable = value >= 0.0 && value.is_finite();
-            dropped += u64::from(!usable);
-            if usable { f64::from(value) } else { 0.0 }
-        });
-        sum.add(values);
-        for (total, value) in total.iter_mut().zip(values) {
-            *total += value;
-        }
-    }
-    square.add(total.map(|value| value * value));
-    dropped
+    let values = radiance.to_array().map(|value| {
+        let usable = value >= 0.0 && value.is_finite();
+        dropped += u64::from(!usable);
+        if usable { f64::from(value) } else { 0.0 }
+    });
+    (values, dropped)
 }
 
 impl Image {
@@ -300,9 +425,9 @@ mod tests {
     }
 
     #[test]
-    fn means_and_variances_are_those_of_the_iterations() {
+    fn means_and_halves_are_those_of_the_iterations() {
         let mut film = Film::new(RECT, TechniqueSet::default());
-        assert!(film.estimated_error().is_infinite());
+        assert!(film.is_empty() && film.estimated_error().relative_mse.is_infinite());
         for (i, value) in [(0, 1.0), (7, 2.0), (3, 6.0)] {
             assert_eq!(film.add(i, &[pixel(value, 1.0), pixel(0.0, 0.0)]), 0);
         }
@@ -310,12 +435,56 @@ mod tests {
         assert_eq!(film.image().pixels[0], [4.0; 3]);
         assert_eq!(film.layer(Layer::Bpt).unwrap().pixels[0], [3.0; 3]);
         assert_eq!(film.layer(Layer::Bp2d), None);
+        let [even, odd] = film.halves().unwrap();
+        assert_eq!([even.pixels[0], odd.pixels[0]], [[2.0; 3], [5.0; 3]]);
         // Sample variance of {2, 3, 7} is 7; of their mean, a third of it.
         assert!((film.variance().pixels[0][0] - 7.0 / 3.0).abs() < 1e-6);
         assert_eq!(film.variance().pixels[1], [0.0; 3]);
         let shares = film.shares();
-        assert_eq!(shares.iter().map(|(l, _)| *l).collect::<Vec<_>>(), film.layers());
+        assert_eq!(shares.iter().map(|(l, _)| *l).collect::<Vec<_>>(), film.layers().collect::<Vec<_>>());
         assert!((shares[0].1 - 0.75).abs() < 1e-12);
+    }
+
+    #[test]
+    fn parts_add_up_to_the_whole() {
+        let rect = PixelRect { x: 1, y: 2, width: 19, height: 17 };
+        let iteration = |i: u32| -> Vec<Pixel> { (0..19 * 17).map(|p| pixel((p * i) as f32, 0.5)).collect() };
+        let mut whole = Film::new(rect, TechniqueSet::default());
+        let mut parted = whole.clone();
+        for i in [4, 7] {
+            whole.add(i.into(), &iteration(i));
+        }
+        parted.add_part(4, 0..1, &iteration(4));
+        // Everything is there, coarsely.
+        let coarse = parted.image();
+        assert_eq!(coarse.pixels[18 * 0 + 15], [0.5; 3]);
+        assert_eq!(coarse.pixels[18], [4.0 * 16.0 + 0.5; 3]);
+        assert_eq!((parted.is_empty(), parted.iterations(), parted.missing(4)), (false, 0, 1..SETS));
+        parted.add_part(7, 0..9, &iteration(7));
+        let mut other = Film::new(rect, TechniqueSet::BPT);
+        other.add_part(7, 0..2, &iteration(7));
+        assert_eq!(parted.overlap(&other), Some(7..8));
+        parted.add_part(4, 1..200, &iteration(4));
+        assert!(parted.halves().is_none());
+        parted.add_part(4, 200..SETS, &iteration(4));
+        // Pixels with both iterations, and with one.
+        assert_eq!(parted.image().pixels[16], [16.0 * 5.5 + 0.5; 3]);
+        assert_eq!(parted.image().pixels[17], [17.0 * 4.0 + 0.5; 3]);
+        parted.add_part(7, 9..SETS, &iteration(7));
+        assert_eq!(parted, whole);
+        assert_eq!(parted.overlap(&whole), Some(4..5));
+    }
+
+    #[test]
+    fn merged_films_have_the_layers_of_both() {
+        let (mut a, mut b) = (Film::new(RECT, TechniqueSet::BPT), Film::new(RECT, TechniqueSet::VOLUME_MERGES));
+        a.add(0, &[pixel(1.0, 0.0); 2]);
+        b.add(1, &[pixel(0.0, 3.0); 2]);
+        a.merge(&b);
+        assert_eq!((a.layers().len(), a.image().pixels[1]), (5, [2.0; 3]));
+        let mut all = Film::new(RECT, TechniqueSet::BPT.with(upbp_estimators::Technique::Surf));
+        all.keep(TechniqueSet::VOLUME_MERGES);
+        assert_eq!(all.layers().collect::<Vec<_>>(), Layer::ALL);
     }
 
     #[test]

@@ -1,12 +1,15 @@
 #![doc = include_str!("../README.md")]
 
 mod adapt;
+mod budget;
 mod census;
 mod choices;
 mod emitters;
 mod engine;
 mod error;
+mod error_estimate;
 mod film;
+mod interleave;
 mod iterations;
 mod memory;
 mod neighbours;
@@ -31,9 +34,11 @@ pub use upbp_media as media;
 
 pub use census::Census;
 pub use error::{OutputError, RenderError, SettingsError, StateError};
+pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap};
 pub use film::{Film, Image, Pixel};
 pub use iterations::{IterationSet, MAX_ITERATIONS};
 pub use output::{Metadata, check_writable, read_exr, remove_leftovers, write_exr, write_png, write_text};
+pub use prepare::{Preparing, Start};
 pub use radius::{Radii, Radius, RadiusSchedule};
 pub use render::Renderer;
 pub use report::{ErrorPoint, ErrorSeries, PassSeconds, Report};

@@ -9,6 +9,30 @@ use upbp_estimators::walk::{LightVertex, PhotonBeam};
 
 use crate::pilot::Pilot;
 
+/// What light sub-paths and their look-ups may take where that must not depend on the machine.
+pub(crate) const LIGHT_BYTES: u64 = 2 << 30;
+
+/// Bytes that a render may take: so many MiB, or half of what the machine has free.
+pub(crate) fn budget(mebibytes: Option<u32>) -> u64 {
+    mebibytes.map_or_else(|| free_bytes().map_or(LIGHT_BYTES, |free| free / 2), |mib| u64::from(mib) << 20)
+}
+
+/// Bytes that a process can still have, by what Linux says of the machine and of the group of processes that it is in; `None` where it
+/// says nothing.
+fn free_bytes() -> Option<u64> {
+    let number = |path: &str| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
+    let machine = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| available(&text));
+    let group = ["/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"].map(number);
+    let group = group[0].zip(group[1]).map(|(most, taken)| most.saturating_sub(taken));
+    machine.into_iter().chain(group).min()
+}
+
+/// The line `MemAvailable` of `/proc/meminfo`, in bytes.
+fn available(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?.checked_mul(1024)
+}
+
 /// What light sub-paths leave in memory, by number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LightCounts {
@@ -66,5 +90,19 @@ impl LightCounts {
         let points = (self.surface + self.medium) * tree;
         let beams = points + self.beams * SEGMENT + self.pieces * (PIECE + CENTRE + PLACED + PIECE_BOXES);
         held + surface.max(medium).max(beams)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_what_is_free_or_what_is_allowed() {
+        let text = "MemTotal:       24576000 kB\nMemFree:          512000 kB\nMemAvailable:   16384000 kB\n";
+        assert_eq!(available(text), Some(16_384_000 * 1024));
+        assert_eq!(available("MemAvailable: lots"), None);
+        assert_eq!(budget(Some(3)), 3 << 20);
+        assert!(budget(None) > 1 << 20);
     }
 }

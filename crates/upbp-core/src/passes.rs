@@ -3,7 +3,7 @@
 //! Work is cut into pieces of fixed size, and what pieces return is put together in their order: a reduction by work stealing
 //! would change the last bits with the schedule.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::Range;
 
 use rayon::prelude::*;
 use upbp_estimators::mis::Densities;
@@ -14,10 +14,14 @@ use upbp_estimators::walk::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, Layer, LightMap, Spectrum, StreamKind};
 
 use crate::film::Pixel;
+use crate::interleave::set_of;
 use crate::memory::LightCounts;
+use crate::stop::Halt;
 
 /// Light sub-paths per piece of work.
 const LIGHT_CHUNK: u32 = 64;
+/// Pixels per piece of work.
+const CAMERA_CHUNK: usize = 64;
 
 /// Lists that are used again in the next iteration: the allocator need not find a use for what was given back to it.
 pub(crate) struct Lists<B, D = f64> {
@@ -31,8 +35,15 @@ impl<B, D> Default for Lists<B, D> {
     }
 }
 
+impl<B, D> Lists<B, D> {
+    /// Those of a map that is no longer needed.
+    pub(crate) fn of(map: LightMap<B, D>) -> Self {
+        Self { vertices: map.vertices, beams: map.beams }
+    }
+}
+
 /// Traces all light sub-paths of the plan into `lists`, and hands their splats over in the order of the sub-paths. `expected` is how many
-/// vertices and beams there will be, as far as anyone knows.
+/// vertices and beams there will be, as far as anyone knows. `None` if it was halted: then lists and splats mean nothing.
 ///
 /// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never more than a
 /// fraction of all in two places.
@@ -41,9 +52,9 @@ pub(crate) fn light_pass<S: Scene, D: Densities>(
     kind: StreamKind,
     expected: &LightCounts,
     lists: &mut Lists<S::Bsdf, D>,
-    cancelled: &AtomicBool,
+    halt: &Halt<'_>,
     mut take_splats: impl FnMut(&[Splat]),
-) -> Counters {
+) -> Option<Counters> {
     let paths = if context.plan.needs_light_paths() { context.plan.light_paths } else { 0 };
     let chunks = paths.div_ceil(LIGHT_CHUNK);
     // Enough for each thread that none waits long for the last one.
@@ -59,16 +70,18 @@ pub(crate) fn light_pass<S: Scene, D: Densities>(
     let _ = lists.beams.try_reserve_exact((1.05 * expected.beams) as usize);
     for start in (0..chunks).step_by(wave as usize) {
         let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
-        buffers.par_iter_mut().enumerate().for_each_init(Scratch::default, |scratch, (i, out)| {
-            if cancelled.load(Ordering::Relaxed) {
-                return;
-            }
+        let trace = |scratch: &mut Scratch<S::Bsdf>, (i, out): (usize, &mut LightChunk<S::Bsdf, D>)| {
             let first = (start + i as u32) * LIGHT_CHUNK;
             let nobody = &mut Nobody::default();
             for index in first..first.saturating_add(LIGHT_CHUNK).min(paths) {
+                if halt.now() {
+                    return None;
+                }
                 trace_light_path(context, kind, index, scratch, out, nobody);
             }
-        });
+            Some(())
+        };
+        buffers.par_iter_mut().enumerate().map_init(Scratch::default, trace).collect::<Option<()>>()?;
         for out in buffers {
             lists.vertices.append(&mut out.vertices);
             lists.beams.append(&mut out.beams);
@@ -77,51 +90,48 @@ pub(crate) fn light_pass<S: Scene, D: Densities>(
             out.splats.clear();
         }
     }
-    counters
+    Some(counters)
 }
 
-/// Traces one camera sub-path per pixel of `rect` and adds it to `pixels`.
+/// Traces one camera sub-path for each pixel of `rect` that belongs to one of `sets`, and adds it to `pixels`. `None` if it was halted: then
+/// the pixels of these sets mean nothing.
 pub(crate) fn camera_pass<S: Scene, D: Densities>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, D>,
     rect: PixelRect,
+    sets: &Range<u32>,
     pixels: &mut [Pixel],
-    cancelled: &AtomicBool,
-) -> Counters {
-    let rows: Vec<Counters> = pixels
-        .par_chunks_mut(rect.width as usize)
-        .enumerate()
-        .map_init(Scratch::default, |scratch, (row, pixels)| {
-            let mut counters = Counters::default();
-            if cancelled.load(Ordering::Relaxed) {
-                return counters;
+    halt: &Halt<'_>,
+) -> Option<Counters> {
+    let width = rect.width as usize;
+    let trace = |scratch: &mut Scratch<S::Bsdf>, (chunk, pixels): (usize, &mut [Pixel])| {
+        let mut counters = Counters::default();
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            let place = chunk * CAMERA_CHUNK + i;
+            let (column, row) = (place % width, place / width);
+            if !sets.contains(&set_of(column, row)) {
+                continue;
             }
-            for (column, pixel) in pixels.iter_mut().enumerate() {
-                let place = [rect.x + column as u32, rect.y + row as u32];
-                // Addressed by the place on the whole film: a crop shows the same samples as the whole picture.
-                let index = u64::from(place[1]) << 32 | u64::from(place[0]);
-                let walk = trace_camera_path(
-                    context,
-                    map,
-                    StreamKind::Camera,
-                    place,
-                    index,
-                    scratch,
-                    &mut counters,
-                    &mut Nobody::default(),
-                );
-                for (sum, value) in pixel.iter_mut().zip(walk.layers) {
-                    *sum += value;
-                }
+            if halt.now() {
+                return None;
             }
-            counters
-        })
-        .collect();
-    let mut counters = Counters::default();
-    for row in &rows {
-        counters.add(row);
-    }
-    counters
+            let place = [rect.x + column as u32, rect.y + row as u32];
+            // Addressed by the place on the whole film: a crop shows the same samples as the whole picture.
+            let index = u64::from(place[1]) << 32 | u64::from(place[0]);
+            let (kind, nobody) = (StreamKind::Camera, &mut Nobody::default());
+            let walk = trace_camera_path(context, map, kind, place, index, scratch, &mut counters, nobody);
+            for (sum, value) in pixel.iter_mut().zip(walk.layers) {
+                *sum += value;
+            }
+        }
+        Some(counters)
+    };
+    let chunks = pixels.par_chunks_mut(CAMERA_CHUNK).enumerate().map_init(Scratch::default, trace);
+    // Integers: the same in whatever order they are added.
+    chunks.try_reduce(Counters::default, |mut sum, counters| {
+        sum.add(&counters);
+        Some(sum)
+    })
 }
 
 /// Adds splats of light tracing, in their order.

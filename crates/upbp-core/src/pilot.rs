@@ -3,8 +3,6 @@
 //! Whatever it finds is fixed before any sample of the image is drawn, so it introduces no bias; it has random streams of its
 //! own, so it is the same for every run of a seed.
 
-use std::sync::atomic::AtomicBool;
-
 use glam::Vec3;
 use rayon::prelude::*;
 use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
@@ -19,10 +17,12 @@ use upbp_estimators::{
 
 use crate::choices::usual_roulette;
 use crate::emitters::pixel;
+use crate::engine::Clock;
 use crate::memory::LightCounts;
 use crate::neighbours::{Nearest, Neighbours, median};
 use crate::passes::{Lists, light_pass};
 use crate::settings::CheckedSettings;
+use crate::stop::Halt;
 
 /// Light sub-paths of the pilot: of a first, quick one, and at most of the one that counts,
 pub(crate) const LIGHT_PATHS: [u32; 2] = [1024, 8192];
@@ -44,6 +44,8 @@ const CORRELATION_ANGLE: f32 = 0.07;
 /// What the pilot found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Pilot {
+    /// Wall seconds per light sub-path, with all threads at work: for limits of time, which are kept by the clock.
+    pub(crate) light_path_seconds: f64,
     /// Connectible vertices per light sub-path.
     pub(crate) vertices_per_path: f64,
     /// Of them those on surfaces that are looked up,
@@ -71,13 +73,16 @@ pub(crate) struct Pilot {
     pub(crate) bb1d: Option<Neighbours>,
 }
 
-/// Runs a pilot with at most so many light sub-paths.
+/// Runs a pilot with at most so many light sub-paths, or a part of them and of the camera sub-paths. `None` if it was halted.
 pub(crate) fn run<S: Scene>(
     world: &World<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
     most_light_paths: u32,
-) -> Pilot {
+    part: f64,
+    halt: &Halt<'_>,
+) -> Option<Pilot> {
+    let most_light_paths = (part * f64::from(most_light_paths)).ceil() as u32;
     let nominal = 1e-3 * world.bounds.radius;
     let plan_with = |light_paths| {
         let choices = PlanChoices {
@@ -111,14 +116,17 @@ pub(crate) fn run<S: Scene>(
     let mut light = Lists::default();
     let few = most_light_paths.min(LIGHT_PATHS[0]);
     let mut plan = plan_with(few);
-    trace_light(world, &plan, &mut light);
+    let mut clock = Clock::start();
+    trace_light(world, &plan, &mut light, halt)?;
     let enough = VERTICES / light.vertices.len().max(1) as f64 * f64::from(few);
     let light_paths = (enough as u32).min(most_light_paths);
     if light_paths > few {
         plan = plan_with(light_paths);
-        trace_light(world, &plan, &mut light);
+        clock.lap();
+        trace_light(world, &plan, &mut light, halt)?;
     }
-    let mut queries = camera_queries(world, &plan);
+    let light_time = clock.lap();
+    let mut queries = camera_queries(world, &plan, (part * CAMERA_PATHS as f64).ceil() as u64, halt)?;
     let beam_paths = f64::from(plan.beam_paths);
     let paths = f64::from(plan.light_paths);
     let near = first_paths(&light.vertices, paths);
@@ -138,7 +146,8 @@ pub(crate) fn run<S: Scene>(
     let wanted = |technique, found: &dyn Fn() -> Option<Neighbours>| {
         plan.techniques.has(technique).then(found).flatten()
     };
-    Pilot {
+    Some(Pilot {
+        light_path_seconds: light_time.as_secs_f64() / paths,
         vertices_per_path: light.vertices.len() as f64 / paths,
         footprint: median(&mut queries.footprints).unwrap_or(0.0),
         correlation_radius: median(&mut queries.distances)
@@ -172,12 +181,17 @@ pub(crate) fn run<S: Scene>(
         bb1d: near_beams.of(&queries.edges, light.beams.len(), 1.0, |edge, radius, found| {
             beams.around_ray(edge, radius, |(), approach| found(approach.distance));
         }),
-    }
+    })
 }
 
-fn trace_light<S: Scene>(world: &World<'_, S>, plan: &Plan, lists: &mut Lists<S::Bsdf>) {
+fn trace_light<S: Scene>(
+    world: &World<'_, S>,
+    plan: &Plan,
+    lists: &mut Lists<S::Bsdf>,
+    halt: &Halt<'_>,
+) -> Option<Counters> {
     let (context, expected) = (Context { world, plan }, LightCounts::default());
-    light_pass(&context, StreamKind::PilotLight, &expected, lists, &AtomicBool::new(false), |_| ());
+    light_pass(&context, StreamKind::PilotLight, &expected, lists, halt, |_| ())
 }
 
 /// The vertices of the first light sub-paths, and how many sub-paths those are.
@@ -245,24 +259,32 @@ impl<B> Observer<B> for Queries {
     }
 }
 
-fn camera_queries<S: Scene>(world: &World<'_, S>, plan: &Plan) -> Queries {
+fn camera_queries<S: Scene>(
+    world: &World<'_, S>,
+    plan: &Plan,
+    paths: u64,
+    halt: &Halt<'_>,
+) -> Option<Queries> {
     use upbp_estimators::scene::Camera;
     let crop = world.scene.camera().crop();
     let context = Context { world, plan };
     let map = LightMap::empty();
-    let pieces: Vec<Queries> = (0..CAMERA_PATHS.div_ceil(CHUNK))
+    let pieces: Vec<Queries> = (0..paths.div_ceil(CHUNK))
         .into_par_iter()
         .map_init(Scratch::default, |scratch, chunk| {
             let mut queries = Queries::default();
-            for index in chunk * CHUNK..(chunk + 1) * CHUNK {
+            for index in chunk * CHUNK..((chunk + 1) * CHUNK).min(paths) {
+                if halt.now() {
+                    return None;
+                }
                 let (kind, pixel) = (StreamKind::PilotCamera, pixel(crop, index));
                 let counters = &mut Counters::default();
                 let observer: &mut DynObserver<'_, S::Bsdf> = &mut queries;
                 trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);
             }
-            queries
+            Some(queries)
         })
-        .collect();
+        .collect::<Option<_>>()?;
     let mut queries = Queries::default();
     for piece in pieces {
         queries.surfaces.extend(piece.surfaces);
@@ -274,7 +296,7 @@ fn camera_queries<S: Scene>(world: &World<'_, S>, plan: &Plan) -> Queries {
     thin(&mut queries.surfaces);
     thin(&mut queries.media);
     thin(&mut queries.edges);
-    queries
+    Some(queries)
 }
 
 /// Keeps `QUERIES` elements, evenly.

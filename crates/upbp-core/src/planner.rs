@@ -6,6 +6,7 @@ use upbp_estimators::scene::Scene;
 use upbp_estimators::{Technique, TechniqueSet, World};
 
 use crate::adapt::{self, roulette};
+use crate::budget::Budget;
 use crate::census::Census;
 use crate::choices::{BEAMS, correlation, plan};
 use crate::emitters;
@@ -25,13 +26,14 @@ pub(crate) struct Planner {
 }
 
 impl Planner {
-    /// The stage that follows from a review.
+    /// The stage that follows from a review, with what time there is for it.
     pub(crate) fn stage<S: Scene>(
         &self,
         world: &World<'_, S>,
         census: &Census,
         pilot: &Pilot,
         review: u32,
+        budget: &Budget<'_>,
     ) -> Stage {
         let Self { settings, everything, .. } = self;
         if everything.techniques.without(TechniqueSet::PT).is_empty() {
@@ -51,7 +53,7 @@ impl Planner {
             most_paths: emitters::light_paths(pilot.vertices_per_path),
             timed: !settings.deterministic,
         };
-        let candidate = adapt::choose(world, &choice, review);
+        let candidate = adapt::choose(world, &choice, review, budget);
         let count = |planned: u32, factor: f64| ((f64::from(planned) * factor) as u32).max(1);
         let light_paths =
             if candidate.needs_light() { count(everything.light_paths, candidate.light_paths) } else { 0 };

@@ -3,22 +3,23 @@
 use std::time::Instant;
 
 use upbp_estimators::scene::{Camera, EmitterId, Scene};
-use upbp_estimators::{Technique, TechniqueSet, World};
+use upbp_estimators::{LightMap, Technique, TechniqueSet, World};
 
+use crate::budget::Budget;
 use crate::census::Census;
 use crate::choices::{self, everything, stage};
 use crate::emitters::{self, EmitterChoices};
-use crate::engine::{Engine, SceneEngine};
+use crate::engine::{Engine, Map, SceneEngine};
 use crate::error::RenderError;
 use crate::film::Film;
-use crate::memory::LightCounts;
-use crate::passes::Lists;
+use crate::memory::{self, LightCounts};
 use crate::pilot::{self, Pilot};
 use crate::planner::Planner;
 use crate::report::PassTimes;
 use crate::settings::CheckedSettings;
 use crate::stage::{RenderPlan, Stage};
 use crate::state::{Identity, Record, State, fingerprint};
+use crate::stop::{Canceller, Halt};
 use crate::techniques::Techniques;
 
 /// A render that has not begun.
@@ -26,16 +27,58 @@ pub(crate) struct Prepared<'a> {
     pub(crate) engine: Box<dyn Engine + 'a>,
     /// None if the plan is given.
     pub(crate) planner: Option<Planner>,
+    pub(crate) canceller: Canceller,
     pub(crate) state: State,
 }
 
+/// How a render begins, besides its scene and settings.
+#[derive(Default)]
+pub struct Start<'a> {
+    /// A plan that was made before, perhaps on another machine, and does not change. `None` for one that is made now.
+    pub plan: Option<RenderPlan>,
+    /// Stops the preparation, and the render after it.
+    pub canceller: Canceller,
+    /// Seconds that the whole render may take. The preparation takes a twentieth at most, unless that is too little to learn anything, and
+    /// chooses so few light sub-paths that there are several iterations; if choices are to be
+    /// [deterministic](crate::Settings::deterministic), neither. The render itself ends by [`Stop`](crate::Stop).
+    pub seconds: Option<f64>,
+    /// Is told what comes next, before each step of the preparation.
+    pub progress: Option<&'a mut (dyn FnMut(Preparing) + Send)>,
+}
+
+/// A step of the preparation of a render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preparing {
+    /// What is done now.
+    pub step: &'static str,
+    /// Part of the steps that are done, in `[0, 1)`.
+    pub fraction: f64,
+}
+
+/// Part of the render's time that the preparation may take.
+const TIME: f64 = 0.05;
+/// Part of the preparation's time that measuring emitters may take, and looking around for radii; the rest is for the choice of techniques.
+const TIME_FOR_EMITTERS: f64 = 0.3;
+const TIME_FOR_RADII: f64 = 0.2;
+/// Part of the render's time that the light sub-paths of an iteration may take.
+const LIGHT_TIME: f64 = 0.05;
+
 /// Takes the census, runs the pilot, and makes a plan, unless one is given.
-pub(crate) fn prepare<S: Scene>(
-    scene: &S,
+pub(crate) fn prepare<'a, S: Scene>(
+    scene: &'a S,
     settings: CheckedSettings,
-    frozen: Option<RenderPlan>,
-) -> Result<Prepared<'_>, RenderError> {
+    begin: Start<'_>,
+) -> Result<Prepared<'a>, RenderError> {
     let start = Instant::now();
+    let Start { plan: frozen, canceller, seconds, mut progress } = begin;
+    let seconds = seconds.filter(|_| !settings.deterministic);
+    let budget = Budget::new(&canceller, seconds.map(|seconds| TIME * seconds));
+    let mut tell = |step, fraction| {
+        if let Some(progress) = &mut progress {
+            progress(Preparing { step, fraction });
+        }
+        if canceller.is_cancelled() { Err(RenderError::Cancelled) } else { Ok(()) }
+    };
     let mut world = World::new(scene)?;
     let census = Census::take(&world, settings.techniques.candidates(), settings.max_length);
     let techniques = census.techniques;
@@ -49,30 +92,37 @@ pub(crate) fn prepare<S: Scene>(
         });
     }
     let rect = scene.camera().crop();
-    let budget = u64::from(settings.memory) << 20;
+    let memory = memory::budget(settings.memory);
     let film_bytes = Film::memory_bytes(rect, techniques);
     // Light vertices have gone when an image is written.
     let output_bytes = Film::output_bytes(rect, techniques);
-    if film_bytes + output_bytes > budget {
+    if film_bytes + output_bytes > memory {
         return Err(RenderError::Memory {
             width: rect.width,
             height: rect.height,
             needed: (film_bytes + output_bytes).div_ceil(1 << 20),
-            budget: u64::from(settings.memory),
+            budget: memory >> 20,
         });
     }
+    let light_bytes = match settings.memory {
+        // What is free now says nothing of other machines.
+        None if settings.deterministic => memory::LIGHT_BYTES,
+        _ => memory - film_bytes,
+    };
     let without_pilot: TechniqueSet =
         [Technique::Hit, Technique::Nee, Technique::LightTracing].into_iter().collect();
-    let look = |world: &World<'_, S>, light_paths| {
-        if techniques.without(without_pilot).is_empty() {
-            Pilot::default()
-        } else {
-            pilot::run(world, &settings, techniques, light_paths)
+    let look = |world: &World<'_, S>, light_paths, part| {
+        let only_light_tracing = techniques.without(without_pilot).is_empty();
+        if only_light_tracing && !(seconds.is_some() && techniques.has(Technique::LightTracing)) {
+            return Ok(Pilot::default());
         }
+        let run = |part, halt: &Halt<'_>| pilot::run(world, &settings, techniques, light_paths, part, halt);
+        budget.part(part).largest(true, run).ok_or(RenderError::Cancelled)
     };
     let [few, many] = pilot::LIGHT_PATHS;
-    let emitters = (scene.emitters().len() > 1).then(|| {
-        let pilot = look(&world, few);
+    tell("measuring lights", 0.0)?;
+    let measure = || -> Result<_, RenderError> {
+        let pilot = look(&world, few, 0.2 * TIME_FOR_EMITTERS)?;
         let light_paths = emitters::light_paths_for(scene.emitters().len(), pilot.vertices_per_path);
         let plan = |techniques| {
             let stage = stage(&world, &settings, techniques, &pilot, [light_paths, light_paths / 8]);
@@ -82,8 +132,11 @@ pub(crate) fn prepare<S: Scene>(
         let camera = techniques.intersection(TechniqueSet::PT);
         let may_be_alone = matches!(settings.techniques, Techniques::Auto) && camera != techniques;
         let alone = may_be_alone.then(|| plan(camera));
-        EmitterChoices::measure(&world, &plan(techniques), alone.as_ref())
-    });
+        let budget = budget.part(0.8 * TIME_FOR_EMITTERS);
+        EmitterChoices::measure(&world, &plan(techniques), alone.as_ref(), &budget)
+            .ok_or(RenderError::Cancelled)
+    };
+    let emitters = if scene.emitters().len() > 1 { Some(measure()?) } else { None };
     let mut probabilities = Vec::new();
     // With light sub-paths last: the pilot and trials have some.
     for has_light_paths in [false, true] {
@@ -95,28 +148,41 @@ pub(crate) fn prepare<S: Scene>(
             probabilities.extend(chosen.map(f32::to_le_bytes).as_flattened());
         }
     }
-    let pilot = look(&world, many);
+    tell("looking around", TIME_FOR_EMITTERS)?;
+    let pilot = look(&world, many, TIME_FOR_RADII)?;
     let pixels = rect.width.saturating_mul(rect.height);
     for stage in frozen.iter().flat_map(RenderPlan::stages) {
         let counts = LightCounts::expected(&pilot, stage.light_paths, stage.beam_paths);
         let needed = film_bytes + counts.peak_bytes::<S::Bsdf>(stage.correlation.is_some()) as u64;
-        if needed > budget {
+        if needed > memory {
             return Err(RenderError::PlanMemory {
                 from: stage.from,
                 needed: needed.div_ceil(1 << 20),
-                budget: u64::from(settings.memory),
+                budget: memory >> 20,
             });
         }
     }
-    let everything = everything(&world, &settings, techniques, &pilot, pixels, budget - film_bytes);
-    let planner = Planner { settings: settings.clone(), everything, bytes: budget - film_bytes };
+    let most = match seconds {
+        // A quick look need not wait for a light sub-path per pixel.
+        Some(seconds) if pilot.light_path_seconds > 0.0 => {
+            ((LIGHT_TIME * seconds / pilot.light_path_seconds) as u32).clamp(1, pixels)
+        }
+        _ => pixels,
+    };
+    let everything = everything(&world, &settings, techniques, &pilot, most, light_bytes);
+    let planner = Planner { settings: settings.clone(), everything, bytes: light_bytes };
+    tell("choosing techniques", TIME_FOR_EMITTERS + TIME_FOR_RADII)?;
     let (plan, planner) = match (frozen, settings.techniques) {
         (Some(plan), _) => (plan, None),
         (None, Techniques::Auto) => {
-            (RenderPlan::new(planner.stage(&world, &census, &pilot, 0)), Some(planner))
+            let budget = budget.part(1.0 - TIME_FOR_EMITTERS - TIME_FOR_RADII);
+            (RenderPlan::new(planner.stage(&world, &census, &pilot, 0, &budget)), Some(planner))
         }
         (None, Techniques::Set(_)) => (RenderPlan::new(planner.everything), None),
     };
+    if canceller.is_cancelled() {
+        return Err(RenderError::Cancelled);
+    }
     let identity = Identity {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scene: String::new(),
@@ -128,7 +194,7 @@ pub(crate) fn prepare<S: Scene>(
         emitters: fingerprint(&probabilities),
         plan,
     };
-    let film = Film::new(rect, techniques);
+    let film = Film::new(rect, identity.plan.techniques());
     let mut record =
         Record { times: PassTimes { pilot: start.elapsed(), ..PassTimes::default() }, ..Record::default() };
     let first = identity.plan.stage(0);
@@ -140,10 +206,10 @@ pub(crate) fn prepare<S: Scene>(
             world,
             emitters,
             pilot,
-            lists: Lists::default(),
-            lists_apart: Lists::default(),
+            map: Map::Plain(LightMap::empty()),
         }),
         planner,
+        canceller,
         state: State { identity, record, film },
     })
 }

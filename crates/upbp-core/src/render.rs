@@ -1,27 +1,26 @@
 //! The scheduler: iterations, each a plan and three passes, until a rule says stop.
 
 use std::ops::{ControlFlow, Range};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use upbp_estimators::Plan;
 use upbp_estimators::scene::Scene;
+use upbp_estimators::{Counters, Plan};
 
 use crate::adapt;
 use crate::census::Census;
-use crate::engine::Engine;
+use crate::engine::{Clock, Engine};
 use crate::error::{RenderError, StateError};
+use crate::error_estimate::{ErrorEstimate, is_due};
 use crate::film::{Film, Pixel};
 use crate::iterations::MAX_ITERATIONS;
 use crate::passes::BLACK;
 use crate::planner::Planner;
-use crate::prepare::{Prepared, prepare};
+use crate::prepare::{Prepared, Start, prepare};
 use crate::report::{ErrorPoint, PassTimes, Report};
 use crate::settings::CheckedSettings;
-use crate::stage::{RenderPlan, Stage};
+use crate::stage::Stage;
 use crate::state::{Identity, State, fingerprint};
-use crate::stop::{Canceller, Outcome, Progress, Stop, StopReason};
+use crate::stop::{Canceller, Halt, Outcome, Progress, Stop, StopReason};
 
 /// A render of one scene.
 ///
@@ -35,7 +34,11 @@ pub struct Renderer<'a> {
     /// The iterations that are rendered.
     range: Range<u64>,
     pixels: Vec<Pixel>,
-    cancelled: Arc<AtomicBool>,
+    /// How long the camera sub-paths of a set of pixels took, if known.
+    set_time: Option<Duration>,
+    /// As it was when it was last due.
+    estimated_error: ErrorEstimate,
+    canceller: Canceller,
 }
 
 /// A renderer may go to another thread.
@@ -52,30 +55,31 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// A scene whose bounds, powers or crop make no sense, or a film that exceeds the memory budget.
     pub fn new<S: Scene>(scene: &'a S, settings: CheckedSettings) -> Result<Self, RenderError> {
-        Ok(Self::begin(prepare(scene, settings, None)?))
+        Self::start(scene, settings, Start::default())
     }
 
-    /// As [`new`](Self::new), but with a plan that was made before, perhaps on another machine, and does not change.
+    /// As [`new`](Self::new), with more to say: a plan that was made before, a time limit, a handle that stops the preparation too.
     ///
     /// # Errors
-    /// As `new`; or the plan has techniques that the settings or the scene rule out, or exceeds the memory budget.
-    pub fn with_plan<S: Scene>(
+    /// As `new`; or the plan has techniques that the settings or the scene rule out, or exceeds the memory budget; or it was cancelled.
+    pub fn start<S: Scene>(
         scene: &'a S,
         settings: CheckedSettings,
-        plan: RenderPlan,
+        start: Start<'_>,
     ) -> Result<Self, RenderError> {
-        Ok(Self::begin(prepare(scene, settings, Some(plan))?))
+        Ok(Self::begin(prepare(scene, settings, start)?))
     }
 
-    fn begin(Prepared { engine, planner, state }: Prepared<'a>) -> Self {
-        let rect = state.film.rect();
+    fn begin(Prepared { engine, planner, canceller, state }: Prepared<'a>) -> Self {
         Self {
             engine,
             planner,
             state,
             range: 0..MAX_ITERATIONS,
-            pixels: vec![BLACK; rect.width as usize * rect.height as usize],
-            cancelled: Arc::default(),
+            pixels: Vec::new(),
+            set_time: None,
+            estimated_error: ErrorEstimate::UNKNOWN,
+            canceller,
         }
     }
 
@@ -125,38 +129,70 @@ impl<'a> Renderer<'a> {
         self.engine.plan(settings, stages.stage(iteration), iteration)
     }
 
-    /// Makes the plan for all iterations up to this one.
-    fn plan_up_to(&mut self, iteration: u64) {
+    /// Makes the plan for all iterations up to this one, in so many seconds each time.
+    fn plan_up_to(&mut self, iteration: u64, seconds: Option<f64>) {
         let Some(planner) = &self.planner else { return };
-        let Identity { census, plan, .. } = &mut self.state.identity;
+        let Identity { census, plan, settings, .. } = &mut self.state.identity;
+        let seconds = seconds.filter(|_| !settings.deterministic);
         let start = Instant::now();
         while let Some(from) = adapt::REVIEWS.get(plan.stages().len()).filter(|from| **from <= iteration) {
             let review = plan.stages().len() as u32;
-            plan.push(Stage { from: *from, ..self.engine.stage(planner, census, review) });
+            let stage = self.engine.stage(planner, census, review, &self.canceller, seconds);
+            plan.push(Stage { from: *from, ..stage });
         }
         let times = PassTimes { pilot: start.elapsed(), ..PassTimes::default() };
+        self.state.film.keep(plan.techniques());
         self.state.record.times.add(&times);
     }
 
-    /// Renders the next iteration: the first of the [range](Self::set_range) that is not on the film yet. `false` if there
-    /// is none, or if it was cancelled: then it is as if it had not begun.
+    /// Renders the next iteration: the first of the [range](Self::set_range) that is not on the film yet, or what is missing of it. `false`
+    /// if there is none, or if it was cancelled: then some of it may be on the film.
     pub fn iterate(&mut self) -> bool {
+        self.iterate_until(None, None)
+    }
+
+    /// As [`iterate`](Self::iterate), but ends at a time, too.
+    fn iterate_until(&mut self, deadline: Option<Instant>, review_seconds: Option<f64>) -> bool {
+        /// Sets of pixels that are traced together take about so long: what is lost when a render is stopped.
+        const PORTION: Duration = Duration::from_millis(200);
         let Some(iteration) = self.next_iteration() else { return false };
-        self.plan_up_to(iteration);
+        self.plan_up_to(iteration, review_seconds);
         let plan = self.plan(iteration);
+        let halt = Halt { canceller: &self.canceller, deadline };
         let State { record, film, .. } = &mut self.state;
-        let Some(mut done) = self.engine.iterate(&plan, film.rect(), &mut self.pixels, &self.cancelled)
-        else {
-            return false;
-        };
-        let start = Instant::now();
-        done.counters.dropped += film.add(iteration, &self.pixels);
-        done.times.film = start.elapsed();
-        // What a state file says may be of any size: sums that saturate.
-        record.counters.add(&done.counters);
-        record.times.add(&done.times);
-        record.map_bytes = record.map_bytes.max(done.map_bytes);
-        true
+        let rect = film.rect();
+        self.pixels.resize(rect.width as usize * rect.height as usize, BLACK);
+        let Some(light) = self.engine.trace_light(&plan, rect, &mut self.pixels, &halt) else { return false };
+        let missing = film.missing(iteration);
+        let (mut counters, mut times) = (light.counters, light.times);
+        if missing.start > 0 {
+            // Counted when the iteration was begun.
+            counters = Counters::default();
+        }
+        let mut clock = Clock::start();
+        let mut done = missing.start;
+        while done < missing.end {
+            let fit = self.set_time.map_or(1.0, |time| PORTION.as_secs_f64() / time.as_secs_f64().max(1e-9));
+            let sets = done..done.saturating_add((fit as u32).max(1)).min(missing.end);
+            // There is always a picture, however late.
+            let halt = if film.is_empty() && done == 0 { Halt { deadline: None, ..halt } } else { halt };
+            let traced = self.engine.trace_camera(&plan, rect, &sets, &mut self.pixels, &halt);
+            let time = clock.lap();
+            times.camera += time;
+            let Some(own) = traced else { break };
+            counters.add(&own);
+            self.set_time = Some(time / sets.len() as u32);
+            done = sets.end;
+        }
+        if done > missing.start {
+            counters.dropped += film.add_part(iteration, missing.start..done, &self.pixels);
+            times.film = clock.lap();
+            // What a state file says may be of any size: sums that saturate.
+            record.counters.add(&counters);
+        }
+        record.times.add(&times);
+        record.map_bytes = record.map_bytes.max(light.map_bytes);
+        done == missing.end
     }
 
     fn next_iteration(&self) -> Option<u64> {
@@ -182,19 +218,22 @@ impl<'a> Renderer<'a> {
         stop: &Stop,
         mut progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Outcome {
+        self.estimate_error();
         loop {
             if let Some(reason) = self.reason_to_stop(stop) {
                 return Outcome { reason };
             }
-            if !self.iterate() {
-                return Outcome { reason: StopReason::Cancelled };
+            if !self.iterate_until(self.deadline(stop), stop.seconds.map(|seconds| 0.05 * seconds)) {
+                let cancelled = self.canceller.is_cancelled();
+                return Outcome { reason: if cancelled { StopReason::Cancelled } else { StopReason::Time } };
             }
+            self.estimate_error();
             let film = &self.state.film;
             let now = Progress {
                 iterations: film.iterations(),
                 seconds: self.seconds(),
                 fraction: self.fraction(stop),
-                estimated_error: film.estimated_error(),
+                estimated_error: self.estimated_error,
                 state: &self.state,
                 film,
             };
@@ -204,25 +243,41 @@ impl<'a> Renderer<'a> {
         }
     }
 
+    /// When an iteration that begins now has to end.
+    fn deadline(&self, stop: &Stop) -> Option<Instant> {
+        let limit = stop.seconds?;
+        let patience = (0.05 * limit).max(1.0);
+        let left = limit + patience - self.seconds();
+        // However long the preparation took, there is a picture.
+        let left = left.max(if self.state.film.is_empty() { patience } else { 0.0 });
+        // What is longer than a clock can tell is no limit.
+        Instant::now().checked_add(Duration::try_from_secs_f64(left).ok()?)
+    }
+
     fn reason_to_stop(&self, stop: &Stop) -> Option<StopReason> {
         let done = self.state.film.iterations();
         if self.next_iteration().is_none() || stop.iterations.is_some_and(|limit| done >= limit) {
             return Some(StopReason::Iterations);
         }
-        if let Some(limit) = stop.seconds
-            && done > 0
-        {
+        if let Some(limit) = stop.seconds {
             let elapsed = self.seconds();
-            let one = (elapsed - self.state.record.times.pilot.as_secs_f64()) / done as f64;
-            if elapsed + 0.5 * one > limit {
+            let one = (elapsed - self.state.record.times.pilot.as_secs_f64()) / done.max(1) as f64;
+            if elapsed >= limit && !self.state.film.is_empty() || done > 0 && elapsed + 0.5 * one > limit {
                 return Some(StopReason::Time);
             }
         }
-        // The estimate of the error is itself noisy: a few iterations first.
-        if done >= 4 && stop.error.is_some_and(|limit| self.state.film.estimated_error() <= limit) {
-            return Some(StopReason::Error);
+        let reached = |target| is_due(done) && self.estimated_error.reached(target);
+        stop.error.is_some_and(reached).then_some(StopReason::Error)
+    }
+
+    /// Estimates the error when a stop rule asks for it, and while hardly anything is known, for those who watch.
+    fn estimate_error(&mut self) {
+        /// Iterations of which each is looked at.
+        const FIRST: u64 = 8;
+        let done = self.state.film.iterations();
+        if done < FIRST || is_due(done) {
+            self.estimated_error = self.state.film.estimated_error();
         }
-        None
     }
 
     fn fraction(&self, stop: &Stop) -> f64 {
@@ -233,14 +288,14 @@ impl<'a> Renderer<'a> {
             stop.iterations.map_or(0.0, |limit| film.iterations() as f64 / limit.max(1) as f64);
         let by_time = stop.seconds.map_or(0.0, |limit| self.seconds() / limit);
         // The relMSE falls with the number of iterations.
-        let by_error = stop.error.map_or(0.0, |limit| limit / film.estimated_error());
+        let by_error = stop.error.map_or(0.0, |limit| limit / self.estimated_error.high);
         by_range.max(by_iterations).max(by_time).max(by_error).clamp(0.0, 1.0)
     }
 
     /// A handle that stops the render from any thread.
     #[must_use]
     pub fn canceller(&self) -> Canceller {
-        Canceller(Arc::clone(&self.cancelled))
+        self.canceller.clone()
     }
 
     /// Adds a point to the report's series of errors.

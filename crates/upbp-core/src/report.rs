@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use upbp_estimators::{Counters, Technique};
 
 use crate::census::Census;
+use crate::error_estimate::ErrorEstimate;
 use crate::iterations::IterationSet;
 use crate::stage::RenderPlan;
 use crate::state::State;
@@ -143,8 +144,8 @@ pub struct Report {
     pub map_bytes: u64,
     /// Bytes that the render was expected to need: the film, and an iteration or the writing of an image.
     pub expected_bytes: u64,
-    /// Estimated relMSE of the image; `None` with fewer than two iterations.
-    pub estimated_error: Option<f64>,
+    /// Estimated relMSE of the image, without the bias of kernels and light that no technique finds; `None` before there are two halves.
+    pub estimated_error: Option<ErrorEstimate>,
     /// Error against a reference over time, if there is one.
     pub series: ErrorSeries,
 }
@@ -155,7 +156,7 @@ impl Report {
         let last = film.iteration_set().last().unwrap_or(0);
         let stage = identity.plan.stage(last);
         let radii = stage.radii.kernels(last);
-        let error = film.estimated_error();
+        let error = film.error_map().map(|map| map.estimate());
         Self {
             version: identity.version.clone(),
             census: identity.census.clone(),
@@ -180,7 +181,7 @@ impl Report {
             shares: film.shares().into_iter().map(|(layer, share)| (layer.name(), share)).collect(),
             map_bytes: record.map_bytes,
             expected_bytes: record.expected_bytes,
-            estimated_error: error.is_finite().then_some(error),
+            estimated_error: error,
             series: record.series.clone(),
         }
     }
@@ -227,7 +228,7 @@ impl fmt::Display for Report {
         }
         writeln!(f)?;
         match self.estimated_error {
-            Some(error) => writeln!(f, "estimated relMSE: {error:.3e}")?,
+            Some(error) => writeln!(f, "estimated relMSE: {error}")?,
             None => writeln!(f, "estimated relMSE: unknown before the second iteration")?,
         }
         if c.cut_walks > 0 {

@@ -63,8 +63,9 @@ pub struct Settings {
     pub radii: Radii,
     /// Whether radii shrink, so that the result converges.
     pub progressive: bool,
-    /// Memory for light vertices, beams, look-up structures and the film, MiB.
-    pub memory: u32,
+    /// Memory for light vertices, beams, look-up structures and the film, MiB; `None` for half of what the machine has free. If choices
+    /// are [deterministic](Self::deterministic), light vertices, beams and look-ups then take at most 2048 MiB on any machine.
+    pub memory: Option<u32>,
 }
 
 impl Default for Settings {
@@ -87,7 +88,7 @@ impl Default for Settings {
             correlation: false,
             radii: Radii::default(),
             progressive: true,
-            memory: 2048,
+            memory: None,
         }
     }
 }
@@ -148,7 +149,7 @@ impl Settings {
                 format!("{} with min_length {}", self.max_length, self.min_length),
             );
         }
-        if self.memory == 0 {
+        if self.memory == Some(0) {
             return refuse("memory", "at least 1 MiB", "0".into());
         }
         for (name, radius) in [

@@ -123,6 +123,12 @@ impl RenderPlan {
         &self.stages
     }
 
+    /// The techniques of all stages.
+    #[must_use]
+    pub fn techniques(&self) -> TechniqueSet {
+        self.stages.iter().flat_map(|stage| stage.techniques.iter()).collect()
+    }
+
     /// What an iteration runs, as far as it has been decided.
     #[must_use]
     pub fn stage(&self, iteration: u64) -> &Stage {

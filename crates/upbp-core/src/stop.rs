@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
+use crate::error_estimate::ErrorEstimate;
 use crate::film::Film;
 use crate::state::State;
 
@@ -11,9 +13,11 @@ use crate::state::State;
 pub struct Stop {
     /// When the film holds this many iterations.
     pub iterations: Option<u64>,
-    /// After this many seconds of rendering, those before a resumption included: at the end of the iteration that comes closest.
+    /// After this many seconds of rendering, those before a resumption and those of the pilot included: at the end of the iteration that
+    /// comes closest, or in the middle of one that would take longer than a twentieth more, or than one second more if that is more.
     pub seconds: Option<f64>,
-    /// When [`Film::estimated_error`] is below this, after at least four iterations.
+    /// When the upper end of [`Film::estimated_error`] is not above this. Asked after 8, 10, 12, 14, 16, 20, 24, 28, 32, 40 iterations and
+    /// so on: who asks after each stops at the luckiest answer.
     pub error: Option<f64>,
 }
 
@@ -37,14 +41,37 @@ pub struct Outcome {
     pub reason: StopReason,
 }
 
-/// Stops a render from any thread: the iteration in hand ends as soon as possible and leaves no trace.
-#[derive(Clone, Debug)]
-pub struct Canceller(pub(crate) Arc<AtomicBool>);
+/// Stops a render from any thread, its preparation included: within the time of a few sub-paths. Of the iteration in hand the sets of
+/// pixels that are done stay on the film.
+///
+/// It may be made before the render ([`Start`](crate::Start)); all copies stop the same renders.
+#[derive(Clone, Debug, Default)]
+pub struct Canceller(Arc<AtomicBool>);
 
 impl Canceller {
     /// Stops the render, for good.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it was stopped.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// When work has to stop: asked between sub-paths.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Halt<'a> {
+    pub(crate) canceller: &'a Canceller,
+    pub(crate) deadline: Option<Instant>,
+}
+
+impl Halt<'_> {
+    /// Whether work has to stop now.
+    pub(crate) fn now(&self) -> bool {
+        self.canceller.is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }
 
@@ -56,8 +83,8 @@ pub struct Progress<'a> {
     pub seconds: f64,
     /// Part of the work done, `[0, 1]`, as far as the stop rules tell.
     pub fraction: f64,
-    /// Estimated relMSE; infinite before the second iteration.
-    pub estimated_error: f64,
+    /// Estimated relMSE, as it was when a stop rule last had reason to ask.
+    pub estimated_error: ErrorEstimate,
     /// The film.
     pub film: &'a Film,
     /// All that was done so far, to be saved.

@@ -22,14 +22,14 @@ pub(crate) const MAX_COUNT: u64 = 1 << (64 - DIGITS);
 /// Places of the first digits of the least and of the greatest number in double precision.
 const PLACES: std::ops::RangeInclusive<i8> = -30..=28;
 
-/// A sum per channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Sum3 {
-    /// The upper and the lower bin of each channel, in units of their last digits.
-    bins: [[u64; 2]; 3],
-    /// Where the upper bins are: they count multiples of `2^(36 place)`. `NOWHERE` while a sum is zero.
-    places: [i8; 3],
-}
+/// A sum per channel: the upper and the lower bin of each, in units of their last digits, then [a byte](place) for each that says where
+/// these are.
+///
+/// Plain words, of which zeros are sums of nothing: so that memory for a large film is there at once, and is taken as it is used.
+pub(crate) type Sum3 = [u64; 7];
+
+/// Sums of nothing.
+pub(crate) const ZERO: Sum3 = [0; 7];
 
 /// The place of a sum of nothing.
 const NOWHERE: i8 = i8::MIN;
@@ -37,101 +37,115 @@ const NOWHERE: i8 = i8::MIN;
 /// The bytes of a sum in a file, at most.
 pub(crate) const MAX_ENCODED: usize = 3 * 17;
 
-impl Sum3 {
-    pub(crate) const ZERO: Self = Self { bins: [[0; 2]; 3], places: [NOWHERE; 3] };
+/// Where the upper bin of a channel is: it counts multiples of `2^(36 place)`. `NOWHERE` while the sum is zero.
+fn place(sum: &Sum3, c: usize) -> i8 {
+    ((sum[6] >> (8 * c)) as u8 ^ 0x80).cast_signed()
+}
 
-    /// Adds a number per channel: zero, or positive and finite.
-    #[inline]
-    pub(crate) fn add(&mut self, values: [f64; 3]) {
-        for (c, value) in values.into_iter().enumerate() {
-            debug_assert!(value >= 0.0 && value.is_finite(), "{value}");
-            if value > 0.0 {
-                self.add_to(c, value);
-            }
+fn set_place(sum: &mut Sum3, c: usize, place: i8) {
+    let byte = u64::from(place.cast_unsigned() ^ 0x80);
+    sum[6] = sum[6] & !(0xff << (8 * c)) | byte << (8 * c);
+}
+
+fn bins(sum: &Sum3, c: usize) -> [u64; 2] {
+    [sum[2 * c], sum[2 * c + 1]]
+}
+
+fn set_bins(sum: &mut Sum3, c: usize, bins: [u64; 2]) {
+    sum[2 * c..2 * c + 2].copy_from_slice(&bins);
+}
+
+/// Adds a number per channel: zero, or positive and finite.
+#[inline]
+pub(crate) fn add(sum: &mut Sum3, values: [f64; 3]) {
+    for (c, value) in values.into_iter().enumerate() {
+        debug_assert!(value >= 0.0 && value.is_finite(), "{value}");
+        if value > 0.0 {
+            add_to(sum, c, value);
         }
     }
+}
 
-    #[inline]
-    fn add_to(&mut self, c: usize, value: f64) {
-        let (digits, exponent) = decompose(value);
-        let first = exponent + digits.ilog2().cast_signed();
-        let place = first.div_euclid(DIGITS) as i8;
-        if place > self.places[c] {
-            self.bins[c] = self.seen_from(c, place);
-            self.places[c] = place;
+#[inline]
+fn add_to(sum: &mut Sum3, c: usize, value: f64) {
+    let (digits, exponent) = decompose(value);
+    let first = exponent + digits.ilog2().cast_signed();
+    let upper = first.div_euclid(DIGITS) as i8;
+    if upper > place(sum, c) {
+        set_bins(sum, c, seen_from(sum, c, upper));
+        set_place(sum, c, upper);
+    }
+    // Units of the lower bin: at most 72 digits, since the first one is in the upper bin or below.
+    let shift = exponent - DIGITS * (i32::from(place(sum, c)) - 1);
+    let units = match shift {
+        0.. => u128::from(digits) << shift,
+        -63..0 => u128::from(digits >> -shift),
+        _ => 0,
+    };
+    sum[2 * c] += (units >> DIGITS) as u64;
+    sum[2 * c + 1] += units as u64 & ((1 << DIGITS) - 1);
+}
+
+/// Adds other sums. The two together must be of no more than [`MAX_COUNT`] numbers.
+pub(crate) fn merge(sum: &mut Sum3, other: &Sum3) {
+    for c in 0..3 {
+        let upper = place(sum, c).max(place(other, c));
+        let (own, others) = (seen_from(sum, c, upper), seen_from(other, c, upper));
+        set_bins(sum, c, [own[0] + others[0], own[1] + others[1]]);
+        set_place(sum, c, upper);
+    }
+}
+
+/// The bins of a channel at another place, not below the present one.
+fn seen_from(sum: &Sum3, c: usize, upper: i8) -> [u64; 2] {
+    let [high, low] = bins(sum, c);
+    match i16::from(upper) - i16::from(place(sum, c)) {
+        0 => [high, low],
+        1 => [0, high],
+        _ => [0, 0],
+    }
+}
+
+/// The sums, rounded to double precision; what is below 2⁻¹⁰²² becomes zero.
+#[inline]
+pub(crate) fn values(sum: &Sum3) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        if place(sum, c) == NOWHERE {
+            return 0.0;
         }
-        // Units of the lower bin: at most 72 digits, since the first one is in the upper bin or below.
-        let shift = exponent - DIGITS * (i32::from(self.places[c]) - 1);
-        let units = match shift {
-            0.. => u128::from(digits) << shift,
-            -63..0 => u128::from(digits >> -shift),
-            _ => 0,
-        };
-        self.bins[c][0] += (units >> DIGITS) as u64;
-        self.bins[c][1] += units as u64 & ((1 << DIGITS) - 1);
-    }
+        let [upper, lower] = bins(sum, c).map(|units| units as f64);
+        (upper + lower * power_of_two(-DIGITS)) * power_of_two(DIGITS * i32::from(place(sum, c)))
+    })
+}
 
-    /// Adds another sum. The two together must be of no more than [`MAX_COUNT`] numbers.
-    pub(crate) fn merge(&mut self, other: &Self) {
-        for c in 0..3 {
-            let place = self.places[c].max(other.places[c]);
-            let (own, others) = (self.seen_from(c, place), other.seen_from(c, place));
-            self.bins[c] = [own[0] + others[0], own[1] + others[1]];
-            self.places[c] = place;
+/// Appends the sums in the least space: a place, then two bins unless the sum is zero.
+pub(crate) fn encode(sum: &Sum3, out: &mut Vec<u8>) {
+    for c in 0..3 {
+        out.extend(place(sum, c).to_le_bytes());
+        if place(sum, c) != NOWHERE {
+            out.extend(bins(sum, c).into_iter().flat_map(u64::to_le_bytes));
         }
     }
+}
 
-    /// The bins at another place, not below the present one.
-    fn seen_from(&self, c: usize, place: i8) -> [u64; 2] {
-        let [upper, lower] = self.bins[c];
-        match i16::from(place) - i16::from(self.places[c]) {
-            0 => [upper, lower],
-            1 => [0, upper],
-            _ => [0, 0],
+/// Takes from the front of `bytes` what [`encode`] wrote. `None` if it is no sum of `count` numbers.
+pub(crate) fn decode(bytes: &mut &[u8], count: u64) -> Option<Sum3> {
+    let mut sum = ZERO;
+    for c in 0..3 {
+        let place = i8::from_le_bytes(*take(bytes)?);
+        if place == NOWHERE {
+            continue;
         }
-    }
-
-    /// The sums, rounded to double precision; what is below 2⁻¹⁰²² becomes zero.
-    #[inline]
-    pub(crate) fn values(&self) -> [f64; 3] {
-        std::array::from_fn(|c| {
-            if self.places[c] == NOWHERE {
-                return 0.0;
-            }
-            let [upper, lower] = self.bins[c].map(|units| units as f64);
-            (upper + lower * power_of_two(-DIGITS)) * power_of_two(DIGITS * i32::from(self.places[c]))
-        })
-    }
-
-    /// Appends the sums in the least space: a place, then two bins unless the sum is zero.
-    pub(crate) fn encode(&self, out: &mut Vec<u8>) {
-        for (place, bins) in self.places.into_iter().zip(self.bins) {
-            out.extend(place.to_le_bytes());
-            if place != NOWHERE {
-                out.extend(bins.into_iter().flat_map(u64::to_le_bytes));
-            }
+        let bins = [u64::from_le_bytes(*take(bytes)?), u64::from_le_bytes(*take(bytes)?)];
+        let most = count.min(MAX_COUNT) * ((1 << DIGITS) - 1);
+        // The largest number has its first digit in the upper bin.
+        if !PLACES.contains(&place) || bins[0] == 0 || bins.iter().any(|bin| *bin > most) {
+            return None;
         }
+        set_place(&mut sum, c, place);
+        set_bins(&mut sum, c, bins);
     }
-
-    /// Takes from the front of `bytes` what [`encode`](Self::encode) wrote. `None` if it is no sum of `count` numbers.
-    pub(crate) fn decode(bytes: &mut &[u8], count: u64) -> Option<Self> {
-        let mut sum = Self::ZERO;
-        for c in 0..3 {
-            let place = i8::from_le_bytes(*take(bytes)?);
-            if place == NOWHERE {
-                continue;
-            }
-            let bins = [u64::from_le_bytes(*take(bytes)?), u64::from_le_bytes(*take(bytes)?)];
-            let most = count.min(MAX_COUNT) * ((1 << DIGITS) - 1);
-            // The largest number has its first digit in the upper bin.
-            if !PLACES.contains(&place) || bins[0] == 0 || bins.iter().any(|bin| *bin > most) {
-                return None;
-            }
-            sum.places[c] = place;
-            sum.bins[c] = bins;
-        }
-        Some(sum)
-    }
+    Some(sum)
 }
 
 fn take<'a, const N: usize>(bytes: &mut &'a [u8]) -> Option<&'a [u8; N]> {
@@ -171,9 +185,9 @@ mod tests {
     }
 
     fn sum(numbers: &[f64]) -> Sum3 {
-        let mut sum = Sum3::ZERO;
+        let mut sum = ZERO;
         for number in numbers {
-            sum.add([*number, 0.0, 0.5 * number]);
+            add(&mut sum, [*number, 0.0, 0.5 * number]);
         }
         sum
     }
@@ -202,7 +216,7 @@ mod tests {
         fn is_the_exact_sum_of_the_digits_kept(numbers in numbers()) {
             let sum = sum(&numbers);
             let expected = by_definition(&numbers).unwrap_or((NOWHERE, [0; 2]));
-            prop_assert_eq!((sum.places[0], sum.bins[0]), expected);
+            prop_assert_eq!((place(&sum, 0), bins(&sum, 0)), expected);
         }
 
         #[test]
@@ -214,14 +228,14 @@ mod tests {
             let whole = sum(&numbers);
             let (a, b) = shuffled.split_at(split.min(shuffled.len()));
             let (mut first, second) = if flip { (sum(a), sum(b)) } else { (sum(b), sum(a)) };
-            first.merge(&second);
+            merge(&mut first, &second);
             prop_assert_eq!(first, whole);
         }
 
         #[test]
         fn little_is_lost(numbers in numbers()) {
             let numbers: Vec<f64> = numbers.into_iter().filter(|x| *x == 0.0 || (1e-30..1e30).contains(x)).collect();
-            let found = sum(&numbers).values()[0];
+            let found = values(&sum(&numbers))[0];
             let exact: f64 = numbers.iter().sum();
             let largest = numbers.iter().copied().fold(0.0, f64::max);
             let lost = largest * numbers.len() as f64 * (-36_f64).exp2();
@@ -233,47 +247,49 @@ mod tests {
         fn survives_a_file(numbers in numbers()) {
             let sum = sum(&numbers);
             let mut bytes = Vec::new();
-            sum.encode(&mut bytes);
+            encode(&sum, &mut bytes);
             prop_assert!(bytes.len() <= MAX_ENCODED);
             let mut rest = bytes.as_slice();
-            prop_assert_eq!(Sum3::decode(&mut rest, numbers.len() as u64), Some(sum));
+            prop_assert_eq!(decode(&mut rest, numbers.len() as u64), Some(sum));
             prop_assert!(rest.is_empty());
             for end in 0..bytes.len() {
-                prop_assert_eq!(Sum3::decode(&mut &bytes[..end], numbers.len() as u64), None);
+                prop_assert_eq!(decode(&mut &bytes[..end], numbers.len() as u64), None);
             }
         }
 
         #[test]
         fn any_bytes_decode_to_something_that_can_be_merged(bytes in proptest::collection::vec(any::<u8>(), 0..60)) {
             let half = MAX_COUNT / 2;
-            if let Some(sum) = Sum3::decode(&mut bytes.as_slice(), half) {
+            if let Some(sum) = decode(&mut bytes.as_slice(), half) {
                 let mut twice = sum;
-                twice.merge(&sum);
-                prop_assert!(twice.values().iter().all(|v| *v >= 0.0));
+                merge(&mut twice, &sum);
+                prop_assert!(values(&twice).iter().all(|v| *v >= 0.0));
             }
         }
     }
 
     #[test]
     fn single_precision_within_a_factor_of_4096_is_exact() {
-        let mut sum = Sum3::ZERO;
+        let mut sum = ZERO;
         let (large, small) = (f32::from_bits(0x3fff_ffff), f32::from_bits(0x3a00_0001));
         let mut units = 0_u128;
         for _ in 0..100_000 {
-            sum.add([f64::from(large), f64::from(small), f64::from(large) + f64::from(small)]);
+            add(&mut sum, [f64::from(large), f64::from(small), f64::from(large) + f64::from(small)]);
             units += [large, small].map(|x| (f64::from(x) * 2_f64.powi(36)) as u128).iter().sum::<u128>();
         }
-        let total = sum.bins[2];
-        assert_eq!(sum.places[2], 0);
+        let total = bins(&sum, 2);
+        assert_eq!(place(&sum, 2), 0);
         assert_eq!((u128::from(total[0]) << 36) + u128::from(total[1]), units);
     }
 
     #[test]
     fn as_many_numbers_as_allowed_fit() {
-        let most = Sum3 { bins: [[(MAX_COUNT - 1) * ((1 << DIGITS) - 1); 2]; 3], places: [0; 3] };
-        let mut sum = most;
-        sum.add([2_f64.powi(DIGITS) - 1.0; 3]);
-        assert!(sum.bins[0][0] > most.bins[0][0]);
-        assert_eq!(sum.bins[0][0], MAX_COUNT * ((1 << DIGITS) - 1));
+        let most = [[(MAX_COUNT - 1) * ((1 << DIGITS) - 1); 6].as_slice(), &[0x80_8080]].concat();
+        let mut sum: Sum3 = most.try_into().unwrap();
+        let before = bins(&sum, 0);
+        assert_eq!(place(&sum, 2), 0);
+        add(&mut sum, [2_f64.powi(DIGITS) - 1.0; 3]);
+        assert!(bins(&sum, 0)[0] > before[0]);
+        assert_eq!(bins(&sum, 0)[0], MAX_COUNT * ((1 << DIGITS) - 1));
     }
 }

@@ -21,7 +21,7 @@ pub use kernel::Kernel;
 pub use light_map::LightMap;
 pub use look_ups::LookUps;
 pub use plan::{Kernels, PathLengths, Plan, PlanChoices};
-pub use random::{Stream, StreamKind};
+pub use random::{Stream, StreamKind, half};
 pub use roulette::{Roulette, Survival};
 pub use technique::{Layer, Technique, TechniqueSet, UnknownTechnique};
 pub use upbp_accel::{Ray, offset_origin};

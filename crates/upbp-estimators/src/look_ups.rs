@@ -8,7 +8,7 @@ use std::num::NonZeroU32;
 
 use serde::{Deserialize, Serialize};
 
-use crate::random::{Stream, StreamKind};
+use crate::random::{Stream, StreamKind, half};
 use crate::technique::{Technique, TechniqueSet};
 
 /// One of how many iterations makes each look-up.
@@ -60,15 +60,17 @@ impl LookUps {
         }
     }
 
-    /// What runs in an iteration: each technique in one of every `m` iterations from a multiple of `m` on, whichever it happens to be.
-    /// So every iteration has it with probability `1/m`, and `m` of them have it once.
+    /// What runs in an iteration: each technique in one of every `m` iterations of a [half](crate::half) from a multiple of
+    /// `m` on, whichever it happens to be. So every iteration has it with probability `1/m`, and `m` of a half have it once.
     #[must_use]
     pub fn due(&self, seed: u64, iteration: u64) -> TechniqueSet {
+        let (half, iteration) = half(iteration);
         let due = |technique: &Technique| {
             let period = u64::from(self.period(*technique));
             let turn = || {
                 let block = iteration / period;
-                Stream::new(seed, block, StreamKind::LookUps, *technique as u64).index(period as usize)
+                let index = (half as u64) << 32 | *technique as u64;
+                Stream::new(seed, block, StreamKind::LookUps, index).index(period as usize)
             };
             period == 1 || iteration % period == turn() as u64
         };
@@ -90,10 +92,11 @@ mod tests {
         let mut turns = [0_u32; 8];
         for block in 0..4000_u64 {
             let of_block: Vec<_> =
-                (0..8).filter(|i| look_ups.due(7, 8 * block + i).has(Technique::Surf)).collect();
+                (0..8).filter(|i| look_ups.due(7, 2 * (8 * block + i)).has(Technique::Surf)).collect();
             assert_eq!(of_block.len(), 1);
             turns[of_block[0] as usize] += 1;
-            let beams = (0..3).filter(|i| look_ups.due(7, 3 * block + i).has(Technique::Bb1d)).count();
+            let beams =
+                (0..3).filter(|i| look_ups.due(7, 2 * (3 * block + i) + 1).has(Technique::Bb1d)).count();
             assert_eq!(beams, 1);
             assert!(
                 look_ups.due(7, block).has(Technique::Pb2d) && look_ups.due(7, block).has(Technique::Nee)

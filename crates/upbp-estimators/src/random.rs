@@ -25,7 +25,8 @@ const COMMON_DRAWS: u32 = 5;
 pub enum StreamKind {
     /// Light sub-paths.
     Light,
-    /// Camera sub-paths.
+    /// Camera sub-paths. Those of even and of odd iterations are stratified apart, so that the two halves of a render are
+    /// independent of each other and their difference tells the error.
     Camera,
     /// Light sub-paths of the pilot, which sets radii and counts before the first iteration.
     PilotLight,
@@ -64,7 +65,10 @@ impl Stream {
             StreamKind::Light | StreamKind::PilotLight => {
                 (index as u32, mix(common ^ of_iteration), STRATIFIED_DRAWS)
             }
-            StreamKind::Camera => (iteration as u32, mix(common ^ of_index), STRATIFIED_DRAWS),
+            StreamKind::Camera => {
+                let (half, point) = half(iteration);
+                (point as u32, mix(mix(common ^ of_index) ^ half as u64), STRATIFIED_DRAWS)
+            }
             StreamKind::PilotCamera => (0, mix(common ^ of_index), COMMON_DRAWS),
             StreamKind::LookUps => (0, 0, 0),
         };
@@ -119,6 +123,12 @@ impl Stream {
         (self.draws <= self.from_sequences)
             .then(|| mix(self.family.wrapping_add(u64::from(self.draws).wrapping_mul(0x9e37_79b9_7f4a_7c15))))
     }
+}
+
+/// The half of a render that an iteration belongs to, 0 or 1, and its number there. Halves have no random decision in common.
+#[must_use]
+pub const fn half(iteration: u64) -> (usize, u64) {
+    ((iteration % 2) as usize, iteration / 2)
 }
 
 fn to_unit(bits: u32) -> f32 {
@@ -190,7 +200,8 @@ mod tests {
         // 64 streams of a family: every elementary interval of area 1/64 has one point, at each decision.
         for (kind, make) in [
             (StreamKind::Light, (|i| Stream::new(5, 3, StreamKind::Light, 192 + i)) as fn(u64) -> Stream),
-            (StreamKind::Camera, |i| Stream::new(5, 192 + i, StreamKind::Camera, 17)),
+            (StreamKind::Camera, |i| Stream::new(5, 2 * (192 + i), StreamKind::Camera, 17)),
+            (StreamKind::Camera, |i| Stream::new(5, 2 * (192 + i) + 1, StreamKind::Camera, 17)),
         ] {
             let mut streams: Vec<_> = (0..64).map(make).collect();
             for _ in 0..STRATIFIED_DRAWS / 2 {

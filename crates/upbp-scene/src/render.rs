@@ -3,7 +3,7 @@
 //! The renderer is compiled for every type of scene that it is given, in the crate that gives it one. For [`ReadyScene`]
 //! that is this one: programs that ask here need not compile the walks again, which takes minutes.
 
-use upbp_core::{CheckedSettings, RenderError, RenderPlan, Renderer};
+use upbp_core::{CheckedSettings, RenderError, Renderer, Start};
 
 use crate::scene::ReadyScene;
 
@@ -17,16 +17,16 @@ impl ReadyScene {
         Renderer::new(self, settings)
     }
 
-    /// A render of this scene by a given plan, as [`Renderer::with_plan`], but compiled already.
+    /// A render of this scene with more to say, as [`Renderer::start`], but compiled already.
     ///
     /// # Errors
     /// As there.
     #[inline(never)]
-    pub fn renderer_with_plan(
+    pub fn start_renderer(
         &self,
         settings: CheckedSettings,
-        plan: RenderPlan,
+        start: Start<'_>,
     ) -> Result<Renderer<'_>, RenderError> {
-        Renderer::with_plan(self, settings, plan)
+        Renderer::start(self, settings, start)
     }
 }

@@ -24,6 +24,9 @@ pub(crate) use search::Bounds;
 use search::Candidate;
 use trial::PASSES;
 
+use crate::budget::Budget;
+use crate::stop::Halt;
+
 /// The iterations before which the plan is chosen, again and again: radii have shrunk, and a larger trial is worth its time.
 pub(crate) const REVIEWS: [u64; 3] = [0, 512, 4096];
 /// The factor by which a change must make the product of variance and cost smaller.
@@ -51,24 +54,47 @@ pub(crate) struct Choice<'a> {
     pub(crate) timed: bool,
 }
 
-/// Makes the choice of a review, by the number of it.
-pub(crate) fn choose<S: Scene>(world: &World<'_, S>, choice: &Choice<'_>, review: u32) -> Candidate {
+/// Makes the choice of a review, by the number of it: everything, if there is no time for a choice.
+pub(crate) fn choose<S: Scene>(
+    world: &World<'_, S>,
+    choice: &Choice<'_>,
+    review: u32,
+    budget: &Budget<'_>,
+) -> Candidate {
+    budget
+        .largest(false, |part, halt| choose_by_part(world, choice, review, part, halt))
+        .unwrap_or_else(|| Candidate::everything(&choice.bounds))
+}
+
+/// Makes the choice with a part of a trial. `None` if it was halted.
+fn choose_by_part<S: Scene>(
+    world: &World<'_, S>,
+    choice: &Choice<'_>,
+    review: u32,
+    part: f64,
+    halt: &Halt<'_>,
+) -> Option<Candidate> {
     let plan = choice.everything;
     let crop = world.scene.camera().crop();
     let media = plan.techniques.intersects(TechniqueSet::VOLUME_MERGES);
     let pixels_per_cell = PIXELS_PER_CELL[usize::from(!media)];
     let first = (crop.width.saturating_mul(crop.height) / pixels_per_cell).clamp(CELLS[0], CELLS[1]);
-    let mut cells = (first * GROWTH.pow(review)).min(choice.most_paths);
+    let full = (first * GROWTH.pow(review)).min(choice.most_paths);
+    let mut cells = ((part * f64::from(full)) as u32).max(LEAST_CELLS);
     while cells >= LEAST_CELLS {
         let grid = Grid::new(crop, cells);
         let paths = choice.most_paths.min(LIGHT_PATHS_PER_CELL * cells);
-        if let Some(trial) = trial::run(world, plan, &grid, paths, PASSES * review, choice.timed) {
+        let trial = trial::run(world, plan, &grid, paths, PASSES * review, choice.timed, halt);
+        if halt.now() {
+            return None;
+        }
+        if let Some(trial) = trial {
             let costs = Costs::of(&trial);
             let prediction = Prediction::new(trial, &grid);
-            return search::best(&prediction, &costs, &choice.bounds, GAINS[review as usize]);
+            return Some(search::best(&prediction, &costs, &choice.bounds, GAINS[review as usize]));
         }
         // As many photons are looked up less often and by less sub-paths.
         cells /= SMALLER;
     }
-    Candidate::everything(&choice.bounds)
+    Some(Candidate::everything(&choice.bounds))
 }

@@ -12,6 +12,7 @@ use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
 
 use super::grid::Grid;
 use super::trial::PASSES;
+use crate::stop::Halt;
 
 /// Sub-paths per piece of work.
 pub(super) const CHUNK: usize = 16;
@@ -25,15 +26,17 @@ pub(super) trait Piece<B>: Observer<B> + Default + Send {
     fn written(&self) -> usize;
 }
 
-/// Room for samples, common to all pieces of a trial. Whether it suffices does not depend on the order of the pieces.
-pub(super) struct Room {
+/// Room for samples, common to all pieces of a trial, as long as it is not halted. Whether it suffices does not depend on the order of
+/// the pieces.
+pub(super) struct Room<'a> {
     taken: AtomicUsize,
     most: usize,
+    halt: &'a Halt<'a>,
 }
 
-impl Room {
-    pub(super) const fn new(most: usize) -> Self {
-        Self { taken: AtomicUsize::new(0), most }
+impl<'a> Room<'a> {
+    pub(super) const fn new(most: usize, halt: &'a Halt<'a>) -> Self {
+        Self { taken: AtomicUsize::new(0), most, halt }
     }
 
     /// Takes room for more samples; whether there was enough.
@@ -45,11 +48,14 @@ impl Room {
 /// Lets `observer` see sub-paths one after the other, as long as there is room for what it writes down.
 fn watch<O: Piece<B>, B>(
     observer: &mut O,
-    room: &Room,
+    room: &Room<'_>,
     paths: impl IntoIterator<Item = u32>,
     mut trace: impl FnMut(u32, &mut O),
 ) -> Option<()> {
     for path in paths {
+        if room.halt.now() {
+            return None;
+        }
         let before = observer.written();
         trace(path, observer);
         observer.path_ended();
@@ -74,7 +80,7 @@ impl<O> Pass<O> {
         plan: &Plan,
         grid: &Grid,
         pass: u32,
-        room: &Room,
+        room: &Room<'_>,
     ) -> Option<Self>
     where
         O: Piece<S::Bsdf>,

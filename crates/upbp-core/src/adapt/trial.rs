@@ -10,6 +10,7 @@ use super::grid::Grid;
 use super::recorder::{ByRoulette, MOST_SAMPLES, Recorder, Sample, TECHNIQUES, add, reach};
 use super::trace::{CHUNK, Pass, Piece, Room};
 use super::watch::{PARTS, WALK, Watch};
+use crate::stop::Halt;
 
 /// Looks at each cell: enough to tell what they have in common.
 pub(crate) const PASSES: u32 = 2;
@@ -66,7 +67,7 @@ impl Trial {
 }
 
 /// Runs a trial of `plan`, with `paths` of its light sub-paths per pass. `first_pass` numbers the passes of all trials of a render;
-/// `timed` says whether to measure time. `None` if there were [too many samples](MOST_SAMPLES).
+/// `timed` says whether to measure time. `None` if there were [too many samples](MOST_SAMPLES), or if it was halted.
 pub(crate) fn run<S: Scene>(
     world: &World<'_, S>,
     plan: &Plan,
@@ -74,6 +75,7 @@ pub(crate) fn run<S: Scene>(
     paths: u32,
     first_pass: u32,
     timed: bool,
+    halt: &Halt<'_>,
 ) -> Option<Trial> {
     let cells = grid.cells() as usize;
     let part = |traced: u32, planned: u32| f64::from(traced) / f64::from(planned.max(1));
@@ -93,7 +95,7 @@ pub(crate) fn run<S: Scene>(
     let mut plan = plan.clone();
     // Fewer light sub-paths, each of which counts for more; weights as in the plan.
     (plan.light_paths, plan.beam_paths) = (paths, beam_paths);
-    let room = Room::new(MOST_SAMPLES);
+    let room = Room::new(MOST_SAMPLES, halt);
     let mut passes = (first_pass..first_pass + PASSES)
         .map(|pass| {
             // Not the iterations of other pilots.

@@ -1,4 +1,5 @@
-//! One OpenEXR file with everything: the picture as `R`, `G`, `B`, layers as `bpt.R` and so on, the variance.
+//! One OpenEXR file with everything: the picture as `R`, `G`, `B`, layers as `bpt.R` and so on, the variance, two independent halves,
+//! the estimated error.
 //!
 //! One part with dotted channel names is what every viewer reads; all metadata is in one text attribute, because the
 //! encoder writes several in random order.
@@ -25,7 +26,7 @@ pub struct Metadata<'a> {
     pub report: &'a Report,
 }
 
-/// Writes the mean, the layers and the variance of a film, float32.
+/// Writes the mean of a film, its layers, variance, halves and estimated error, as far as there are such: float32.
 ///
 /// # Errors
 /// What the file system or the encoder says.
@@ -34,11 +35,22 @@ pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::resu
     let mut channels = SmallVec::<[AnyChannel<FlatSamples>; 4]>::new();
     push(&mut channels, "", &film.image());
     for layer in film.layers() {
-        if let Some(image) = film.layer(*layer) {
+        if let Some(image) = film.layer(layer) {
             push(&mut channels, &format!("{}.", layer.name()), &image);
         }
     }
-    push(&mut channels, "variance.", &film.variance());
+    if film.iterations() > 1 {
+        push(&mut channels, "variance.", &film.variance());
+    }
+    if let Some(halves) = film.halves() {
+        for (half, name) in halves.iter().zip(["half0.", "half1."]) {
+            push(&mut channels, name, half);
+        }
+    }
+    if let Some(error) = film.error_map() {
+        let (width, height) = (film.rect().width, film.rect().height);
+        push(&mut channels, "error.", &Picture { width, height, pixels: error.relative });
+    }
 
     let size = (film.rect().width as usize, film.rect().height as usize);
     let mut attributes = LayerAttributes::default();

@@ -4,29 +4,32 @@
 //! "UPBPSTAT"   8 bytes
 //! version      u32, little-endian as all numbers
 //! block        the header: RON text
-//! block ...    one per row of the film: the sums of all layers pixel by pixel, then those of squares
+//! block ...    one per row of the film: the sums of each layer, of the even iterations, of squares
 //! ```
 //!
 //! A block is its length (u32), its bytes, and the checksum (u64) of all blocks so far: each block is
 //! known to be good, and in its place, before anything in it is believed. Memory for the film grows as blocks arrive, so a
 //! file cannot ask for more than some fifty times its own length.
 
+use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::checksum::Checksum;
 use super::{Identity, Record, State};
 use crate::error::StateError;
 use crate::film::Film;
-use crate::iterations::IterationSet;
-use crate::sum::{MAX_ENCODED, Sum3};
+use crate::interleave::SETS;
+use crate::iterations::{IterationSet, MAX_ITERATIONS};
+use crate::sum::{self, MAX_ENCODED, Sum3};
 
 /// How every state file begins.
 const MAGIC: [u8; 8] = *b"UPBPSTAT";
 
 /// Version of the format.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// The longest header, bytes: room for a million ranges of iterations.
 const MAX_HEADER: u64 = 1 << 24;
@@ -37,6 +40,8 @@ const MAX_HEADER: u64 = 1 << 24;
 struct Header {
     identity: Identity,
     iterations: IterationSet,
+    /// Iterations that are there in part, with the number of sets of pixels that are.
+    parts: BTreeMap<u64, u32>,
     record: Record,
 }
 
@@ -52,19 +57,24 @@ impl Film {
     #[must_use]
     pub fn fingerprint(&self) -> String {
         let mut checksum = Checksum::new();
-        checksum.add(format!("{:?}{:?}", self.iteration_set().ranges(), self.layers()).as_bytes());
-        let mut bytes = Vec::new();
-        for row in 0..self.rect().height as usize {
-            self.encode_row(row, &mut bytes);
-            checksum.add(&bytes);
-        }
+        let layers: Vec<_> = self.layers().collect();
+        let what = format!("{:?}{:?}{layers:?}", self.iteration_set().ranges(), self.parts());
+        checksum.add(what.as_bytes());
+        let of_row = |bytes: &mut Vec<u8>, row| {
+            self.encode_row(row, bytes);
+            let mut checksum = Checksum::new();
+            checksum.add(bytes);
+            checksum.value()
+        };
+        let height = self.rect().height as usize;
+        let rows: Vec<_> = (0..height).into_par_iter().map_init(Vec::new, of_row).collect();
+        rows.iter().for_each(|row| checksum.add(&row.to_le_bytes()));
         format!("{:016x}", checksum.value())
     }
 
     fn encode_row(&self, row: usize, bytes: &mut Vec<u8>) {
         bytes.clear();
-        let (sums, squares) = self.row(row);
-        sums.iter().chain(squares).for_each(|sum| sum.encode(bytes));
+        self.row(row).for_each(|sum| sum::encode(sum, bytes));
     }
 }
 
@@ -77,6 +87,7 @@ impl State {
         let header = Header {
             identity: self.identity.clone(),
             iterations: self.film.iteration_set().clone(),
+            parts: self.film.parts().clone(),
             record: self.record.clone(),
         };
         let text = ron::to_string(&header).map_err(io::Error::other)?;
@@ -112,7 +123,7 @@ impl State {
         let mut checksum = Checksum::new();
         let header = read_block(&mut from, &mut checksum, MAX_HEADER, "header")?;
         let text = str::from_utf8(&header).map_err(|error| damaged("header", &error))?;
-        let Header { identity, iterations, record } =
+        let Header { identity, iterations, parts, record } =
             ron::from_str(text).map_err(|error| damaged("header", &error))?;
 
         let rect = identity.rect();
@@ -122,19 +133,23 @@ impl State {
         if !inside(rect.x, rect.width, identity.film.0) || !inside(rect.y, rect.height, identity.film.1) {
             return Err(damaged("header", &"the crop is not inside of the film"));
         }
-        let techniques = identity.census.techniques;
-        let layers = Film::layers_of(techniques).len();
-        let longest = u64::from(rect.width) * ((layers + 1) * MAX_ENCODED) as u64;
-        let (mut sums, mut squares) = (Vec::new(), Vec::new());
+        let numbers = iterations.len() + parts.len() as u64;
+        for (iteration, done) in &parts {
+            let whole = iterations.count_in(&(*iteration..iteration.saturating_add(1))) > 0;
+            if *iteration >= MAX_ITERATIONS || whole || !(1..SETS).contains(done) {
+                return Err(damaged("header", &format!("no part of an iteration: {iteration}, {done} sets")));
+            }
+        }
+        let mut film = Film::without_sums(rect, identity.plan.techniques(), iterations, parts);
+        let longest = u64::from(rect.width) * (film.lists().count() * MAX_ENCODED) as u64;
         for row in 0..rect.height {
             let what = || format!("row {row} of {}", rect.height);
             let block = read_block(&mut from, &mut checksum, longest, &what())?;
             let mut bytes = block.as_slice();
-            let width = rect.width as usize;
-            decode(&mut bytes, width * layers, iterations.len(), &mut sums)
-                .ok_or_else(|| damaged(&what(), &"no sums"))?;
-            decode(&mut bytes, width, iterations.len(), &mut squares)
-                .ok_or_else(|| damaged(&what(), &"no sums"))?;
+            for sums in film.lists() {
+                decode(&mut bytes, rect.width as usize, numbers, sums)
+                    .ok_or_else(|| damaged(&what(), &"no sums"))?;
+            }
             if !bytes.is_empty() {
                 return Err(damaged(&what(), &"too long"));
             }
@@ -142,7 +157,6 @@ impl State {
         if fills(&mut from, &mut [0])? {
             return Err(damaged("end", &"bytes follow"));
         }
-        let film = Film::from_parts(rect, techniques, iterations, sums, squares);
         Ok(Self { identity, record, film })
     }
 }
@@ -152,7 +166,7 @@ fn decode(bytes: &mut &[u8], count: usize, numbers: u64, sums: &mut Vec<Sum3>) -
     // An empty sum takes three bytes: no more memory than for what can be there.
     sums.try_reserve(count.min(bytes.len() / 3)).ok()?;
     for _ in 0..count {
-        sums.push(Sum3::decode(bytes, numbers)?);
+        sums.push(sum::decode(bytes, numbers)?);
     }
     Some(())
 }

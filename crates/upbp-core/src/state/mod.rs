@@ -17,7 +17,7 @@ pub use identity::Identity;
 
 use crate::error::{OutputError, StateError};
 use crate::film::Film;
-use crate::iterations::{IterationSet, MAX_ITERATIONS};
+use crate::iterations::MAX_ITERATIONS;
 use crate::output::write_whole;
 use crate::report::{ErrorSeries, PassTimes, Report};
 
@@ -69,16 +69,15 @@ impl State {
     /// If the other state is of another render, or has iterations that this one has too. Then nothing has changed.
     pub fn merge(&mut self, other: Self) -> Result<(), StateError> {
         self.identity.check_same(&other.identity)?;
-        let (own, others) = (self.film.iteration_set(), other.film.iteration_set());
-        if let Some(common) = own.overlap(others) {
+        if let Some(common) = self.film.overlap(&other.film) {
             return Err(StateError::Overlap { start: common.start, end: common.end });
         }
-        let (none, others_none) = (own.is_empty(), others.is_empty());
+        let (none, others_none) = (self.film.is_empty(), other.film.is_empty());
         // What may differ is that of the state with the first iteration, so that the order does not matter.
-        let first = |set: &IterationSet| set.ranges().first().map_or(MAX_ITERATIONS, |range| range.start);
+        let first = |film: &Film| film.first().unwrap_or(MAX_ITERATIONS);
         let theirs_goes_farther = other.identity.plan.stages().len() > self.identity.plan.stages().len();
         let plan = if theirs_goes_farther { &other.identity.plan } else { &self.identity.plan }.clone();
-        if first(others) < first(own) {
+        if first(&other.film) < first(&self.film) {
             self.identity = other.identity;
         }
         self.identity.plan = plan;
@@ -94,6 +93,7 @@ impl State {
             record.series = ErrorSeries::default();
             self.film.merge(&other.film);
         }
+        self.film.keep(self.identity.plan.techniques());
         Ok(())
     }
 
