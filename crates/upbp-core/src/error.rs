@@ -52,7 +52,7 @@ pub enum RenderError {
     #[error(transparent)]
     Settings(#[from] SettingsError),
     /// The scene.
-    #[error("scene: {0}")]
+    #[error(transparent)]
     World(#[from] WorldError),
     /// The film, with what writing it takes, does not fit.
     #[error(
@@ -159,5 +159,27 @@ pub enum OutputError {
         path: PathBuf,
         /// Why.
         reason: String,
+    },
+    /// Writing a file would destroy another one that is read or written.
+    #[error("{role}, {}, and {other_role}, {}, are the same file", path.display(), other_path.display())]
+    SameFile {
+        /// What would be written.
+        role: String,
+        /// Where.
+        path: PathBuf,
+        /// What else the file is.
+        other_role: String,
+        /// Its name in that role.
+        other_path: PathBuf,
+    },
+    /// Something else would be overwritten.
+    #[error("{role}: {} is there and is not {expected}; remove it, or choose another name", path.display())]
+    Overwrites {
+        /// What would be written.
+        role: String,
+        /// The file.
+        path: PathBuf,
+        /// What may be overwritten.
+        expected: String,
     },
 }

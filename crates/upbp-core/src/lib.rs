@@ -37,7 +37,10 @@ pub use error::{OutputError, RenderError, SettingsError, StateError};
 pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap};
 pub use film::{Film, Image, Pixel};
 pub use iterations::{IterationSet, MAX_ITERATIONS};
-pub use output::{Metadata, check_writable, read_exr, remove_leftovers, write_exr, write_png, write_text};
+pub use output::{
+    Content, Metadata, Output, check_outputs, check_writable, read_exr, remove_leftovers, write_exr,
+    write_png, write_text,
+};
 pub use prepare::{Preparing, Start};
 pub use radius::{Radii, Radius, RadiusSchedule};
 pub use render::Renderer;

@@ -47,14 +47,18 @@ impl FromStr for Techniques {
     type Err = UnknownTechniques;
 
     fn from_str(text: &str) -> Result<Self, UnknownTechniques> {
-        if text.trim().eq_ignore_ascii_case("auto") { Ok(Self::Auto) } else { Ok(Self::Set(text.parse()?)) }
+        if text.trim().eq_ignore_ascii_case("auto") {
+            Ok(Self::Auto)
+        } else {
+            text.parse().map(Self::Set).map_err(UnknownTechniques)
+        }
     }
 }
 
 /// Neither `auto` nor a set of techniques.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}; or auto")]
-pub struct UnknownTechniques(#[from] UnknownTechnique);
+pub struct UnknownTechniques(UnknownTechnique);
 
 impl TryFrom<String> for Techniques {
     type Error = UnknownTechniques;

@@ -4,6 +4,8 @@
 //! bodies are gathered in one traversal together with the surface that ends the ray, so that boundaries that
 //! coincide are all found.
 
+use std::path::PathBuf;
+
 use glam::Vec3;
 use upbp_accel::{Candidate, Ray, SceneGeometry, ShapeId, Visit};
 use upbp_estimators::scene::{BoundingSphere, Bsdf, Crossing, EmitterId, Hit, Scene};
@@ -50,6 +52,7 @@ pub struct ReadyScene {
     pub(crate) bounds: BoundingSphere,
     pub(crate) origin: Vec3,
     pub(crate) hash: u64,
+    pub(crate) files: Vec<PathBuf>,
 }
 
 impl ReadyScene {
@@ -71,6 +74,13 @@ impl ReadyScene {
     #[must_use]
     pub const fn hash(&self) -> u64 {
         self.hash
+    }
+
+    /// The meshes and images that were read for it, in the order of their reading; not the scene file itself.
+    /// A program that writes files must not overwrite them.
+    #[must_use]
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
     }
 
     fn record(&self, candidate: &Candidate) -> &Surface {

@@ -293,5 +293,7 @@ fn all_problems_are_reported_at_once() {
 fn files_are_named() {
     let error = ReadyScene::load("no_such_folder/no_such_scene.ron").unwrap_err();
     assert!(matches!(error, SceneError::Read { .. }));
-    assert!(error.to_string().starts_with("no_such_folder/no_such_scene.ron: cannot be read: "));
+    assert_eq!(error.to_string(), "no_such_folder/no_such_scene.ron: cannot be read");
+    let cause = std::error::Error::source(&error).expect("why it cannot be read");
+    assert!(cause.is::<std::io::Error>(), "{cause}");
 }

@@ -17,7 +17,7 @@ const LEFTOVER: Duration = Duration::from_secs(3600);
 /// Checks that a file can be written, before hours are spent on its content.
 ///
 /// # Errors
-/// What the file system says.
+/// What the file system says; a file that is there and read-only; a folder.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     let check = || {
         if path.is_dir() {
@@ -27,14 +27,17 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
             // Opening a pipe would wait for its reader.
             return Ok(());
         }
-        let (temporary, _) = create_beside(&target(path))?;
+        let target = target(path)?;
+        check_not_protected(&target)?;
+        let (temporary, _) = create_beside(&target)?;
         fs::remove_file(temporary)
     };
     check().map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
 
 /// Writes a file beside its place, forces it to the disk and moves it there: whoever looks, whenever the process or the machine
-/// stops, finds the old file or the new one. What is no regular file, such as a pipe, is written to directly.
+/// stops, finds the old file or the new one. A read-only file stays. What is no regular file, such as a pipe,
+/// is written to directly.
 pub(crate) fn write_whole(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<File>) -> Result<(), OutputError>,
@@ -45,7 +48,8 @@ pub(crate) fn write_whole(
         content(&mut writer)?;
         return writer.flush().map_err(fail);
     }
-    let target = target(path);
+    let target = target(path).map_err(fail)?;
+    check_not_protected(&target).map_err(fail)?;
     let (temporary, file) = create_beside(&target).map_err(fail)?;
     let written = (|| {
         let mut writer = BufWriter::new(file);
@@ -76,7 +80,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
 /// Removes what processes that were killed while they wrote `path` have left beside it, once it is an hour old. Failures
 /// do not matter: there is nothing to remove then, or nothing to be done.
 pub fn remove_leftovers(path: &Path) {
-    let target = target(path);
+    let Ok(target) = target(path) else { return };
     let (Some(name), Ok(entries)) = (target.file_name(), fs::read_dir(folder(&target))) else { return };
     let prefix = format!("{}.", name.to_string_lossy());
     for entry in entries.flatten() {
@@ -96,12 +100,34 @@ fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
-/// The file itself, where `path` is a link to it.
-fn target(path: &Path) -> PathBuf {
-    fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+/// Refuses a file that is not to be changed. A new one in its place is a change, too, for which the file system
+/// asks the folder only.
+fn check_not_protected(target: &Path) -> io::Result<()> {
+    let metadata = match fs::metadata(target) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        known => known?,
+    };
+    // Who may do everything may open it all the same.
+    if metadata.permissions().readonly() {
+        return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is read-only"));
+    }
+    OpenOptions::new().write(true).open(target).map(drop)
 }
 
-fn folder(path: &Path) -> &Path {
+/// The file itself, where `path` is a link to it, also if it is not there yet.
+pub(super) fn target(path: &Path) -> io::Result<PathBuf> {
+    let known = fs::canonicalize(path);
+    if !known.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::NotFound) {
+        return known;
+    }
+    if let Ok(link) = fs::read_link(path) {
+        return target(&folder(path).join(link));
+    }
+    let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
+    Ok(fs::canonicalize(folder(path))?.join(name))
+}
+
+pub(super) fn folder(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -111,14 +137,35 @@ fn folder(path: &Path) -> &Path {
 /// A new file in the same folder, so that moving is a rename. Its name is one that no other process chooses, on this machine or
 /// on another that shares the folder.
 fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
-    let mut name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?.to_owned();
-    name.push(format!(".{:016x}{UNFINISHED}", RandomState::new().hash_one(std::process::id())));
-    let temporary = path.with_file_name(name);
+    let temporary = beside(path, mark())?;
     let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
     Ok((temporary, file))
 }
 
-/// Whether a part of a name is one of [`create_beside`].
+/// Whether the file system takes two names in one folder for the same, as where case does not count: it is
+/// asked.
+pub(super) fn is_one_name(path: &Path, other: &Path) -> io::Result<bool> {
+    let mark = mark();
+    let (temporary, other) = (beside(path, mark)?, beside(other, mark)?);
+    OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+    let same = other.exists();
+    fs::remove_file(temporary)?;
+    Ok(same)
+}
+
+/// A number that no other process chooses.
+fn mark() -> u64 {
+    RandomState::new().hash_one(std::process::id())
+}
+
+/// The name of an unfinished file.
+fn beside(path: &Path, mark: u64) -> io::Result<PathBuf> {
+    let mut name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?.to_owned();
+    name.push(format!(".{mark:016x}{UNFINISHED}"));
+    Ok(path.with_file_name(name))
+}
+
+/// Whether a part of a name is one of [`mark`].
 fn is_mark(text: &str) -> bool {
     text.len() == 16 && text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
@@ -170,6 +217,26 @@ mod tests {
         fs::remove_dir_all(&folder).unwrap();
     }
 
+    #[test]
+    fn a_read_only_file_stays() {
+        let folder = std::env::temp_dir().join(format!("upbp-protected-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("a.txt");
+        write_text(&path, "old").unwrap();
+        let writable = fs::metadata(&path).unwrap().permissions();
+        let mut protected = writable.clone();
+        protected.set_readonly(true);
+        fs::set_permissions(&path, protected).unwrap();
+        for error in [check_writable(&path).unwrap_err(), write_text(&path, "new").unwrap_err()] {
+            let OutputError::Write { source, .. } = error else { panic!("{error}") };
+            assert!(source.to_string().contains("read-only"), "{source}");
+        }
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(files(&folder), ["a.txt"]);
+        fs::set_permissions(&path, writable).unwrap();
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
     #[cfg(unix)]
     #[test]
     fn links_and_devices_stay_what_they_are() {
@@ -183,6 +250,11 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), "new");
         write_text(Path::new("/dev/null"), "text").unwrap();
         assert!(is_special(Path::new("/dev/null")));
+        // A link to a file to come makes that file.
+        let (new, link) = (folder.join("new"), folder.join("to_come"));
+        std::os::unix::fs::symlink("new", &link).unwrap();
+        write_text(&link, "new").unwrap();
+        assert!(link.is_symlink() && new.is_file());
         fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -30,6 +30,8 @@ struct Builder<'a> {
     problems: Vec<Problem>,
     /// Of the description and of the files that were read.
     hash: Fnv1a,
+    /// The files that were read.
+    files: Vec<PathBuf>,
 }
 
 impl ReadyScene {
@@ -84,6 +86,7 @@ impl ReadyScene {
             base_dir: base_dir.as_ref(),
             problems: Vec::new(),
             hash: Fnv1a(description.hash()),
+            files: Vec::new(),
         };
         let scene = builder.build();
         match scene {
@@ -165,8 +168,21 @@ impl Builder<'_> {
             }
         };
         let hash = self.hash.0;
+        let files = std::mem::take(&mut self.files);
         let camera = camera?;
-        Some(ReadyScene { geometry, surfaces, bodies, lights, media, camera, outside, bounds, origin, hash })
+        Some(ReadyScene {
+            geometry,
+            surfaces,
+            bodies,
+            lights,
+            media,
+            camera,
+            outside,
+            bounds,
+            origin,
+            hash,
+            files,
+        })
     }
 
     fn problem(&mut self, item: impl Into<String>, message: impl Display) {
@@ -181,8 +197,11 @@ impl Builder<'_> {
         }
     }
 
-    fn path(&self, file: &str) -> PathBuf {
-        self.base_dir.join(file)
+    /// The path of a file to read.
+    fn path(&mut self, file: &str) -> PathBuf {
+        let path = self.base_dir.join(file);
+        self.files.push(path.clone());
+        path
     }
 
     fn medium(&mut self, item: &str, name: &str, ids: &BTreeMap<&str, MediumId>) -> Option<MediumId> {
