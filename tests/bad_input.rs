@@ -23,6 +23,12 @@ fn refused(folder: &Path, arguments: &[&str], words: &[&str]) {
         assert!(text.contains(word), "{arguments:?}: expected `{word}` in: {text}");
     }
     assert!(!text.contains("panicked"), "{text}");
+    let mut parts = text.split("because: ").map(str::trim);
+    let mut said = parts.next().unwrap_or_default().to_owned();
+    for cause in parts {
+        assert!(!said.contains(cause), "{arguments:?}: `{cause}` is said twice: {text}");
+        said += cause;
+    }
     assert_eq!(list(folder), before, "{arguments:?} left a file");
 }
 
@@ -118,6 +124,7 @@ fn settings_and_options_that_make_no_sense_are_refused() {
     write("infinite.ron", "(radii: (bb1d: Scene(inf)))");
     write("typo.ron", "(\n  sed: 1,\n)");
     write("image.exr", "this is no image");
+    write("image.state", "this is no state");
     for (arguments, words) in [
         (&["--settings", "zero.ron"][..], &["radii.pb2d", "positive"][..]),
         (&["--settings", "infinite.ron"], &["radii.bb1d"]),
@@ -134,11 +141,13 @@ fn settings_and_options_that_make_no_sense_are_refused() {
         (&["--iterations", "5..5"], &["--iterations"]),
         (&["--iterations", "0..300000000"], &["--iterations", "268435456"]),
         (&["--save-every", "5"], &["--state"]),
-        (&["--state", "image.exr"], &["image.exr", "not a state"]),
+        (&["--state", "image.exr"], &["image.exr", ".state"]),
+        (&["--state", "image.state"], &["image.state", "not a state"]),
         (&["--state", "no/such/folder/a.state"], &["no/such/folder/a.state"]),
         (&["--size", "4000x4000", "--memory", "100"], &["4000 x 4000", "100 MiB"]),
         (&["--target-error", "0"], &["--target-error"]),
-        (&["--threads", "0"], &["--threads"]),
+        (&["--threads", "0"], &["--threads", "from 1 to", "16 per core"]),
+        (&["--threads", "1000000"], &["--threads", "from 1 to", "16 per core"]),
         (&["--reference", "image.exr"], &["image.exr"]),
         (&["--frobnicate"], &["--frobnicate"]),
         (&["-o", "no/such/folder/out.exr"], &["no/such/folder/out.exr"]),

@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --example cornell_media` renders the shipped scene; `-- --help` lists the options.
 
+mod bar;
 #[path = "../support/exit.rs"]
 mod exit;
 #[path = "../support/files.rs"]
@@ -9,6 +10,8 @@ mod files;
 mod interrupt;
 mod options;
 mod render;
+#[path = "../support/threads.rs"]
+mod threads;
 
 use std::error::Error;
 use std::num::NonZeroUsize;
@@ -17,12 +20,13 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use upbp_core::{
-    OutputError, RenderPlan, Renderer, Settings, Start, State, StateError, StopReason, check_writable, read_exr,
-    remove_leftovers, write_text,
+    OutputError, Preparing, RenderError, RenderPlan, Renderer, Settings, Start, State, StateError, StopReason,
+    check_outputs, check_writable, read_exr, remove_leftovers, write_text,
 };
 use upbp_scene::ReadyScene;
 
-use exit::{Failure, finish, say};
+use bar::Bar;
+use exit::{Failure, complain, finish, say};
 use options::Options;
 use render::{Beside, render};
 
@@ -41,10 +45,28 @@ fn run(options: &Options) -> Result<(), Failure> {
     let path = options.scene.clone().unwrap_or_else(shipped_scene);
     let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
     let scene = load(&path, options).map_err(Failure::input)?;
+    let outputs = options.outputs();
+    let read = scene.files().iter().map(|file| ("a mesh or an image of the scene", file.as_path()));
+    let inputs: Vec<_> =
+        [("the scene", path.as_path())].into_iter().chain(options.inputs()).chain(read).collect();
+    check_outputs(&outputs, &inputs).map_err(Failure::input)?;
+    if !options.check {
+        // Before the work, not after it.
+        for output in outputs {
+            check_writable(output.path).map_err(Failure::input)?;
+            remove_leftovers(output.path);
+        }
+    }
     let reference = options.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
     let plan = options.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
-    let start = Start { plan, canceller, seconds: options.stop().seconds, progress: None };
-    let mut renderer = scene.start_renderer(settings, start).map_err(Failure::input)?;
+    let bar = Bar::on_stderr(options.quiet || options.check);
+    let mut show = |now: Preparing| bar.prepare(now.step);
+    let start =
+        Start { plan, canceller, seconds: options.stop().seconds, progress: Some(&mut show) };
+    let mut renderer = scene.start_renderer(settings, start).map_err(|error| match error {
+        RenderError::Cancelled => Failure::Interrupted(format!("interrupted: {error}")),
+        error => Failure::input(error),
+    })?;
     renderer
         .identify_scene(&format!("{} ({:016x})", path.display(), scene.hash()), &scene.hash().to_le_bytes());
     let rect = renderer.film().rect();
@@ -69,26 +91,16 @@ fn run(options: &Options) -> Result<(), Failure> {
     if options.check {
         return say(&format!("{}: no problems; {}", path.display(), renderer.census()));
     }
-    // Before the work, not after it.
-    let picture = files::picture(&options.output);
-    let outputs = [
-        Some(options.output.as_path()),
-        Some(picture.as_path()),
-        options.report.as_deref(),
-        options.state.as_deref(),
-        options.save_plan.as_deref(),
-    ];
-    for output in outputs.into_iter().flatten() {
-        check_writable(output).map_err(Failure::input)?;
-        remove_leftovers(output);
+    if options.is_lost_share() && !options.quiet {
+        complain("note: without --state these iterations cannot be merged with others");
     }
 
     let beside = Beside {
         reference: reference.as_ref(),
         state: options.state.as_deref().map(|path| (path, options.save_every())),
-        quiet: options.quiet,
+        bar,
     };
-    let reason = render(&mut renderer, &options.stop(), &beside);
+    let reason = render(&mut renderer, &options.stop(), beside);
     write(renderer.state(), reason, options)
 }
 
@@ -124,21 +136,23 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
         attempt(write_text(path, &state.identity().plan.to_string()));
     }
     let report = state.report();
-    // Before the first iteration there is no picture.
-    let rendered = report.iterations > 0;
+    // Before the first pixels there is no picture.
+    let rendered = !state.film().is_empty();
     if rendered {
-        attempt(files::write_images(state, &report, &options.output));
+        attempt(options.output.write(state, &report));
     }
     if let Some(path) = &options.report {
         attempt(files::write_report(&report, path));
     }
     Failure::all(&failures)?;
     if !options.quiet {
-        let picture = files::picture(&options.output);
         let wrote = if rendered {
-            format!("wrote {} and {}", options.output.display(), picture.display())
+            let names: Vec<_> =
+                options.output.outputs().map(|file| file.path.display().to_string()).collect();
+            format!("wrote {}", names.join(" and "))
         } else {
-            "nothing was rendered".to_owned()
+            "nothing was rendered: the light sub-paths of the first iteration were not done (--time, --light-paths)"
+                .to_owned()
         };
         say(&format!("{report}{wrote}"))?;
     }

@@ -2,12 +2,15 @@
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Parser;
-use upbp_core::{LightPaths, MAX_ITERATIONS, Settings, Stop, Techniques};
+use upbp_core::{Content, LightPaths, MAX_ITERATIONS, Output, Settings, Stop, Techniques};
 use upbp_scene::description::Count;
+
+use crate::files::{self, Images};
+use crate::threads::threads;
 
 /// Seconds of rendering if nothing else says when to stop.
 const DEFAULT_SECONDS: f64 = 60.0;
@@ -19,9 +22,9 @@ const DEFAULT_SECONDS: f64 = 60.0;
 pub(crate) struct Options {
     /// Scene file (RON) [default: the one that comes with the project]
     pub(crate) scene: Option<PathBuf>,
-    /// Image to write, OpenEXR; a PNG of the same name is written beside it
-    #[arg(short, long, value_name = "OUT.exr", default_value = "cornell_media.exr")]
-    pub(crate) output: PathBuf,
+    /// Image to write: OpenEXR, and a PNG of the same name beside it; or OUT.png, a PNG alone
+    #[arg(short, long, value_name = "OUT.exr", default_value = "cornell_media.exr", value_parser = files::path(Images::named))]
+    pub(crate) output: Images,
     /// Size of the film in pixels instead of the scene's, such as 640x360
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<[Count; 2]>,
@@ -41,10 +44,10 @@ pub(crate) struct Options {
     #[arg(long)]
     deterministic: bool,
     /// Run what a plan says that another render has saved
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE.ron")]
     pub(crate) plan: Option<PathBuf>,
     /// Save the plan: what iterations run, as far as it was decided
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE.ron", value_parser = files::path(plan))]
     pub(crate) save_plan: Option<PathBuf>,
     /// Most edges of a path between light and camera
     #[arg(long, value_name = "K")]
@@ -52,8 +55,8 @@ pub(crate) struct Options {
     /// Seed of all random numbers
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
-    /// Threads [default: one per core]; the image does not depend on it
-    #[arg(long, value_name = "T")]
+    /// Threads [default: one per core; at most 16 per core]; the image does not depend on it
+    #[arg(long, value_name = "T", value_parser = threads)]
     pub(crate) threads: Option<NonZeroUsize>,
     /// Light sub-paths per iteration [default: one per pixel]
     #[arg(long, value_name = "N")]
@@ -71,10 +74,10 @@ pub(crate) struct Options {
     #[arg(long, value_name = "REF.exr")]
     pub(crate) reference: Option<PathBuf>,
     /// Write the report as JSON
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_name = "FILE.json", value_parser = files::path(files::report))]
     pub(crate) report: Option<PathBuf>,
     /// File to go on from if it is there, and to save to: now and then, at the end, and when interrupted
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE.state", value_parser = files::path(files::state))]
     pub(crate) state: Option<PathBuf>,
     /// Time between two savings of the state; what is lost in a crash is no more than this and an iteration
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, requires = "state")]
@@ -104,6 +107,31 @@ impl Options {
     /// Time between two savings.
     pub(crate) fn save_every(&self) -> Duration {
         Duration::try_from_secs_f64(self.save_every).unwrap_or(Duration::MAX)
+    }
+
+    /// All files that are written. The state, which is read too if it is there, is one of them.
+    pub(crate) fn outputs(&self) -> Vec<Output<'_>> {
+        let others = [
+            ("the report", &self.report, Content::Report),
+            ("the state", &self.state, Content::State),
+            ("the plan to save", &self.save_plan, Content::Plan),
+        ];
+        let others = others
+            .into_iter()
+            .filter_map(|(role, path, content)| Some(Output { role, path: path.as_deref()?, content }));
+        self.output.outputs().chain(others).collect()
+    }
+
+    /// The files that are only read, as far as the command line tells.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        [("the settings", &self.settings), ("the plan", &self.plan), ("the reference", &self.reference)]
+            .into_iter()
+            .filter_map(|(role, path)| Some((role, path.as_deref()?)))
+    }
+
+    /// Whether others render the rest, and what is rendered here cannot be put together with it.
+    pub(crate) fn is_lost_share(&self) -> bool {
+        self.state.is_none() && self.iterations.as_ref().is_some_and(|iterations| iterations.is_share)
     }
 
     /// The iterations to render, if not all.
@@ -136,6 +164,10 @@ impl Options {
             settings.progressive = false;
         }
     }
+}
+
+fn plan(path: PathBuf) -> Result<PathBuf, String> {
+    files::ends_in(path, &["ron", "plan"])
 }
 
 fn size(text: &str) -> Result<[Count; 2], String> {

@@ -1,36 +1,29 @@
 //! The render: progress, errors against a reference, the state on the disk.
 
-use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
 use upbp_core::{ErrorPoint, ErrorSeries, Image, Progress, Renderer, State, Stop, StopReason};
 
-use crate::exit::complain;
+use crate::bar::Bar;
+use crate::exit::{complain, describe};
 
 /// What is done besides rendering.
 pub(crate) struct Beside<'a> {
     pub(crate) reference: Option<&'a Image>,
     /// Where the state goes, and how often.
     pub(crate) state: Option<(&'a Path, Duration)>,
-    pub(crate) quiet: bool,
+    pub(crate) bar: Bar,
 }
 
 /// Renders until a rule of `stop` holds.
-pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: &Beside<'_>) -> StopReason {
-    let bar = if beside.quiet { ProgressBar::hidden() } else { ProgressBar::new(1000) };
-    if let Ok(style) = ProgressStyle::with_template("[{elapsed_precise}] {bar:40} {percent:>3} %  {msg}") {
-        bar.set_style(style);
-    }
-    // Iterations take seconds: the clock moves meanwhile.
-    bar.enable_steady_tick(Duration::from_millis(200));
-    let terminal = std::io::stderr().is_terminal();
+pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: Beside<'_>) -> StopReason {
+    let Beside { reference, state, bar } = beside;
     let mut errors = ErrorSeries::default();
     let mut saved = Instant::now();
     let outcome = renderer.render(stop, |now: &Progress<'_>| {
-        if let Some(reference) = beside.reference {
+        if let Some(reference) = reference {
             let image = now.film.image();
             errors.push(ErrorPoint {
                 seconds: now.seconds,
@@ -39,14 +32,8 @@ pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: &Beside<'
                 rmse: image.rmse(reference),
             });
         }
-        let message = status(now);
-        bar.set_position((1000.0 * now.fraction) as u64);
-        bar.set_message(message.clone());
-        // Without a terminal a bar is invisible: a line now and then instead.
-        if !terminal && !beside.quiet && now.iterations.is_power_of_two() {
-            complain(&format!("{:3.0} %  {message}", 100.0 * now.fraction));
-        }
-        if let Some((path, every)) = beside.state
+        bar.show(now.iterations, now.fraction, status(now));
+        if let Some((path, every)) = state
             && saved.elapsed() >= every
         {
             save(now.state, path);
@@ -54,7 +41,7 @@ pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: &Beside<'
         }
         ControlFlow::Continue(())
     });
-    bar.finish();
+    bar.end(outcome.reason != StopReason::Cancelled);
     for point in errors.points() {
         renderer.record_error(*point);
     }
@@ -64,18 +51,18 @@ pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: &Beside<'
 /// Saves, or says that it was not possible: a disk that is full now need not be so at the end.
 fn save(state: &State, path: &Path) {
     if let Err(error) = state.save(path) {
-        let cause = std::error::Error::source(&error).map_or_else(String::new, |cause| format!(": {cause}"));
-        complain(&format!("warning: {error}{cause}; the render goes on"));
+        complain(&format!("warning: {}\n  the render goes on", describe(&error)));
     }
 }
 
 /// Iterations, time left, and the error so far.
 fn status(now: &Progress<'_>) -> String {
     let left = if now.fraction > 0.0 { now.seconds * (1.0 / now.fraction - 1.0) } else { f64::INFINITY };
-    let error = if now.estimated_error.is_finite() {
-        format!("estimated relMSE {:.2e}", now.estimated_error)
+    let (error, doubt) = (now.estimated_error, if now.estimated_error.doubt.is_some() { ">" } else { "" });
+    let error = if error.relative_mse.is_finite() {
+        format!("relMSE {doubt}{:.1e}", error.relative_mse)
     } else {
-        "error not known yet".to_owned()
+        "error unknown".to_owned()
     };
     format!("iteration {}, {left:.0} s left, {error}", now.iterations)
 }

@@ -12,9 +12,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use upbp_core::{OutputError, State, check_writable};
+use upbp_core::{Content, Output, OutputError, State, check_outputs, check_writable};
 
 use exit::{Failure, finish, say};
+use files::Images;
 
 /// Merges states of one render with disjoint iterations, in any order, to the bits of a single run.
 #[derive(Debug, Parser)]
@@ -24,17 +25,29 @@ struct Options {
     #[arg(required = true, value_name = "STATE")]
     states: Vec<PathBuf>,
     /// Where to save the merged state: it can be merged again, and resumed
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE.state", value_parser = files::path(files::state))]
     state: Option<PathBuf>,
-    /// Image to write, OpenEXR; a PNG of the same name is written beside it
-    #[arg(short, long, value_name = "OUT.exr")]
-    output: Option<PathBuf>,
+    /// Image to write: OpenEXR, and a PNG of the same name beside it; or OUT.png, a PNG alone
+    #[arg(short, long, value_name = "OUT.exr", value_parser = files::path(Images::named))]
+    output: Option<Images>,
     /// Write the report as JSON
-    #[arg(long, value_name = "FILE.json")]
+    #[arg(long, value_name = "FILE.json", value_parser = files::path(files::report))]
     report: Option<PathBuf>,
     /// Print nothing but errors
     #[arg(long)]
     quiet: bool,
+}
+
+impl Options {
+    /// All files that are written.
+    fn outputs(&self) -> Vec<Output<'_>> {
+        let others =
+            [("the state", &self.state, Content::State), ("the report", &self.report, Content::Report)];
+        let others = others
+            .into_iter()
+            .filter_map(|(role, path, content)| Some(Output { role, path: path.as_deref()?, content }));
+        self.output.iter().flat_map(Images::outputs).chain(others).collect()
+    }
 }
 
 fn main() -> ExitCode {
@@ -42,9 +55,11 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Failure> {
-    let picture = options.output.as_deref().map(files::picture);
-    for output in [&options.state, &options.output, &picture, &options.report].into_iter().flatten() {
-        check_writable(output).map_err(Failure::input)?;
+    let outputs = options.outputs();
+    let inputs: Vec<_> = options.states.iter().map(|path| ("a state to merge", path.as_path())).collect();
+    check_outputs(&outputs, &inputs).map_err(Failure::input)?;
+    for output in outputs {
+        check_writable(output.path).map_err(Failure::input)?;
     }
     let merged = merge(&options.states, options.quiet)?;
     let report = merged.report();
@@ -53,8 +68,8 @@ fn run(options: &Options) -> Result<(), Failure> {
     if let Some(path) = &options.state {
         attempt(merged.save(path));
     }
-    if let Some(path) = &options.output {
-        attempt(files::write_images(&merged, &report, path));
+    if let Some(images) = &options.output {
+        attempt(images.write(&merged, &report));
     }
     if let Some(path) = &options.report {
         attempt(files::write_report(&report, path));

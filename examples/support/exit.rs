@@ -39,7 +39,7 @@ impl Failure {
 }
 
 /// An error with all its causes.
-fn describe(error: &dyn Error) -> String {
+pub(crate) fn describe(error: &dyn Error) -> String {
     match error.source() {
         Some(cause) => format!("{error}\n  because: {}", describe(cause)),
         None => error.to_string(),
