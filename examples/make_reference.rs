@@ -16,8 +16,11 @@ use std::str::FromStr;
 
 use clap::Parser;
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image as ExrImage, WritableImage as _, f16};
-use upbp_core::{Image, Radii, Radius, Settings, Stop, TechniqueSet};
-use upbp_scene::ReadyScene;
+use upbp_core::{
+    Content, Image, Output, OutputError, Radii, Radius, Settings, Stop, TechniqueSet, check_outputs,
+    check_writable,
+};
+use upbp_scene::{ReadyScene, SceneError};
 
 use scenes::{Group, Shipped, names};
 
@@ -82,13 +85,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     } else {
         options.scenes.clone()
     };
+    let folder =
+        options.out.clone().unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/suite"));
+    let jobs = wanted.into_iter().map(|name| Job::open(name, &folder)).collect::<Result<Vec<_>, _>>()?;
+    if !options.dry {
+        std::fs::create_dir_all(&folder)?;
+        check_files(&jobs)?;
+    }
     println!(
         "| scene | set | batches × iterations | mean R, G, B | relMSE of its noise | relMSE × s | worst tile |"
     );
     println!("|---|---|---|---|---|---|---|");
-    for name in wanted {
-        let file = Shipped::find(&name).map_or_else(|| PathBuf::from(&name), |shipped| shipped.scene());
-        let scene = ReadyScene::load(&file)?;
+    for Job { name, scene, reference, .. } in jobs {
         let mut first: Option<Batches> = None;
         for (index, set) in options.sets.iter().enumerate() {
             let count = if index == 0 { options.batches } else { (options.batches / 4).max(LEAST_BATCHES) };
@@ -96,17 +104,43 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("| {name} | {} {}", set.name, batches.row(first.as_ref()));
             first.get_or_insert(batches);
         }
-        if let (Some(reference), false) = (first, options.dry) {
-            let folder = options
-                .out
-                .clone()
-                .unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/suite"));
-            std::fs::create_dir_all(&folder)?;
-            let name = file.with_extension("exr");
-            reference.write(&folder.join(name.file_name().unwrap_or_default()))?;
+        if let (Some(batches), false) = (first, options.dry) {
+            batches.write(&reference)?;
         }
     }
     Ok(())
+}
+
+/// A scene to render, and where its reference goes.
+struct Job {
+    name: String,
+    file: PathBuf,
+    scene: ReadyScene,
+    reference: PathBuf,
+}
+
+impl Job {
+    fn open(name: String, folder: &Path) -> Result<Self, SceneError> {
+        let file = Shipped::find(&name).map_or_else(|| PathBuf::from(&name), |shipped| shipped.scene());
+        let scene = ReadyScene::load(&file)?;
+        let reference = folder.join(file.with_extension("exr").file_name().unwrap_or_default());
+        Ok(Self { name, file, scene, reference })
+    }
+}
+
+/// Checks, before the work, that the references can be written, and destroy nothing.
+fn check_files(jobs: &[Job]) -> Result<(), OutputError> {
+    let outputs: Vec<_> = jobs
+        .iter()
+        .map(|job| Output { role: "the reference", path: &job.reference, content: Content::Exr })
+        .collect();
+    let inputs: Vec<_> = jobs
+        .iter()
+        .flat_map(|job| [&job.file].into_iter().chain(job.scene.files()))
+        .map(|path| ("a file of a scene", path.as_path()))
+        .collect();
+    check_outputs(&outputs, &inputs)?;
+    outputs.iter().try_for_each(|output| check_writable(output.path))
 }
 
 /// Independent renders of one scene with one set.

@@ -7,9 +7,12 @@
 mod stress;
 #[path = "../../tests/support/mod.rs"]
 mod support;
+#[path = "../support/threads.rs"]
+mod threads;
 
 use std::collections::BTreeMap;
 use std::error::Error;
+use std::num::NonZeroUsize;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -29,9 +32,9 @@ struct Options {
     /// Every n-th case only
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
-    /// Cases at the same time [default: one per core]
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
-    threads: Option<u64>,
+    /// Cases at the same time [default: one per core; at most 16 per core]
+    #[arg(long, value_parser = threads::threads)]
+    threads: Option<NonZeroUsize>,
     /// Print the cases instead of rendering them
     #[arg(long)]
     list: bool,
@@ -62,13 +65,13 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         return Ok(true);
     }
     let workers = match options.threads {
-        Some(threads) => threads as usize,
-        None => std::thread::available_parallelism()?.get(),
+        Some(threads) => threads,
+        None => std::thread::available_parallelism()?,
     };
     let start = Instant::now();
     let bar = ProgressBar::new(cases.len() as u64)
         .with_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {eta} {msg}")?);
-    let results = in_parallel(cases.len(), workers, |index| {
+    let results = in_parallel(cases.len(), workers.get(), |index| {
         let result = cases[index].judge();
         if let Err(wrong) = &result {
             bar.suspend(|| println!("FAILED {}: {wrong}", line(&cases[index])));

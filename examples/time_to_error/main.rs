@@ -15,15 +15,20 @@ mod plot;
 mod scenes;
 mod subject;
 mod table;
+#[path = "../support/threads.rs"]
+mod threads;
 mod verdict;
 
 use std::error::Error;
 use std::num::NonZeroUsize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use upbp_core::{ErrorPoint, Settings, TechniqueSet, check_writable, write_png};
+use upbp_core::{
+    Content, ErrorPoint, Output, OutputError, Settings, TechniqueSet, check_outputs, check_writable,
+    write_png, write_text,
+};
 
 use analysis::Curve;
 use options::{NamedSet, Options};
@@ -67,9 +72,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&options.out)
         .map_err(|error| format!("cannot make the folder {}: {error}", options.out.display()))?;
     let table_path = options.out.join("errors.csv");
-    check_writable(&table_path)?;
     let summary_path = options.out.join("summary.md");
-    check_writable(&summary_path)?;
+    check_files(&table_path, &summary_path, &subjects, options)?;
 
     let (sets, seeds, seconds) = (options.sets()?, options.seeds(), options.seconds());
     let mut csv = table::CSV_HEADER.to_owned();
@@ -90,12 +94,12 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             curves.push(curve);
         }
         // What was measured stays, should a later scene fail.
-        write(&table_path, &csv)?;
+        write_text(&table_path, &csv)?;
         plot(subject, &curves, &options.out)?;
         verdicts.extend(Verdict::new(&subject.name, &curves, seconds));
     }
     say(&format!("\n{}", verdict::markdown(&mut verdicts)));
-    write(&summary_path, &summary)?;
+    write_text(&summary_path, &summary)?;
     Ok(())
 }
 
@@ -135,17 +139,37 @@ fn series(
     Ok(series)
 }
 
-fn plot(subject: &Subject, curves: &[Curve], folder: &Path) -> Result<(), Box<dyn Error>> {
-    let drawing = plot::chart(&subject.name, curves, subject.floor.rmse);
-    write(&folder.join(format!("{}.svg", subject.name)), &plot::svg(&drawing))?;
-    write_png(
-        &folder.join(format!("{}.png", subject.name)),
-        &plot::rasterise(&drawing, PIXELS_PER_UNIT),
-        1.0,
-    )?;
-    Ok(())
+/// Where the plots of a scene go: SVG and PNG.
+fn plots(subject: &Subject, folder: &Path) -> [PathBuf; 2] {
+    ["svg", "png"].map(|ending| folder.join(format!("{}.{ending}", subject.name)))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    std::fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))
+/// Checks that everything can be written, and destroys nothing.
+fn check_files(
+    table: &Path,
+    summary: &Path,
+    subjects: &[Subject],
+    options: &Options,
+) -> Result<(), Box<dyn Error>> {
+    let plots: Vec<_> = subjects.iter().map(|subject| plots(subject, &options.out)).collect();
+    let output = |role, path, content| Output { role, path, content };
+    let mut outputs = vec![
+        output("the table", table, Content::Text("scene,set,")),
+        output("the summary", summary, Content::Text("| scene")),
+    ];
+    for [svg, png] in &plots {
+        outputs.extend([output("a plot", svg, Content::Text("<svg")), output("a plot", png, Content::Png)]);
+    }
+    let settings = options.settings.iter().map(|path| ("the settings", path.as_path()));
+    let read = subjects.iter().flat_map(|subject| &subject.files);
+    let read = read.map(|path| ("a file of a scene", path.as_path()));
+    check_outputs(&outputs, &settings.chain(read).collect::<Vec<_>>())?;
+    outputs.iter().try_for_each(|output| Ok(check_writable(output.path)?))
+}
+
+fn plot(subject: &Subject, curves: &[Curve], folder: &Path) -> Result<(), OutputError> {
+    let drawing = plot::chart(&subject.name, curves, subject.floor.rmse);
+    let [svg, png] = plots(subject, folder);
+    write_text(&svg, &plot::svg(&drawing))?;
+    write_png(&png, &plot::rasterise(&drawing, PIXELS_PER_UNIT), 1.0)
 }

@@ -8,6 +8,8 @@ use std::str::FromStr;
 use clap::Parser;
 use upbp_core::{Settings, Techniques};
 
+use crate::threads::threads;
+
 /// The set that is judged: the choice of the program.
 pub(crate) const AUTO: &str = "auto";
 /// Everything, whether it helps or not.
@@ -65,8 +67,8 @@ pub(crate) struct Options {
     /// Folder for the CSV file and the plots; it is made if it is not there
     #[arg(long, value_name = "FOLDER")]
     pub(crate) out: PathBuf,
-    /// Threads [default: one per core]
-    #[arg(long, value_name = "T")]
+    /// Threads [default: one per core; at most 16 per core]
+    #[arg(long, value_name = "T", value_parser = threads)]
     pub(crate) threads: Option<NonZeroUsize>,
 }
 

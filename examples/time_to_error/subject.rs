@@ -25,6 +25,8 @@ pub(crate) struct Subject {
     pub(crate) scene: ReadyScene,
     pub(crate) reference: Image,
     pub(crate) floor: Floor,
+    /// All that was read for it.
+    pub(crate) files: Vec<PathBuf>,
 }
 
 /// Where a scene and its reference are.
@@ -64,7 +66,8 @@ impl Subject {
         let errors = standard_errors(&files.reference)
             .map_err(|error| format!("cannot read {}: {error}", files.reference.display()))?;
         let floor = errors.map_or_else(Floor::default, |errors| floor(&reference, &errors));
-        Ok(Self { name: files.name, scene, reference, floor })
+        let read = [[files.scene, files.reference].as_slice(), scene.files()].concat();
+        Ok(Self { name: files.name, scene, reference, floor, files: read })
     }
 }
 

@@ -20,11 +20,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use upbp_core::{Radii, Radius, Renderer, Settings, Stop, Technique, TechniqueSet};
+use upbp_core::{
+    Content, Output, Radii, Radius, Renderer, Settings, Stop, Technique, TechniqueSet, check_outputs,
+    check_writable, write_text,
+};
 use upbp_scene::ReadyScene;
 
 use compare::{Comparison, Estimate, Reference, Spread};
-use scenes::{Group, Shipped, names};
+use scenes::{Group, SCENES, Shipped, names};
 
 const SETS: [&str; 8] = [
     "pt",
@@ -105,6 +108,16 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         options.sets.clone()
     };
     let seconds = if options.quick { 4.0 } else { options.time };
+    if let Some(path) = &options.csv {
+        // Before the work, not after it.
+        let read: Vec<_> = SCENES.iter().flat_map(|shipped| [shipped.scene(), shipped.reference()]).collect();
+        let inputs: Vec<_> = read.iter().map(|path| ("a scene or a reference", path.as_path())).collect();
+        check_outputs(
+            &[Output { role: "the table", path, content: Content::Text("scene,techniques,") }],
+            &inputs,
+        )?;
+        check_writable(path)?;
+    }
     let mut csv = "scene,techniques,iterations,mean_r,mean_g,mean_b,error_r,error_g,error_b,sigmas_r,sigmas_g,sigmas_b,\
         percent_r,percent_g,percent_b,chi_square,outliers,tile_sigmas,relative_mse,missed\n"
         .to_owned();
@@ -157,7 +170,7 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         exponents(&chosen, seconds)?;
     }
     if let Some(path) = &options.csv {
-        std::fs::write(path, csv).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+        write_text(path, &csv)?;
     }
     Ok(good)
 }

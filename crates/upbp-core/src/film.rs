@@ -275,7 +275,7 @@ impl Film {
             return None;
         }
         let even = self.collect(|i, [even, _]| sum::values(&self.even[i]).map(|v| v / even));
-        let odd: u64 = self.collect(|i, [_, odd]| {
+        let odd = self.collect(|i, [_, odd]| {
             let (total, even) = (self.total(i), sum::values(&self.even[i]));
             // Sums are cut off far below their last digits in single precision: so may be their difference, below zero.
             std::array::from_fn(|c| ((total[c] - even[c]) / odd).max(0.0))
