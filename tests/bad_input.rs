@@ -158,3 +158,20 @@ fn settings_and_options_that_make_no_sense_are_refused() {
         refused(&folder, &all, words);
     }
 }
+
+/// None of these would be refused if it was read to its end.
+#[cfg(unix)]
+#[test]
+fn devices_and_pipes_are_not_read() {
+    let folder = folder("devices");
+    fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
+    let made = std::process::Command::new("mkfifo").arg(folder.join("pipe")).status();
+    assert!(made.expect("mkfifo runs").success());
+    let expected = "expected a regular file, found a device, a pipe or a socket";
+    for path in ["/dev/zero", "pipe"] {
+        refused(&folder, &[path], &[path, expected]);
+        for option in ["--settings", "--plan", "--reference", "--state"] {
+            refused(&folder, &["scene.ron", option, path], &[path, expected]);
+        }
+    }
+}

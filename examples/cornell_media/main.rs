@@ -21,7 +21,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use upbp_core::{
     OutputError, Preparing, RenderError, RenderPlan, Renderer, Settings, Start, State, StateError, StopReason,
-    check_outputs, check_writable, read_exr, remove_leftovers, write_text,
+    check_outputs, check_writable, read_exr, read_text, remove_leftovers, write_text,
 };
 use upbp_scene::ReadyScene;
 
@@ -105,8 +105,7 @@ fn run(options: &Options) -> Result<(), Failure> {
 }
 
 fn read_plan(path: &Path) -> Result<RenderPlan, String> {
-    let text =
-        std::fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let text = read_text(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     RenderPlan::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))
 }
 
@@ -190,8 +189,8 @@ impl Options {
         let mut settings = match &self.settings {
             None => Settings::default(),
             Some(path) => {
-                let text = std::fs::read_to_string(path)
-                    .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+                let text =
+                    read_text(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
                 Settings::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))?
             }
         };

@@ -99,8 +99,8 @@ impl Options {
     /// The settings file, if there is one.
     pub(crate) fn settings(&self) -> Result<Settings, Box<dyn Error>> {
         let Some(path) = &self.settings else { return Ok(Settings::default()) };
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+        let text =
+            upbp_core::read_text(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
         Ok(Settings::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))?)
     }
 }

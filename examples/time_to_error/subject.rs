@@ -5,7 +5,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
-use upbp_core::{Image, read_exr};
+use upbp_core::{Image, open_exr, read_exr};
 use upbp_scene::ReadyScene;
 
 use crate::scenes::{Group, SCENES, Shipped};
@@ -92,7 +92,7 @@ impl Files {
 /// The channels `stderr.R`, `stderr.G`, `stderr.B`, if there are all three.
 fn standard_errors(path: &Path) -> Result<Option<[Vec<f32>; 3]>, exr::error::Error> {
     let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
-    let layer = image.all_attributes().from_file(path)?.layer_data;
+    let layer = image.all_attributes().from_buffered(open_exr(path)?)?.layer_data;
     let channel = |name: &str| {
         let found = layer.channel_data.list.iter().find(|channel| channel.name.to_string() == name)?;
         Some(found.sample_data.values_as_f32().collect::<Vec<f32>>())

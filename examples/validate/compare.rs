@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
-use upbp_core::{Film, Image};
+use upbp_core::{Film, Image, open_exr};
 
 /// Side of a tile, pixels.
 const TILE: usize = 8;
@@ -22,7 +22,7 @@ impl Reference {
     /// Reads the channels `R`, `stderr.R` and so on.
     pub(crate) fn read(path: &Path) -> Result<Self, exr::error::Error> {
         let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
-        let layer = image.all_attributes().from_file(path)?.layer_data;
+        let layer = image.all_attributes().from_buffered(open_exr(path)?)?.layer_data;
         let width = layer.size.width();
         let count = width * layer.size.height();
         let mut reference = Self { width, pixels: vec![[0.0; 3]; count], errors: vec![[0.0; 3]; count] };

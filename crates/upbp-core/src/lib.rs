@@ -9,6 +9,7 @@ mod engine;
 mod error;
 mod error_estimate;
 mod film;
+mod input;
 mod interleave;
 mod iterations;
 mod memory;
@@ -36,6 +37,7 @@ pub use census::Census;
 pub use error::{OutputError, RenderError, SettingsError, StateError};
 pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap};
 pub use film::{Film, Image, Pixel};
+pub use input::{open_exr, open_file, read_text};
 pub use iterations::{IterationSet, MAX_ITERATIONS};
 pub use output::{
     Content, Metadata, Output, check_outputs, check_writable, read_exr, remove_leftovers, write_exr,

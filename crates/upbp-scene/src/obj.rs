@@ -1,9 +1,11 @@
 //! Triangle meshes from Wavefront OBJ files.
 //!
-//! Read are vertices (`v`), normals (`vn`) and faces (`f`); polygons become fans of triangles. Everything
-//! else (texture coordinates, groups, materials) is skipped. Memory is bounded by the size of the file.
+//! Read are vertices (`v`), normals (`vn`) and faces (`f`); polygons become fans of triangles. Texture
+//! coordinates, groups, materials, lines and points are skipped; anything else, such as a free-form surface,
+//! is an error.
 
 use std::collections::BTreeMap;
+use std::io::{BufRead, Read as _};
 
 use glam::Vec3;
 
@@ -29,14 +31,76 @@ pub struct ObjError {
 }
 
 /// A corner of a face: indices of its position and its normal.
-type Corner = (u32, Option<u32>);
+type Corner = (u32, u32);
+
+/// The index of the normal that a corner does not have.
+const NONE: u32 = u32::MAX;
+
+/// The longest line, in bytes.
+const MAX_LINE: u64 = 1 << 20;
+
+/// The most triangles of a mesh: a corner of a polygon takes two bytes of a file and twenty-four of memory.
+const MAX_TRIANGLES: usize = if cfg!(test) { 1 << 12 } else { 1 << 25 };
+
+/// Statements that say nothing about the surface.
+const SKIPPED: [&str; 22] = [
+    "vt",
+    "vp",
+    "g",
+    "o",
+    "s",
+    "mg",
+    "usemtl",
+    "mtllib",
+    "usemap",
+    "maplib",
+    "l",
+    "p",
+    "lod",
+    "bevel",
+    "c_interp",
+    "d_interp",
+    "shadow_obj",
+    "trace_obj",
+    "ctech",
+    "stech",
+    "call",
+    "csh",
+];
 
 impl ObjMesh {
     /// Reads the text of an OBJ file.
     pub fn parse(text: &str) -> Result<Self, ObjError> {
+        Self::read(text.as_bytes())
+    }
+
+    /// Reads an OBJ file line by line, of at most 1 MiB each. A byte order mark at its start is left out.
+    ///
+    /// # Errors
+    ///
+    /// The first line that cannot be read or is no statement, or the last one of a file without faces.
+    pub fn read(mut file: impl BufRead) -> Result<Self, ObjError> {
         let mut parser = Parser::default();
-        for (index, line) in text.lines().enumerate() {
-            parser.line(line).map_err(|message| ObjError { line: index + 1, message })?;
+        let mut bytes = Vec::new();
+        let mut line = 0;
+        loop {
+            let fail = |line, message| ObjError { line, message };
+            bytes.clear();
+            let count = (&mut file).take(MAX_LINE + 1).read_until(b'\n', &mut bytes);
+            if count.map_err(|error| fail(line + 1, error.to_string()))? == 0 {
+                break;
+            }
+            line += 1;
+            if bytes.len() as u64 > MAX_LINE {
+                return Err(fail(line, format!("is longer than {MAX_LINE} bytes")));
+            }
+            // Names and comments in other encodings do not matter.
+            let text = String::from_utf8_lossy(&bytes);
+            let marked = if line == 1 { text.strip_prefix('\u{feff}') } else { None };
+            parser.line(marked.unwrap_or(&text)).map_err(|message| fail(line, message))?;
+        }
+        if parser.triangles.is_empty() {
+            return Err(ObjError { line: line.max(1), message: "the file ends without a face (`f`)".into() });
         }
         Ok(parser.finish())
     }
@@ -60,7 +124,16 @@ impl Parser {
                 if corners.len() < 3 {
                     return Err(format!("a face needs at least 3 corners, found {}", corners.len()));
                 }
+                if self.triangles.len() + corners.len() > MAX_TRIANGLES {
+                    return Err(format!("the mesh has more than {MAX_TRIANGLES} triangles"));
+                }
                 self.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+            }
+            Some(word) if !SKIPPED.contains(&word) => {
+                let word: String = word.chars().take(20).flat_map(char::escape_debug).collect();
+                return Err(format!(
+                    "expected a statement about polygons, such as `v` or `f`, found `{word}`"
+                ));
             }
             _ => {}
         }
@@ -73,15 +146,15 @@ impl Parser {
         let position = parts.next().unwrap_or("");
         let position = index(position, self.positions.len(), "vertex")?;
         let normal = match parts.nth(1) {
-            Some(normal) if !normal.is_empty() => Some(index(normal, self.normals.len(), "normal")?),
-            _ => None,
+            Some(normal) if !normal.is_empty() => index(normal, self.normals.len(), "normal")?,
+            _ => NONE,
         };
         Ok((position, normal))
     }
 
     fn finish(self) -> ObjMesh {
         let Self { positions, normals, triangles } = self;
-        let smooth = !triangles.is_empty() && triangles.iter().flatten().all(|corner| corner.1.is_some());
+        let smooth = triangles.iter().flatten().all(|corner| corner.1 != NONE);
         if !smooth {
             let indices = triangles.iter().map(|triangle| triangle.map(|corner| corner.0)).collect();
             return ObjMesh { positions, indices, normals: None };
@@ -94,8 +167,7 @@ impl Parser {
                 *numbers.entry((position, normal)).or_insert_with(|| {
                     let number = mesh.positions.len() as u32;
                     mesh.positions.push(positions[position as usize]);
-                    let normal = normal.map_or(Vec3::ZERO, |normal| normals[normal as usize]);
-                    mesh.normals.get_or_insert_default().push(normal);
+                    mesh.normals.get_or_insert_default().push(normals[normal as usize]);
                     number
                 })
             }));
@@ -123,7 +195,7 @@ fn index(word: &str, count: usize, what: &str) -> Result<u32, String> {
     let index = if number < 0 { count.checked_sub(place) } else { place.checked_sub(1) };
     index
         .filter(|&index| index < count)
-        .and_then(|index| u32::try_from(index).ok())
+        .and_then(|index| u32::try_from(index).ok().filter(|&index| index != NONE))
         .ok_or_else(|| format!("there is no {what} {number} among the {count} before this line"))
 }
 
@@ -156,8 +228,47 @@ mod tests {
     }
 
     #[test]
+    fn a_byte_order_mark_and_other_encodings_do_no_harm() {
+        let mesh = b"\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\n# caf\xe9\r\ng caf\xe9\r\nv 1 1 0\r\nf 1 2 3";
+        let mesh = ObjMesh::read(&mesh[..]).unwrap();
+        assert_eq!(mesh.positions.len(), 3);
+        assert_eq!(mesh.indices, [[0, 1, 2]]);
+    }
+
+    /// Without an end, and without a line's end.
+    #[test]
+    fn endless_files_end_at_their_first_line() {
+        for byte in [0, b' ', b'#', b'f', 0xff] {
+            let error = ObjMesh::read(std::io::BufReader::new(std::io::repeat(byte))).unwrap_err();
+            assert_eq!(error.to_string(), "line 1: is longer than 1048576 bytes");
+        }
+    }
+
+    #[test]
+    fn corners_that_are_repeated_do_not_take_all_memory() {
+        let polygon = "v 0 0 0\nf".to_owned() + &" 1".repeat(MAX_TRIANGLES / 2);
+        assert!(ObjMesh::parse(&polygon).is_ok());
+        let error = ObjMesh::parse(&(polygon.clone() + &polygon[7..] + &polygon[7..])).unwrap_err();
+        assert_eq!(error.to_string(), format!("line 4: the mesh has more than {MAX_TRIANGLES} triangles"));
+    }
+
+    #[test]
     fn errors_have_a_line() {
         let cases = [
+            ("", "line 1: the file ends without a face (`f`)"),
+            ("# nothing\nv 0 0 0\ng a\n", "line 3: the file ends without a face (`f`)"),
+            (
+                "v 0 0 0\nLorem ipsum",
+                "line 2: expected a statement about polygons, such as `v` or `f`, found `Lorem`",
+            ),
+            (
+                "\0\u{7}v\n",
+                "line 1: expected a statement about polygons, such as `v` or `f`, found `\\0\\u{7}v`",
+            ),
+            (
+                "surf 0 1 0 1 1",
+                "line 1: expected a statement about polygons, such as `v` or `f`, found `surf`",
+            ),
             ("v 0 0\n", "line 1: expected three coordinates"),
             ("\nv 0 x 0\n", "line 2: expected a finite coordinate, found `x`"),
             ("v 0 NaN 0\n", "line 1: expected a finite coordinate, found `NaN`"),

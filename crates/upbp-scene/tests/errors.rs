@@ -33,19 +33,19 @@ fn wrong_values_have_a_line_and_a_column() {
         ),
         (
             "(version: 1,\n media: {\n  \"fog\": Homogeneous(sigma_a: -2.0),\n })",
-            "3:31: expected finite numbers of at least 0, found -2",
+            "3:31: expected numbers from 0 to 1e12, found -2",
         ),
         (
             "(version: 1,\n media: {\n  \"fog\": Homogeneous(sigma_s: (1, NaN, 1)),\n })",
-            "3:41: expected finite numbers of at least 0, found (1, NaN, 1)",
+            "3:41: expected numbers from 0 to 1e12, found (1, NaN, 1)",
         ),
         (
             "(version: 1, media: { \"a\": Homogeneous(sigma_s: inf) })",
-            "1:49: expected finite numbers of at least 0, found inf",
+            "1:49: expected numbers from 0 to 1e12, found inf",
         ),
         (
             "(version: 1, media: { \"a\": Homogeneous(sigma_s: 1e40) })",
-            "1:49: expected finite numbers of at least 0, found inf",
+            "1:49: expected numbers from 0 to 1e12, found inf",
         ),
         (
             "(version: 1, media: { \"a\": Homogeneous(phase: HenyeyGreenstein(1.0)) })",
@@ -91,7 +91,7 @@ fn wrong_values_have_a_line_and_a_column() {
         ("(version: 1, film: (width: -3))", "1:29: Integer is out of bounds"),
         (
             "(version: 1,\n\ncamera: Perspective(origin: (0, 0), target: (0, 0, 0), fov_degrees: 40))",
-            "3:34: Expected an array of length 3 but found 2 elements instead",
+            "3:34: Expected three numbers in parentheses (x, y, z) but found 2 elements instead",
         ),
         (
             "(version: 1, camera: Perspective(origin: (0, inf, 0), target: (0, 0, 0), fov_degrees: 40))",
@@ -103,11 +103,11 @@ fn wrong_values_have_a_line_and_a_column() {
         ),
         (
             "(version: 1, shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 0), material: \"a\")])",
-            "1:68: expected a finite number above 0, found 0",
+            "1:68: expected a number above 0, from 1.2e-38 to 1e12, found 0",
         ),
         (
             "(version: 1, lights: [Point(position: (0, 0, 0), intensity: -1)])",
-            "1:62: expected finite numbers of at least 0, found -1",
+            "1:62: expected numbers from 0 to 1e12, found -1",
         ),
         (
             "(version: 1, lights: [Spot(position: (0, 0, 0), intensity: 1, cutoff_degrees: 200)])",
@@ -190,6 +190,36 @@ fn problems_of_shapes_name_the_shape() {
 }
 
 #[test]
+fn a_body_that_another_hides_is_refused() {
+    let outer = ["Box(min: (-1, -1, -1), max: (1, 1, 1))", "Sphere(centre: (0, 0, 0), radius: 1)"];
+    let cases = [
+        (outer[0], "Box(min: (-1, -1, -0.5), max: (0.5, 0.5, 0.5))", 1, true),
+        (outer[0], "Box(min: (-1.1, -1, -0.5), max: (0.5, 0.5, 0.5))", 1, false),
+        (outer[0], "Sphere(centre: (0, 0, 0), radius: 0.5)", 1, true),
+        (outer[1], "Sphere(centre: (0.5, 0, 0), radius: 0.5)", 1, true),
+        (outer[1], "Sphere(centre: (0.6, 0, 0), radius: 0.5)", 1, false),
+        (outer[1], "Box(min: (0, 0, 0), max: (0.5, 0.5, 0.5))", 1, true),
+        (outer[1], "Box(min: (0, 0, 0), max: (0.9, 0.5, 0.5))", 1, false),
+        // Without a number the smaller one counts.
+        (outer[0], "Box(min: (-1, -1, -0.5), max: (0.5, 0.5, 0.5))", 0, false),
+    ];
+    for (outer, inner, priority, refused) in cases {
+        let text = format!(
+            r#"(version: 1, {CAMERA} {MATERIALS} {LIGHT} shapes: [
+                (name: "vessel", geometry: {outer}, material: "glass", priority: {priority}),
+                (name: "water", geometry: {inner}, material: "null", interior: "fog")])"#
+        );
+        match ReadyScene::from_ron_str(&text, "") {
+            Ok(_) => assert!(!refused, "{outer} {inner}"),
+            Err(error) => {
+                let expected = "shape `water`: lies inside of shape `vessel`, whose priority 1 is higher than its own 0: it would be nowhere";
+                assert!(refused && error.to_string().ends_with(expected), "{outer} {inner}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
 fn problems_of_meshes_name_the_triangle() {
     const CORNERS: &str = "positions: [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (2, 0, 0)]";
     let cases = [
@@ -210,7 +240,7 @@ fn problems_of_meshes_name_the_triangle() {
         (
             "CORNERS, indices: [(0, 1, 2)], scale: 1e12, translate: (1, 1, 1)",
             "white",
-            "position 4: expected finite coordinates between -1e12 and 1e12, found (2000000000000, 1, 1)",
+            "position 4: expected finite coordinates between -1e12 and 1e12, found (2e12, 1, 1)",
         ),
         (
             "CORNERS, indices: [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]",
@@ -287,6 +317,43 @@ fn all_problems_are_reported_at_once() {
   shape `floor`: unknown material `wood`, known: `glass`, `null`, `white`
   scene: nothing in it shines: no light, no shape with an emission, no medium that emits";
     assert_eq!(error(&text), expected);
+}
+
+/// None of these scenes would be refused if it was read to its end.
+#[cfg(unix)]
+#[test]
+fn devices_and_pipes_are_refused() {
+    let pipe = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("pipe");
+    let _ = std::fs::remove_file(&pipe);
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in ["/dev/zero", "/dev/urandom", pipe.to_str().unwrap()] {
+        let expected = "expected a regular file, found a device, a pipe or a socket";
+        let mesh =
+            format!("{MATERIALS} {LIGHT} shapes: [(geometry: Mesh(file: \"{path}\"), material: \"white\")]");
+        assert_eq!(problem(&mesh), format!("shape 1: mesh `{path}`: {expected}"));
+        let image = problem(&format!("lights: [Image(file: \"{path}\")]"));
+        assert!(image.starts_with("light 1 (Image): ") && image.ends_with(expected), "{image}");
+        let scene = ReadyScene::load(path).unwrap_err().to_string();
+        assert_eq!(scene, format!("{path}: cannot be read: {expected}"));
+    }
+}
+
+#[test]
+fn meshes_that_are_none_are_refused_by_line() {
+    let folder = env!("CARGO_TARGET_TMPDIR");
+    let read = |name: &str, bytes: &[u8]| {
+        std::fs::write(std::path::Path::new(folder).join(name), bytes).unwrap();
+        let rest =
+            format!("{MATERIALS} {LIGHT} shapes: [(geometry: Mesh(file: \"{name}\"), material: \"white\")]");
+        ReadyScene::from_ron_str(&format!("(version: 1, {CAMERA} {rest})"), folder)
+    };
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let marked = read("marked.obj", format!("\u{feff}{corners}f 1 2 3\n").as_bytes());
+    assert!(marked.is_ok(), "{}", marked.unwrap_err());
+    let garbage = read("garbage.obj", b"v 0 0 0\n\x8f\x12garbage").unwrap_err().to_string();
+    assert!(garbage.contains("garbage.obj`: line 2: expected a statement about polygons"), "{garbage}");
+    let points = read("points.obj", corners.as_bytes()).unwrap_err().to_string();
+    assert!(points.ends_with("points.obj`: line 3: the file ends without a face (`f`)"), "{points}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::write_whole;
 use crate::error::OutputError;
 use crate::film::{Film, Image as Picture};
+use crate::input::open_exr;
 use crate::report::Report;
 use crate::settings::Settings;
 
@@ -81,35 +82,23 @@ fn push(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, prefix: &str, ima
 pub fn read_exr(path: &Path) -> std::result::Result<Picture, OutputError> {
     let unreadable =
         |error: exr::error::Error| OutputError::Read { path: path.to_owned(), reason: error.to_string() };
-    check_size(path).map_err(unreadable)?;
-    let image = read_first_rgba_layer_from_file(
-        path,
-        |size, _| Picture {
-            width: size.width() as u32,
-            height: size.height() as u32,
-            pixels: vec![[0.0; 3]; size.width() * size.height()],
-        },
-        |picture: &mut Picture, position, (r, g, b, _): (f32, f32, f32, f32)| {
-            let index = position.y() * picture.width as usize + position.x();
-            picture.pixels[index] = [r, g, b];
-        },
-    )
-    .map_err(unreadable)?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| Picture {
+                width: size.width() as u32,
+                height: size.height() as u32,
+                pixels: vec![[0.0; 3]; size.width() * size.height()],
+            },
+            |picture: &mut Picture, position, (r, g, b): (f32, f32, f32)| {
+                let index = position.y() * picture.width as usize + position.x();
+                picture.pixels[index] = [r, g, b];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(open_exr(path).map_err(|error| unreadable(error.into()))?)
+        .map_err(unreadable)?;
     Ok(image.layer_data.channel_data.pixels)
-}
-
-/// Refuses an image that says it is larger than its file can hold: all memory is taken before the first pixel is read.
-fn check_size(path: &Path) -> exr::error::UnitResult {
-    // No compression of the format makes more of a byte; the rest is for small images.
-    const BYTES_PER_BYTE: u64 = 1100;
-    const SMALL: u64 = 1 << 16;
-    let told = exr::meta::MetaData::read_from_file(path, false)?
-        .headers
-        .iter()
-        .map(|layer| (layer.layer_size.area() as u64).saturating_mul(layer.channels.bytes_per_pixel as u64))
-        .fold(0, u64::saturating_add);
-    if told > SMALL.saturating_add(BYTES_PER_BYTE.saturating_mul(std::fs::metadata(path)?.len())) {
-        return Err(exr::error::Error::Invalid("more pixels than the file can hold".into()));
-    }
-    Ok(())
 }

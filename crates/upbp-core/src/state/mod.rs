@@ -7,7 +7,6 @@ mod checksum;
 mod format;
 mod identity;
 
-use std::fs::File;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -17,6 +16,7 @@ pub use identity::Identity;
 
 use crate::error::{OutputError, StateError};
 use crate::film::Film;
+use crate::input::open_file;
 use crate::iterations::MAX_ITERATIONS;
 use crate::output::write_whole;
 use crate::report::{ErrorSeries, PassTimes, Report};
@@ -112,7 +112,7 @@ impl State {
     /// # Errors
     /// As [`read`](Self::read), with the file's name.
     pub fn load(path: &Path) -> Result<Self, OutputError> {
-        let read = || Self::read(File::open(path)?);
+        let read = || Self::read(open_file(path, u64::MAX)?);
         read().map_err(|source| OutputError::State { path: path.to_owned(), source })
     }
 }

@@ -38,6 +38,25 @@ pub(super) fn rank<'a>(drafts: impl Iterator<Item = BodyDraft<'a>>) -> Vec<Body>
     bodies
 }
 
+/// Whether a body is all inside of another sphere or box, as far as their own boxes tell.
+pub(super) fn is_inside(shape: &Shape, other: &Shape) -> bool {
+    let (min, max) = shape.aabb();
+    match (shape, other) {
+        (_, Shape::Box(_)) => {
+            let (outer_min, outer_max) = other.aabb();
+            outer_min.cmple(min).all() && max.cmple(outer_max).all()
+        }
+        (Shape::Sphere(inner), Shape::Sphere(outer)) => {
+            inner.centre().distance(outer.centre()) + inner.radius() <= outer.radius()
+        }
+        (_, Shape::Sphere(outer)) => {
+            let farthest = (min - outer.centre()).abs().max((max - outer.centre()).abs());
+            farthest.length() <= outer.radius()
+        }
+        _ => false,
+    }
+}
+
 /// The index of refraction around an index-matched body: that of the highest body below it that contains
 /// points all over its surface. A cloud in a glass block has the index of the glass, or a bubble in the
 /// cloud would refract wrongly.

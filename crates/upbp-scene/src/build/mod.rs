@@ -17,6 +17,7 @@ use upbp_estimators::scene::{BoundingSphere, EmitterId};
 use upbp_media::{Homogeneous, MediaError, Medium as _, MediumId, PhaseFunction};
 
 use self::bodies::BodyDraft;
+use self::surfaces::ShapeDraft;
 use crate::description::Fnv1a;
 use crate::description::{Medium, Phase, SceneDescription};
 use crate::error::{Problem, SceneError};
@@ -35,7 +36,7 @@ struct Builder<'a> {
 }
 
 impl ReadyScene {
-    /// Reads a scene file.
+    /// Reads a scene file: a regular file of at most 256 MiB. A byte order mark at its start is left out.
     ///
     /// # Errors
     ///
@@ -55,7 +56,7 @@ impl ReadyScene {
         change: impl FnOnce(&mut SceneDescription),
     ) -> Result<Self, SceneError> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path)
+        let text = upbp_core::read_text(path)
             .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
         let base_dir = path.parent().unwrap_or(Path::new(""));
         let build = || {
@@ -121,6 +122,7 @@ impl Builder<'_> {
             return None;
         }
         let mut drafts: Vec<_> = drafts.into_iter().collect::<Option<_>>()?;
+        self.check_bodies_count(&drafts);
         let far = bounds(drafts.iter().map(|draft| &draft.shape), &lights, camera.as_ref()?.origin());
         let origin = origin_near(&far);
         if origin != Vec3::ZERO {
@@ -183,6 +185,28 @@ impl Builder<'_> {
             hash,
             files,
         })
+    }
+
+    /// A body that is all inside of one with a higher priority would be nowhere.
+    fn check_bodies_count(&mut self, drafts: &[ShapeDraft]) {
+        let mut bodies: Vec<_> = drafts
+            .iter()
+            .enumerate()
+            .filter_map(|(index, draft)| Some((draft.body?.priority, index, &draft.shape)))
+            .collect();
+        bodies.sort_by_key(|(priority, ..)| *priority);
+        for (place, (priority, index, shape)) in bodies.iter().enumerate() {
+            let higher = bodies[place..].iter().filter(|(other, ..)| other > priority);
+            if let Some((other, outer, _)) =
+                higher.clone().find(|(.., other)| bodies::is_inside(shape, other))
+            {
+                let message = format!(
+                    "lies inside of {}, whose priority {other} is higher than its own {priority}: it would be nowhere",
+                    self.shape_item(*outer)
+                );
+                self.problem(self.shape_item(*index), message);
+            }
+        }
     }
 
     fn problem(&mut self, item: impl Into<String>, message: impl Display) {

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
 use super::value::{BeamAngle, Colour, CutoffAngle, Degrees, Positive, Vector};
+use super::{is_default, single};
 
 /// A light. Surfaces that shine are [shapes](super::Shape) with an emission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,6 +42,7 @@ pub enum Light {
         irradiance: Colour,
     },
     /// The same radiance from all directions, infinitely far away.
+    #[serde(deserialize_with = "single::radiance")]
     Constant(Colour),
     /// Radiance from all directions, infinitely far away, by an image.
     Image {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::single;
 use super::value::{Colour, Ior, NonNegative, Reflectance, Roughness};
 
 /// What a surface is made of.
@@ -9,6 +10,7 @@ use super::value::{Colour, Ior, NonNegative, Reflectance, Roughness};
 #[serde(deny_unknown_fields)]
 pub enum Material {
     /// Matt; both sides reflect.
+    #[serde(deserialize_with = "single::reflectance")]
     Lambert(Reflectance),
     /// Matt with a glossy lobe; both sides reflect.
     Phong {
@@ -20,6 +22,7 @@ pub enum Material {
         exponent: NonNegative,
     },
     /// Perfectly smooth metal; both sides reflect.
+    #[serde(deserialize_with = "single::reflectance")]
     Mirror(Reflectance),
     /// Rough metal by its complex index of refraction; both sides reflect.
     Conductor {
@@ -38,6 +41,7 @@ pub enum Material {
         reflectance: Reflectance,
     },
     /// Smooth glass: bounds a body.
+    #[serde(deserialize_with = "single::ior")]
     Dielectric {
         /// Index of refraction of the body.
         ior: Ior,

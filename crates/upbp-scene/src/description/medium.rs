@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
 use super::value::{Asymmetry, Colour, Positive};
+use super::{is_default, single};
 
 /// What fills a body, or everything.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,7 +35,9 @@ pub enum Phase {
     /// As particles much smaller than the wavelength.
     Rayleigh,
     /// By Henyey and Greenstein, with this mean cosine: above 0 forward.
+    #[serde(deserialize_with = "single::g")]
     HenyeyGreenstein(Asymmetry),
     /// A mixture: weights, which need not add up to one, and parts.
+    #[serde(deserialize_with = "single::parts")]
     Blend(Vec<(Positive, Phase)>),
 }

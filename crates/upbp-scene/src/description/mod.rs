@@ -13,6 +13,8 @@ mod material;
 mod medium;
 mod named;
 mod shape;
+mod single;
+mod spelling;
 mod text;
 mod value;
 

@@ -5,7 +5,7 @@ use ron::error::SpannedError;
 use ron::extensions::Extensions;
 use ron::ser::PrettyConfig;
 
-use super::SceneDescription;
+use super::{SceneDescription, spelling};
 use crate::error::SceneError;
 
 /// `Some` and the parentheses of single values may be left out.
@@ -15,6 +15,11 @@ fn options() -> Options {
         .with_default_extension(Extensions::UNWRAP_NEWTYPES)
 }
 
+/// The same; and kinds with a single value see what their parentheses hold (`single`).
+fn reading() -> Options {
+    options().with_default_extension(Extensions::UNWRAP_VARIANT_NEWTYPES)
+}
+
 impl SceneDescription {
     /// Reads a scene file's text.
     ///
@@ -22,7 +27,7 @@ impl SceneDescription {
     ///
     /// [`SceneError::Syntax`] with line and column of the first place that is wrong.
     pub fn from_ron(text: &str) -> Result<Self, SceneError> {
-        options().from_str(text).map_err(|error| syntax_error(&error))
+        reading().from_str(text).map_err(|error| syntax_error(text, &error))
     }
 
     /// The scene as the text of a file.
@@ -47,9 +52,10 @@ impl SceneDescription {
     }
 }
 
-fn syntax_error(error: &SpannedError) -> SceneError {
+fn syntax_error(text: &str, error: &SpannedError) -> SceneError {
     let start = error.span.start;
-    SceneError::Syntax { path: None, line: start.line, column: start.col, message: error.code.to_string() }
+    let message = spelling::message(text, error);
+    SceneError::Syntax { path: None, line: start.line, column: start.col, message }
 }
 
 /// Fowler, Noll and Vo's hash, variant 1a with 64 bits: stable across versions, unlike the standard

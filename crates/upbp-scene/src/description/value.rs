@@ -6,7 +6,7 @@
 use std::fmt;
 
 use glam::Vec3;
-use serde::de::{Error as _, SeqAccess, Visitor};
+use serde::de::{Error as _, Expected, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use upbp_media::Spectrum;
 
@@ -21,6 +21,16 @@ pub struct ValueError {
     pub expected: &'static str,
     /// The value, as text.
     pub found: String,
+}
+
+/// A number as one would write it.
+fn shown(value: f32) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
+fn triple(values: [f32; 3]) -> String {
+    format!("({})", values.map(shown).join(", "))
 }
 
 /// A number in a range.
@@ -38,7 +48,7 @@ macro_rules! number {
                 if accepts(value) {
                     Ok(Self(value))
                 } else {
-                    Err(ValueError { expected: $expected, found: value.to_string() })
+                    Err(ValueError { expected: $expected, found: shown(value) })
                 }
             }
 
@@ -66,12 +76,12 @@ macro_rules! number {
 }
 
 number!(
-    /// A finite number of at least zero.
-    NonNegative(f32), "a finite number of at least 0", |x| (0.0..=MAX_COORDINATE).contains(&x)
+    /// A number in `[0, 1e12]`.
+    NonNegative(f32), "a number from 0 to 1e12", |x| (0.0..=MAX_COORDINATE).contains(&x)
 );
 number!(
-    /// A finite number above zero.
-    Positive(f32), "a finite number above 0", |x| x.is_normal() && x > 0.0 && x <= MAX_COORDINATE
+    /// A number above zero, in `[1.2e-38, 1e12]`.
+    Positive(f32), "a number above 0, from 1.2e-38 to 1e12", |x| (1.2e-38..=MAX_COORDINATE).contains(&x)
 );
 number!(
     /// A Henyey-Greenstein asymmetry, in `(-1, 1)`.
@@ -186,8 +196,8 @@ impl From<Count> for u32 {
 }
 
 /// Three finite numbers: a point or a direction.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "[f32; 3]", into = "[f32; 3]")]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(into = "[f32; 3]")]
 pub struct Vector(Vec3);
 
 impl Vector {
@@ -202,7 +212,7 @@ impl Vector {
             Ok(Self(value))
         } else {
             let expected = "finite coordinates between -1e12 and 1e12";
-            Err(ValueError { expected, found: format!("({}, {}, {})", value.x, value.y, value.z) })
+            Err(ValueError { expected, found: triple(value.to_array()) })
         }
     }
 
@@ -213,11 +223,10 @@ impl Vector {
     }
 }
 
-impl TryFrom<[f32; 3]> for Vector {
-    type Error = ValueError;
-
-    fn try_from(value: [f32; 3]) -> Result<Self, ValueError> {
-        Self::new(value.into())
+impl<'de> Deserialize<'de> for Vector {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = deserializer.deserialize_any(Coordinates)?;
+        Self::new(value.into()).map_err(D::Error::custom)
     }
 }
 
@@ -245,7 +254,7 @@ macro_rules! colour {
                 if accepts(r) && accepts(g) && accepts(b) {
                     Ok(Self(value))
                 } else {
-                    let found = if [g, b] == [r; 2] { r.to_string() } else { format!("({r}, {g}, {b})") };
+                    let found = if [g, b] == [r; 2] { shown(r) } else { triple([r, g, b]) };
                     Err(ValueError { expected: $expected, found })
                 }
             }
@@ -284,8 +293,8 @@ macro_rules! colour {
 }
 
 colour!(
-    /// Three finite numbers of at least zero: radiance, intensity, a coefficient.
-    Colour, "finite numbers of at least 0", |x| (0.0..=MAX_COORDINATE).contains(&x)
+    /// Three numbers in `[0, 1e12]`: radiance, intensity, a coefficient.
+    Colour, "numbers from 0 to 1e12", |x| (0.0..=MAX_COORDINATE).contains(&x)
 );
 colour!(
     /// Three numbers in `[0, 1]`: the share of light that is reflected.
@@ -323,16 +332,36 @@ impl<'de> Visitor<'de> for Channels {
         Ok(Spectrum::splat(grey as f32))
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut channels: A) -> Result<Spectrum, A::Error> {
-        let mut rgb = [0.0; 3];
-        for (index, channel) in rgb.iter_mut().enumerate() {
-            *channel = channels.next_element()?.ok_or_else(|| A::Error::invalid_length(index, &self))?;
-        }
-        if channels.next_element::<f32>()?.is_some() {
-            return Err(A::Error::invalid_length(4, &self));
-        }
-        Ok(Spectrum::from_array(rgb))
+    fn visit_seq<A: SeqAccess<'de>>(self, channels: A) -> Result<Spectrum, A::Error> {
+        three(channels, &self).map(Spectrum::from_array)
     }
+}
+
+/// Reads `(x, y, z)`.
+struct Coordinates;
+
+impl<'de> Visitor<'de> for Coordinates {
+    type Value = [f32; 3];
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("three numbers in parentheses (x, y, z)")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, coordinates: A) -> Result<[f32; 3], A::Error> {
+        three(coordinates, &self)
+    }
+}
+
+/// Reads three numbers and no more.
+fn three<'de, A: SeqAccess<'de>>(mut numbers: A, expected: &dyn Expected) -> Result<[f32; 3], A::Error> {
+    let mut three = [0.0; 3];
+    for (index, number) in three.iter_mut().enumerate() {
+        *number = numbers.next_element()?.ok_or_else(|| A::Error::invalid_length(index, expected))?;
+    }
+    if numbers.next_element::<f32>()?.is_some() {
+        return Err(A::Error::invalid_length(4, expected));
+    }
+    Ok(three)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec3;
+use upbp_core::open_exr;
 use upbp_estimators::scene::{
     BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
@@ -117,7 +118,8 @@ impl EnvironmentImage {
             height: usize,
             values: Vec<Spectrum>,
         }
-        check_size(path).map_err(EnvironmentImageError::Unreadable)?;
+        let unreadable = EnvironmentImageError::Unreadable;
+        let file = open_exr(path).map_err(|error| unreadable(error.into()))?;
         let image = read()
             .no_deep_data()
             .largest_resolution_level()
@@ -136,8 +138,8 @@ impl EnvironmentImage {
             )
             .first_valid_layer()
             .all_attributes()
-            .from_file(path)
-            .map_err(EnvironmentImageError::Unreadable)?;
+            .from_buffered(file)
+            .map_err(unreadable)?;
         let pixels = image.layer_data.channel_data.pixels;
         Self::new(pixels.width, pixels.height, pixels.values)
     }
@@ -320,20 +322,4 @@ impl Emitter for ImageEnvironment {
             pdf_direction: 1.0 / disc_area(bounds),
         })
     }
-}
-
-/// Refuses an image that says it is larger than its file can hold: all memory is taken before the first pixel is read.
-fn check_size(path: &Path) -> exr::error::UnitResult {
-    // No compression of the format makes more of a byte; the rest is for small images.
-    const BYTES_PER_BYTE: u64 = 1100;
-    const SMALL: u64 = 1 << 16;
-    let told = exr::meta::MetaData::read_from_file(path, false)?
-        .headers
-        .iter()
-        .map(|layer| (layer.layer_size.area() as u64).saturating_mul(layer.channels.bytes_per_pixel as u64))
-        .fold(0, u64::saturating_add);
-    if told > SMALL.saturating_add(BYTES_PER_BYTE.saturating_mul(std::fs::metadata(path)?.len())) {
-        return Err(exr::error::Error::Invalid("more pixels than the file can hold".into()));
-    }
-    Ok(())
 }

@@ -1,0 +1,76 @@
+//! Kinds with a single value, which may be written with its name or without: `Dielectric(ior: 1.5)` and
+//! `Dielectric(1.5)`.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{Error, IntoDeserializer, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+
+use super::Phase;
+use super::value::{Asymmetry, Colour, Ior, Positive, Reflectance};
+
+/// One function per name, for `deserialize_with`.
+macro_rules! single {
+    ($($name:ident: $value:ty),* $(,)?) => {$(
+        pub(super) fn $name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<$value, D::Error> {
+            deserializer.deserialize_any(Single { name: &[stringify!($name)], value: PhantomData })
+        }
+    )*};
+}
+
+single! {
+    g: Asymmetry,
+    ior: Ior,
+    parts: Vec<(Positive, Phase)>,
+    radiance: Colour,
+    reflectance: Reflectance,
+}
+
+/// What the parentheses hold, which its type reads; or the name, a colon, and that.
+struct Single<T> {
+    name: &'static [&'static str; 1],
+    value: PhantomData<T>,
+}
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Single<T> {
+    type Value = T;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a value, or `{}: value`", self.name[0])
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<T, E> {
+        T::deserialize(value.into_deserializer())
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<T, E> {
+        T::deserialize(value.into_deserializer())
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<T, E> {
+        T::deserialize(value.into_deserializer())
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<T, E> {
+        T::deserialize(value.into_deserializer())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, values: A) -> Result<T, A::Error> {
+        T::deserialize(SeqAccessDeserializer::new(values))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<T, A::Error> {
+        let mut value = None;
+        while let Some(field) = fields.next_key::<String>()? {
+            if field != self.name[0] {
+                return Err(A::Error::unknown_field(&field, self.name));
+            }
+            if value.replace(fields.next_value()?).is_some() {
+                return Err(A::Error::duplicate_field(self.name[0]));
+            }
+        }
+        value.ok_or_else(|| A::Error::missing_field(self.name[0]))
+    }
+}
