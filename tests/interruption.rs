@@ -4,14 +4,17 @@
 //! `UPBP_KILLS=200` sets how often a render is killed; a few times by default.
 #![cfg(unix)]
 
+#[path = "support/processor.rs"]
+mod processor;
 #[path = "support/program.rs"]
 mod program;
 
 use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
 
 use program::{SMALL, command, folder};
 use upbp_core::State;
@@ -46,12 +49,28 @@ fn signal(child: &Child, name: &str) {
     assert!(status.expect("kill runs").success());
 }
 
-fn wait_for(path: &Path) {
-    let start = Instant::now();
-    while !path.exists() {
-        assert!(start.elapsed() < Duration::from_secs(60), "{} does not appear", path.display());
+/// Processor seconds of a program so far; 0 where they are not known.
+fn used(child: &Child) -> f64 {
+    processor::seconds(Path::new(&format!("/proc/{}", child.id()))).unwrap_or(0.0)
+}
+
+/// Looks at a program again and again until something holds. Fails when it ends before, or has used too much processor time
+/// for it ever to hold.
+fn wait_until(child: &mut Child, what: &str, mut holds: impl FnMut(&Child) -> bool) {
+    const HUNG: f64 = 60.0;
+    while !holds(child) {
+        let ended = child.try_wait().expect("a status").is_some();
+        if ended || used(child) > HUNG {
+            let _ = child.kill();
+            panic!("{what}: {}", if ended { "it ends before" } else { "it hangs" });
+        }
         sleep(Duration::from_millis(5));
     }
+}
+
+/// When a file was written, if it is there.
+fn written(path: &Path) -> Option<SystemTime> {
+    fs::metadata(path).and_then(|metadata| metadata.modified()).ok()
 }
 
 /// The film of a state file: its iterations and its fingerprint.
@@ -69,9 +88,8 @@ fn unfinished(folder: &Path) -> usize {
 
 #[test]
 fn killed_at_random_moments_it_loses_no_more_than_since_the_last_saving() {
-    /// Seconds between savings, and what an iteration and a saving may take on a busy machine.
-    const EVERY: f64 = 0.02;
-    const SLACK: f64 = 1.0;
+    /// Processor seconds between savings: the time that is asked for, and what an iteration and a saving take.
+    const BETWEEN: f64 = 0.02 + 1.0;
     /// Enough that no run ends by itself.
     const MANY: &str = "200000000";
     let kills: u32 = std::env::var("UPBP_KILLS").map_or(10, |text| text.parse().expect("a number"));
@@ -84,24 +102,34 @@ fn killed_at_random_moments_it_loses_no_more_than_since_the_last_saving() {
             .args(["--iterations", MANY])
             .spawn()
             .expect("the program runs");
-        // A low-discrepancy sequence: moments from the start of the process to some savings later.
-        let wait = 0.5 * (f64::from(kill) * 0.618_034).fract();
-        let started = SystemTime::now();
-        sleep(Duration::from_secs_f64(wait));
+        // A low-discrepancy sequence: moments from the start of the process to some savings later, every other one after two.
+        let mut wait = (100.0 * (f64::from(kill) * 0.618_034).fract()) as u32;
+        let mut wanted = 2 * (kill % 2);
+        let (mut last, mut last_used) = (written(&state), None);
+        wait_until(&mut child, "a saving", |child| {
+            if written(&state) != last {
+                (last, last_used) = (written(&state), Some(used(child)));
+                wanted = wanted.saturating_sub(1);
+            }
+            wait = wait.saturating_sub(1);
+            wait == 0 && wanted == 0
+        });
         child.kill().expect("it runs still");
-        let killed = SystemTime::now();
+        let used = used(&child);
         child.wait().expect("it has ended");
         if !state.exists() {
             unsaved += 1;
             continue;
         }
         let (iterations, _) = film(&state);
-        assert!(iterations >= before, "kill {kill}: {iterations} iterations after {before}");
+        let least = before + u64::from(last_used.is_some());
+        assert!(iterations >= least, "kill {kill}: {iterations} iterations after {before}");
         before = iterations;
-        let saved = fs::metadata(&state).and_then(|m| m.modified()).expect("a time");
-        if saved > started {
-            let age = killed.duration_since(saved).map_or(0.0, |age| age.as_secs_f64());
-            assert!(age < EVERY + SLACK, "kill {kill}: the last saving was {age} s ago");
+        if let Some(last_used) = last_used
+            && written(&state) == last
+        {
+            let age = used - last_used;
+            assert!(age < BETWEEN, "kill {kill}: the last saving was {age} s of processor time ago");
             oldest = oldest.max(age);
         }
     }
@@ -113,7 +141,7 @@ fn killed_at_random_moments_it_loses_no_more_than_since_the_last_saving() {
     let leftovers = unfinished(&folder);
     println!(
         "{kills} kills, {unsaved} of them before the first saving, {before} iterations survived; \
-         oldest saving at a kill {oldest:.3} s; {leftovers} unfinished files"
+         oldest saving at a kill {oldest:.2} s of processor time; {leftovers} unfinished files"
     );
 }
 
@@ -123,11 +151,12 @@ fn a_signal_saves_and_says_try_again() {
     let arguments =
         ["--state", "a.state", "--save-every", "0.01", "--light-paths", "64", "--report", "a.json"];
     for name in ["TERM", "INT", "HUP"] {
-        let child = render(&folder, &arguments).args(["-o", "a.exr", "--iterations", "200000000"]).spawn();
-        let child = child.expect("the program runs");
         let _ = fs::remove_file(folder.join("a.exr"));
-        wait_for(&folder.join("a.state"));
-        sleep(Duration::from_millis(300));
+        let state = folder.join("a.state");
+        let before = written(&state);
+        let child = render(&folder, &arguments).args(["-o", "a.exr", "--iterations", "200000000"]).spawn();
+        let mut child = child.expect("the program runs");
+        wait_until(&mut child, "a saving", |_| written(&state) != before);
         signal(&child, name);
         let (code, text) = end(&child.wait_with_output().expect("it ends"));
         assert_eq!(code, Some(75), "{name}: {text}");
@@ -145,21 +174,37 @@ fn a_signal_saves_and_says_try_again() {
     assert_eq!(unfinished(&folder), 0);
 }
 
+#[cfg(target_os = "linux")]
 #[test]
 fn a_second_signal_ends_at_once() {
+    /// Whether it has asked for SIGINT and SIGTERM.
+    fn listens(child: &Child) -> bool {
+        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("it is there");
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a known name");
+        let caught = u64::from_str_radix(caught.trim(), 16).expect("a mask");
+        [2, 15].iter().all(|signal| caught >> (signal - 1) & 1 == 1)
+    }
+
     let folder = prepared("second");
     // Iterations that take long, and a cancellation that has to wait for a row of pixels.
     let scene = SMALL.replace("width: 8", "width: 4000").replace("sigma_s: 0.5", "sigma_s: (500, 500, 500)");
     fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
-    let child = render(&folder, &["--techniques", "pt", "-o", "a.exr"]).spawn().expect("the program runs");
-    sleep(Duration::from_millis(700));
+    let mut child =
+        render(&folder, &["--techniques", "pt", "-o", "a.exr"]).spawn().expect("the program runs");
+    wait_until(&mut child, "it renders", |child| listens(child) && used(child) > 0.5);
+    let before = used(&child);
     signal(&child, "TERM");
     signal(&child, "INT");
-    let start = Instant::now();
-    let (code, text) = end(&child.wait_with_output().expect("it ends"));
+    while child.try_wait().expect("a status").is_none() {
+        if used(&child) > before + 20.0 {
+            child.kill().expect("it runs still");
+            panic!("it goes on");
+        }
+        sleep(Duration::from_millis(5));
+    }
+    let (code, text) = end(&child.wait_with_output().expect("it has ended"));
     // Both may arrive as one, or the first may have been enough.
     assert!(matches!(code, Some(130 | 75)), "{code:?}: {text}");
-    assert!(start.elapsed() < Duration::from_secs(20));
     assert_eq!(unfinished(&folder), 0);
 }
 
@@ -186,16 +231,20 @@ fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
     // A folder that vanishes while it renders.
     let gone = folder.join("gone");
     fs::create_dir(&gone).expect("a folder");
-    let child = render(&folder, &["--state", "gone/a.state", "--save-every", "0.01", "-o", "d.exr"])
+    let mut child = render(&folder, &["--state", "gone/a.state", "--save-every", "0.01", "-o", "d.exr"])
         .args(["--iterations", "200000000", "--light-paths", "64"])
         .spawn()
         .expect("the program runs");
-    wait_for(&gone.join("a.state"));
+    wait_until(&mut child, "a saving", |_| gone.join("a.state").exists());
     while fs::remove_dir_all(&gone).is_err() {}
-    sleep(Duration::from_millis(200));
+    let mut errors = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut text = String::new();
+    while !text.contains("warning") {
+        assert!(errors.read_line(&mut text).expect("text") > 0, "it ends before a warning: {text}");
+    }
     signal(&child, "TERM");
-    let (code, text) = end(&child.wait_with_output().expect("it ends"));
-    assert_eq!(code, Some(74), "{text}");
+    errors.read_to_string(&mut text).expect("text");
+    assert_eq!(child.wait().expect("it ends").code(), Some(74), "{text}");
     assert!(text.contains("warning") && text.contains("gone/a.state"), "{text}");
 
     // Nobody reads what it says: the files are there all the same.

@@ -1,16 +1,21 @@
 //! Renders a case under guard and says what is wrong with the result.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
+use std::sync::{Arc, OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
 use upbp_core::{Counters, Film, Settings};
 use upbp_scene::ReadyScene;
 
+use super::processor;
 use crate::support::Estimate;
 
-/// A render that takes longer has hung.
-pub(crate) const TIME_LIMIT: Duration = Duration::from_secs(60);
+/// A render that takes more processor seconds has hung.
+const LIMIT: f64 = 60.0;
+
+/// How often that is looked at.
+const LOOK: Duration = Duration::from_secs(1);
 
 /// Part of all contributions that may be dropped.
 const DROPPED: f64 = 1e-5;
@@ -40,22 +45,38 @@ impl Render {
 pub(crate) fn render(scene: &str, settings: &Settings, iterations: u64) -> Result<Render, String> {
     let (text, settings) = (scene.to_owned(), settings.clone());
     let (send, receive) = mpsc::channel();
+    let id = Arc::new(OnceLock::new());
+    let own_id = Arc::clone(&id);
     let thread = std::thread::spawn(move || {
+        let render = || {
+            let _ = own_id.set(std::fs::read_link("/proc/thread-self"));
+            render_here(&text, settings, iterations)
+        };
         let result = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build()
             .map_err(|error| error.to_string())
-            .and_then(|pool| pool.install(|| render_here(&text, settings, iterations)));
-        // Nobody listens any more after the time limit.
+            .and_then(|pool| pool.install(render));
+        // Nobody listens any more after the limit.
         let _ = send.send(result);
     });
-    match receive.recv_timeout(TIME_LIMIT) {
-        Ok(result) => result,
-        Err(mpsc::RecvTimeoutError::Timeout) => Err(format!("does not end within {TIME_LIMIT:?}")),
-        Err(mpsc::RecvTimeoutError::Disconnected) => Err(match thread.join() {
-            Err(panic) => format!("panics: {}", message(&*panic)),
-            Ok(()) => "ends without a result".into(),
-        }),
+    loop {
+        match receive.recv_timeout(LOOK) {
+            Ok(result) => return result,
+            Err(mpsc::RecvTimeoutError::Timeout) => {
+                let id = id.get().and_then(|id| id.as_ref().ok());
+                let used = id.and_then(|id| processor::seconds(&Path::new("/proc").join(id)));
+                if used.is_some_and(|used| used > LIMIT) {
+                    return Err(format!("does not end within {LIMIT} seconds of processor time"));
+                }
+            }
+            Err(mpsc::RecvTimeoutError::Disconnected) => {
+                return Err(match thread.join() {
+                    Err(panic) => format!("panics: {}", message(&*panic)),
+                    Ok(()) => "ends without a result".into(),
+                });
+            }
+        }
     }
 }
 

@@ -11,4 +11,6 @@ pub(crate) mod exact;
 pub(crate) mod execute;
 pub(crate) mod grid;
 pub(crate) mod photon;
+#[path = "../support/processor.rs"]
+mod processor;
 pub(crate) mod walk;
