@@ -114,8 +114,10 @@ struct Open<'t> {
     field: &'t str,
 }
 
-/// The brackets that are open at the end of a text, and its last word.
+/// The brackets that are open at the end of a text, and its last word. Nothing for a text that nests deeper than the parser
+/// follows: it was not understood.
 fn open(text: &str) -> (Vec<Open<'_>>, &str) {
+    const DEPTHS: usize = 256;
     let (mut open, mut word): (Vec<Open<'_>>, _) = (Vec::new(), "");
     let mut rest = text;
     while let Some(first) = rest.chars().next() {
@@ -138,6 +140,7 @@ fn open(text: &str) -> (Vec<Open<'_>>, &str) {
         let (token, after) = rest.split_at(length);
         rest = after;
         match first {
+            '(' | '[' | '{' if open.len() == DEPTHS => return (Vec::new(), ""),
             '(' | '[' | '{' => open.push(Open { name: std::mem::take(&mut word), field: "" }),
             ')' | ']' | '}' => {
                 open.pop();
