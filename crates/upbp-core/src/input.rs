@@ -36,7 +36,7 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     open_file(path, MAX_TEXT)?.take(MAX_TEXT).read_to_end(&mut bytes)?;
     let mut text = String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
+        let line = good.split(|&byte| byte == b'\n').count();
         io::Error::new(io::ErrorKind::InvalidData, format!("line {line}: expected UTF-8 text"))
     })?;
     if text.starts_with('\u{feff}') {
