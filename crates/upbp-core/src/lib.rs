@@ -35,7 +35,7 @@ pub use upbp_media as media;
 
 pub use census::Census;
 pub use error::{OutputError, RenderError, SettingsError, StateError};
-pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap};
+pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap, HalfImage};
 pub use film::{Film, Image, Pixel};
 pub use input::{open_exr, open_file, read_text};
 pub use iterations::{IterationSet, MAX_ITERATIONS};
