@@ -20,8 +20,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use upbp_core::{
-    OutputError, Preparing, RenderError, RenderPlan, Renderer, Settings, Start, State, StateError, StopReason,
-    check_outputs, check_writable, read_exr, read_text, remove_leftovers, write_text,
+    OutputError, Preparing, RenderError, RenderPlan, Renderer, Settings, Start, State, StateError,
+    StopReason, check_outputs, check_writable, read_exr, read_text, remove_leftovers, write_text,
 };
 use upbp_scene::ReadyScene;
 
@@ -61,8 +61,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     let plan = options.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
     let bar = Bar::on_stderr(options.quiet || options.check);
     let mut show = |now: Preparing| bar.prepare(now.step);
-    let start =
-        Start { plan, canceller, seconds: options.stop().seconds, progress: Some(&mut show) };
+    let start = Start { plan, canceller, seconds: options.stop().seconds, progress: Some(&mut show) };
     let mut renderer = scene.start_renderer(settings, start).map_err(|error| match error {
         RenderError::Cancelled => Failure::Interrupted(format!("interrupted: {error}")),
         error => Failure::input(error),

@@ -18,7 +18,7 @@ use crate::choices;
 use crate::emitters::EmitterChoices;
 use crate::film::Pixel;
 use crate::memory::LightCounts;
-use crate::passes::{BLACK, Lists, add_splats, camera_pass, light_pass};
+use crate::passes::{Lists, add_splats, camera_pass, light_pass};
 use crate::pilot::Pilot;
 use crate::planner::Planner;
 use crate::report::PassTimes;
@@ -173,7 +173,7 @@ fn trace_light<S: Scene, D: Densities>(
     let plan = context.plan;
     let mut times = PassTimes::default();
     let mut clock = Clock::start();
-    pixels.par_iter_mut().with_min_len(1024).for_each(|pixel| *pixel = BLACK);
+    pixels.par_iter_mut().with_min_len(1024).for_each(|pixel| *pixel = Pixel::BLACK);
     let stores = plan.stores_vertices() || plan.stores_beams();
     let expected = LightCounts::expected(pilot, plan.light_paths, plan.beam_paths);
     let expected = if stores { expected } else { LightCounts::default() };
@@ -181,8 +181,7 @@ fn trace_light<S: Scene, D: Densities>(
         add_splats(rect, splats, pixels);
     })?;
     times.light = clock.lap();
-    let map =
-        if stores { LightMap::build(plan, lists.vertices, lists.beams) } else { LightMap::empty() };
+    let map = if stores { LightMap::build(plan, lists.vertices, lists.beams) } else { LightMap::empty() };
     times.build = clock.lap();
     let map_bytes = map.memory_bytes() as u64;
     Some((map, LightDone { counters, map_bytes, times }))

@@ -11,9 +11,11 @@
 //!
 //! Formulas and sources: `docs/theory.md`, section 6(p). Oracles: `tests`, images with known truth.
 
+use std::fmt;
 use std::ops::AddAssign;
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 /// Reach of the fine windows: 5 × 5 pixels, as few as still tell a spread from noise.
 const REACH: usize = 2;
@@ -48,7 +50,7 @@ pub struct HalfImage<'a> {
 }
 
 /// Estimated relMSE of an image.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorEstimate {
     /// The likely value; infinite where there is nothing to tell it from.
     pub relative_mse: f64,
@@ -64,7 +66,7 @@ pub struct ErrorEstimate {
 }
 
 /// Why the error could be anything.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Doubt {
     /// Fewer than two halves, or fewer than eight iterations in both.
     FewIterations,
@@ -137,14 +139,7 @@ impl ErrorMap {
             .collect();
         let [sum, squares] = pieces.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         if errors.is_empty() || !self.relative[0][0].is_finite() {
-            let relative_mse = f64::INFINITY;
-            return ErrorEstimate {
-                relative_mse,
-                low: 0.0,
-                high: relative_mse,
-                doubt: Some(Doubt::FewIterations),
-                tail_index: 0.0,
-            };
+            return ErrorEstimate::UNKNOWN;
         }
         let relative_mse = sum / errors.len() as f64;
         let standard_error = if sum > 0.0 { squares.sqrt() / sum } else { 0.0 };
@@ -165,6 +160,15 @@ impl ErrorMap {
 }
 
 impl ErrorEstimate {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self {
+        relative_mse: f64::INFINITY,
+        low: 0.0,
+        high: f64::INFINITY,
+        doubt: Some(Doubt::FewIterations),
+        tail_index: 0.0,
+    };
+
     /// Whether the error is below `target` as far as can be told.
     ///
     /// A rule that asks often stops at the luckiest answer: ask after the iterations that
@@ -181,6 +185,27 @@ impl ErrorEstimate {
     pub const fn is_due(iterations: u64) -> bool {
         // No digits but the first three.
         iterations >= FEW_ITERATIONS && iterations.trailing_zeros() + 2 >= iterations.ilog2()
+    }
+}
+
+impl fmt::Display for ErrorEstimate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { relative_mse, low, high, .. } = self;
+        match self.doubt {
+            _ if relative_mse.is_infinite() => write!(f, "unknown"),
+            None => write!(f, "{relative_mse:.2e}, between {low:.2e} and {high:.2e}"),
+            Some(doubt) => write!(f, "{relative_mse:.2e} or more: {doubt}"),
+        }
+    }
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::FewIterations => "fewer than eight iterations",
+            Self::Black => "no light was found yet",
+            Self::HeavyTail => "a few pixels make the error",
+        })
     }
 }
 

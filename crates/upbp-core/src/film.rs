@@ -12,8 +12,20 @@ use crate::interleave::{self, SETS, set_of, stand_ins};
 use crate::iterations::{IterationSet, MAX_ITERATIONS};
 use crate::sum::{self, Sum3};
 
-/// A pixel of one iteration: radiance by layer.
-pub type Pixel = [Spectrum; Layer::COUNT];
+/// A pixel of one iteration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pixel {
+    /// Radiance by layer.
+    pub layers: [Spectrum; Layer::COUNT],
+    /// Of it, light that the camera sees directly, by mirrors or through glass: then it is no sign of an error that a pixel is much
+    /// brighter than its neighbours.
+    pub seen: Spectrum,
+}
+
+impl Pixel {
+    /// No light.
+    pub const BLACK: Self = Self { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
+}
 
 /// Sums over a set of iterations, to the last bit the same in whatever order they were added. A mean is too small by less than
 /// 2⁻³⁶ of the largest iteration of that pixel.
@@ -29,6 +41,8 @@ pub struct Film {
     layers: Vec<(Layer, Vec<Sum3>)>,
     /// Sums of the even iterations, all layers together.
     even: Vec<Sum3>,
+    /// Sums of what the camera sees directly, of even and of odd iterations.
+    seen: [Vec<Sum3>; 2],
     /// Sums of the squares of each iteration's whole radiance.
     squares: Vec<Sum3>,
     iterations: IterationSet,
@@ -65,6 +79,7 @@ impl Film {
             rect,
             layers,
             even: black(rect),
+            seen: [black(rect), black(rect)],
             squares: black(rect),
             iterations: IterationSet::default(),
             parts: BTreeMap::new(),
@@ -81,7 +96,7 @@ impl Film {
     /// Bytes that a film takes, with the buffer of one iteration.
     #[must_use]
     pub fn memory_bytes(rect: PixelRect, techniques: TechniqueSet) -> u64 {
-        let pixel = (Self::layers_of(techniques).len() + 2) * size_of::<Sum3>() + size_of::<Pixel>();
+        let pixel = (Self::layers_of(techniques).len() + 4) * size_of::<Sum3>() + size_of::<Pixel>();
         pixels(rect) as u64 * pixel as u64
     }
 
@@ -199,15 +214,16 @@ impl Film {
         };
         let mut dropped = 0;
         for (layer, sums) in &mut self.layers {
-            dropped += add(sums, &|pixel| usable(pixel[*layer as usize]));
+            dropped += add(sums, &|pixel| usable(pixel.layers[*layer as usize]));
         }
         let layers: Vec<_> = self.layers.iter().map(|(layer, _)| *layer as usize).collect();
         let total = |pixel: &Pixel| {
-            layers.iter().fold([0.0; 3], |total, layer| plus(total, usable(pixel[*layer]).0))
+            layers.iter().fold([0.0; 3], |total, layer| plus(total, usable(pixel.layers[*layer]).0))
         };
         if half(iteration).0 == 0 {
             add(&mut self.even, &|pixel| (total(pixel), 0));
         }
+        add(&mut self.seen[half(iteration).0], &|pixel| (usable(pixel.seen).0, 0));
         add(&mut self.squares, &|pixel| (total(pixel).map(|value| value * value), 0));
         if sets.end == SETS {
             self.parts.remove(&iteration);
@@ -222,23 +238,39 @@ impl Film {
     pub(crate) fn merge(&mut self, other: &Self) {
         debug_assert_eq!(self.rect, other.rect);
         debug_assert_eq!(self.overlap(other), None);
+        let merge = |own: &mut [Sum3], others: &[Sum3]| {
+            own.par_iter_mut().zip(others).for_each(|(own, other)| sum::merge(own, other));
+        };
         for (layer, sums) in &other.layers {
-            self.keep_layer(*layer).par_iter_mut().zip(sums).for_each(|(own, other)| sum::merge(own, other));
+            merge(self.keep_layer(*layer), sums);
         }
-        self.even.par_iter_mut().zip(&other.even).for_each(|(own, other)| sum::merge(own, other));
-        self.squares.par_iter_mut().zip(&other.squares).for_each(|(own, other)| sum::merge(own, other));
+        merge(&mut self.even, &other.even);
+        self.seen.iter_mut().zip(&other.seen).for_each(|(own, others)| merge(own, others));
+        merge(&mut self.squares, &other.squares);
         self.iterations.union(&other.iterations);
         self.parts.extend(&other.parts);
     }
 
-    /// The sums of a row of pixels: those of each layer, of the even iterations, of the squares.
-    pub(crate) fn row(&self, row: usize) -> impl Iterator<Item = &Sum3> {
-        let width = self.rect.width as usize;
-        let all = self.layers.iter().map(|(_, sums)| sums).chain([&self.even, &self.squares]);
-        all.flat_map(move |sums| &sums[row * width..(row + 1) * width])
+    /// All lists of sums: those of each layer, of the even iterations, of what is seen directly in even and in odd ones, of the squares.
+    fn all(&self) -> impl Iterator<Item = &Vec<Sum3>> {
+        let [even, odd] = &self.seen;
+        self.layers.iter().map(|(_, sums)| sums).chain([&self.even, even, odd, &self.squares])
     }
 
-    /// A film without its sums, which [`push_row`](Self::push_row) adds.
+    /// The same, to be filled row by row.
+    pub(crate) fn all_mut(&mut self) -> impl Iterator<Item = &mut Vec<Sum3>> {
+        let [even, odd] = &mut self.seen;
+        let others = [&mut self.even, even, odd, &mut self.squares];
+        self.layers.iter_mut().map(|(_, sums)| sums).chain(others)
+    }
+
+    /// The sums of a row of pixels, list by list.
+    pub(crate) fn row(&self, row: usize) -> impl Iterator<Item = &Sum3> {
+        let width = self.rect.width as usize;
+        self.all().flat_map(move |sums| &sums[row * width..(row + 1) * width])
+    }
+
+    /// A film without its sums, for which [there is room](Self::all_mut).
     pub(crate) fn without_sums(
         rect: PixelRect,
         techniques: TechniqueSet,
@@ -246,12 +278,15 @@ impl Film {
         parts: BTreeMap<u64, u32>,
     ) -> Self {
         let layers = Self::layers_of(techniques).into_iter().map(|layer| (layer, Vec::new())).collect();
-        Self { rect, layers, even: Vec::new(), squares: Vec::new(), iterations, parts }
-    }
-
-    /// The lists of sums, in the order of [`row`](Self::row), to be filled row by row.
-    pub(crate) fn lists(&mut self) -> impl Iterator<Item = &mut Vec<Sum3>> {
-        self.layers.iter_mut().map(|(_, sums)| sums).chain([&mut self.even, &mut self.squares])
+        Self {
+            rect,
+            layers,
+            even: Vec::new(),
+            seen: Default::default(),
+            squares: Vec::new(),
+            iterations,
+            parts,
+        }
     }
 
     /// The mean of all iterations, all layers together.
@@ -307,9 +342,14 @@ impl Film {
         // Pixels of a part may have one more.
         let odd: u64 = self.iterations.ranges().iter().map(|range| range.end / 2 - range.start / 2).sum();
         let iterations = [self.iterations() - odd, odd];
-        let [even, odd] =
-            [0, 1].map(|i| HalfImage { image: &halves[i].pixels, seen: None, iterations: iterations[i].max(1) });
-        Some(ErrorMap::new(self.rect.width as usize, [even, odd]))
+        let seen =
+            [0, 1].map(|h| self.collect(|i, counts| sum::values(&self.seen[h][i]).map(|v| v / counts[h])));
+        let half = |h: usize| HalfImage {
+            image: &halves[h].pixels,
+            seen: Some(&seen[h].pixels),
+            iterations: iterations[h].max(1),
+        };
+        Some(ErrorMap::new(self.rect.width as usize, [half(0), half(1)]))
     }
 
     /// Estimated error of the image, from the two halves.
@@ -418,9 +458,9 @@ mod tests {
     const RECT: PixelRect = PixelRect { x: 3, y: 5, width: 2, height: 1 };
 
     fn pixel(bpt: f32, bb1d: f32) -> Pixel {
-        let mut pixel = [Spectrum::ZERO; Layer::COUNT];
-        pixel[Layer::Bpt as usize] = Spectrum::splat(bpt);
-        pixel[Layer::Bb1d as usize] = Spectrum::splat(bb1d);
+        let mut pixel = Pixel::BLACK;
+        pixel.layers[Layer::Bpt as usize] = Spectrum::splat(bpt);
+        pixel.layers[Layer::Bb1d as usize] = Spectrum::splat(bb1d);
         pixel
     }
 
@@ -477,7 +517,8 @@ mod tests {
 
     #[test]
     fn merged_films_have_the_layers_of_both() {
-        let (mut a, mut b) = (Film::new(RECT, TechniqueSet::BPT), Film::new(RECT, TechniqueSet::VOLUME_MERGES));
+        let (mut a, mut b) =
+            (Film::new(RECT, TechniqueSet::BPT), Film::new(RECT, TechniqueSet::VOLUME_MERGES));
         a.add(0, &[pixel(1.0, 0.0); 2]);
         b.add(1, &[pixel(0.0, 3.0); 2]);
         a.merge(&b);

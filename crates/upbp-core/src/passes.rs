@@ -11,7 +11,7 @@ use upbp_estimators::observer::Nobody;
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::walk::{trace_camera_path, trace_light_path};
-use upbp_estimators::{Counters, Layer, LightMap, Spectrum, StreamKind};
+use upbp_estimators::{Counters, Layer, LightMap, StreamKind};
 
 use crate::film::Pixel;
 use crate::interleave::set_of;
@@ -120,9 +120,10 @@ pub(crate) fn camera_pass<S: Scene, D: Densities>(
             let index = u64::from(place[1]) << 32 | u64::from(place[0]);
             let (kind, nobody) = (StreamKind::Camera, &mut Nobody::default());
             let walk = trace_camera_path(context, map, kind, place, index, scratch, &mut counters, nobody);
-            for (sum, value) in pixel.iter_mut().zip(walk.layers) {
+            for (sum, value) in pixel.layers.iter_mut().zip(walk.layers) {
                 *sum += value;
             }
+            pixel.seen += walk.seen;
         }
         Some(counters)
     };
@@ -139,9 +140,6 @@ pub(crate) fn add_splats(rect: PixelRect, splats: &[Splat], pixels: &mut [Pixel]
     for splat in splats {
         let [x, y] = [splat.pixel[0] - rect.x, splat.pixel[1] - rect.y];
         let pixel = &mut pixels[y as usize * rect.width as usize + x as usize];
-        pixel[Layer::Bpt as usize] += splat.value;
+        pixel.layers[Layer::Bpt as usize] += splat.value;
     }
 }
-
-/// A black pixel.
-pub(crate) const BLACK: Pixel = [Spectrum::ZERO; Layer::COUNT];

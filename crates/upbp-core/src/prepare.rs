@@ -202,12 +202,7 @@ pub(crate) fn prepare<'a, S: Scene>(
     record.expected_bytes =
         film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>(first.correlation.is_some()) as u64);
     Ok(Prepared {
-        engine: Box::new(SceneEngine {
-            world,
-            emitters,
-            pilot,
-            map: Map::Plain(LightMap::empty()),
-        }),
+        engine: Box::new(SceneEngine { world, emitters, pilot, map: Map::Plain(LightMap::empty()) }),
         planner,
         canceller,
         state: State { identity, record, film },

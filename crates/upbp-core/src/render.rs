@@ -10,10 +10,9 @@ use crate::adapt;
 use crate::census::Census;
 use crate::engine::{Clock, Engine};
 use crate::error::{RenderError, StateError};
-use crate::error_estimate::{ErrorEstimate, is_due};
+use crate::error_estimate::ErrorEstimate;
 use crate::film::{Film, Pixel};
 use crate::iterations::MAX_ITERATIONS;
-use crate::passes::BLACK;
 use crate::planner::Planner;
 use crate::prepare::{Prepared, Start, prepare};
 use crate::report::{ErrorPoint, PassTimes, Report};
@@ -161,7 +160,7 @@ impl<'a> Renderer<'a> {
         let halt = Halt { canceller: &self.canceller, deadline };
         let State { record, film, .. } = &mut self.state;
         let rect = film.rect();
-        self.pixels.resize(rect.width as usize * rect.height as usize, BLACK);
+        self.pixels.resize(rect.width as usize * rect.height as usize, Pixel::BLACK);
         let Some(light) = self.engine.trace_light(&plan, rect, &mut self.pixels, &halt) else { return false };
         let missing = film.missing(iteration);
         let (mut counters, mut times) = (light.counters, light.times);
@@ -266,7 +265,7 @@ impl<'a> Renderer<'a> {
                 return Some(StopReason::Time);
             }
         }
-        let reached = |target| is_due(done) && self.estimated_error.reached(target);
+        let reached = |target| ErrorEstimate::is_due(done) && self.estimated_error.reached(target);
         stop.error.is_some_and(reached).then_some(StopReason::Error)
     }
 
@@ -275,7 +274,7 @@ impl<'a> Renderer<'a> {
         /// Iterations of which each is looked at.
         const FIRST: u64 = 8;
         let done = self.state.film.iterations();
-        if done < FIRST || is_due(done) {
+        if done < FIRST || ErrorEstimate::is_due(done) {
             self.estimated_error = self.state.film.estimated_error();
         }
     }

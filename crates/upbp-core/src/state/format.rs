@@ -4,7 +4,8 @@
 //! "UPBPSTAT"   8 bytes
 //! version      u32, little-endian as all numbers
 //! block        the header: RON text
-//! block ...    one per row of the film: the sums of each layer, of the even iterations, of squares
+//! block ...    one per row of the film: the sums of each layer, of the even iterations, of what is seen
+//!              directly in even and in odd ones, of squares
 //! ```
 //!
 //! A block is its length (u32), its bytes, and the checksum (u64) of all blocks so far: each block is
@@ -141,12 +142,12 @@ impl State {
             }
         }
         let mut film = Film::without_sums(rect, identity.plan.techniques(), iterations, parts);
-        let longest = u64::from(rect.width) * (film.lists().count() * MAX_ENCODED) as u64;
+        let longest = u64::from(rect.width) * (film.all_mut().count() * MAX_ENCODED) as u64;
         for row in 0..rect.height {
             let what = || format!("row {row} of {}", rect.height);
             let block = read_block(&mut from, &mut checksum, longest, &what())?;
             let mut bytes = block.as_slice();
-            for sums in film.lists() {
+            for sums in film.all_mut() {
                 decode(&mut bytes, rect.width as usize, numbers, sums)
                     .ok_or_else(|| damaged(&what(), &"no sums"))?;
             }

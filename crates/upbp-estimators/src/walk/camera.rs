@@ -23,6 +23,9 @@ use crate::technique::{Layer, Technique};
 pub struct CameraWalk {
     /// Contributions by [`Layer`].
     pub layers: [Spectrum; Layer::COUNT],
+    /// Of them, light met before the first vertex that scatters: seen directly, by mirrors and through glass. How bright it
+    /// is depends on the place on the film alone, not on luck further on.
+    pub seen: Spectrum,
 }
 
 /// What a technique adds to: the layers of the sample at hand and the counters of the pass.
@@ -91,7 +94,8 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         context.plan.mis.correlation.is_none() || O::Densities::KNOWS_MERGES,
         "correlation needs densities that know merges apart"
     );
-    let mut walk = CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT] };
+    let mut walk = CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
+    let mut scattered_before = false;
     let Context { world, plan } = *context;
     let scene = world.scene;
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, index);
@@ -173,6 +177,10 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             sides: arrived.sides,
         };
         if connectible {
+            if !scattered_before {
+                walk.seen = out.layers[Layer::Bpt as usize];
+                scattered_before = true;
+            }
             estimate::next_events(context, &vertex, &mut stream, &mut scratch.crossings, &mut out);
             estimate::connections(context, map, &vertex, &mut stream, &mut scratch.crossings, &mut out);
             estimate::at_point(context, map, &vertex, &mut out);
@@ -199,6 +207,9 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             connections: plan.mis.connections(),
             depth,
         };
+    }
+    if !scattered_before {
+        walk.seen = walk.layers[Layer::Bpt as usize];
     }
     walk
 }
