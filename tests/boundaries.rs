@@ -2,8 +2,9 @@
 
 mod support;
 
-use support::render;
+use support::{assert_same, render, render_channels};
 use upbp_core::Settings;
+use upbp_core::check::check_scene;
 use upbp_scene::ReadyScene;
 
 fn scene(text: &str) -> ReadyScene {
@@ -91,4 +92,61 @@ fn kernels_wider_than_a_free_path_do_not_darken_a_boundary() {
     let (found, _) = render(&scene, &settings("all"), 16);
     let slack = 5.0 * found.error.hypot(expected.error) + 0.005;
     assert!((found.mean - expected.mean).abs() < slack, "{found:?} {expected:?}");
+}
+
+/// Balls in balls, of radius 1 and less, each of the next of `media` names.
+fn nested(count: u32, media: &str, name: impl Fn(u32) -> String, fov: f32) -> ReadyScene {
+    let shapes: Vec<String> = (0..count)
+        .map(|i| {
+            let radius = 1.0 - 0.9 * f64::from(i) / f64::from(count);
+            let name = name(i);
+            format!("(geometry: Sphere(centre: (0, 0, 0), radius: {radius:?}), material: \"null\", interior: \"{name}\"),")
+        })
+        .collect();
+    let shapes = shapes.concat();
+    scene(&format!(
+        "(version: 1, camera: Perspective(origin: (0, 0, 3), target: (0, 0, 0), fov_degrees: {fov:?}),
+        film: (width: 8, height: 8), media: {{{media}}}, materials: {{\"null\": Null}}, shapes: [{shapes}],
+        lights: [Constant(1), Point(position: (0.2, 0.3, 0.1), intensity: 1)])"
+    ))
+}
+
+#[test]
+fn light_crosses_any_number_of_nested_bodies() {
+    for count in [6_u32, 7, 8, 9, 40] {
+        let sigma = |i: u32| 0.02 * f64::from(i % 5 + 1);
+        let media: Vec<String> =
+            (0..count).map(|i| format!("\"{i}\": Homogeneous(sigma_a: {:?}),", sigma(i))).collect();
+        let balls = nested(count, &media.concat(), |i| i.to_string(), 0.001);
+        check_scene(&balls).expect("a scene that keeps its contract");
+        let (found, _) = render(&balls, &settings("hit"), 2);
+        // Each ball ends 0.9/count before the next, on both sides; the last has a radius of its own.
+        let shell = |i: u32| {
+            if i + 1 < count { 0.9 / f64::from(count) } else { 1.0 - 0.9 * f64::from(i) / f64::from(count) }
+        };
+        let depth: f64 = (0..count).map(|i| 2.0 * sigma(i) * shell(i)).sum();
+        assert!(
+            (found.mean - (-depth).exp()).abs() < 1e-5,
+            "{count}: {} instead of {}",
+            found.mean,
+            (-depth).exp()
+        );
+    }
+}
+
+#[test]
+fn nested_bodies_of_equal_media_are_as_one() {
+    let fog = "Homogeneous(sigma_a: (0.1, 0.2, 0.3), sigma_s: (2, 1, 0.5))";
+    let media = format!("\"even\": {fog}, \"odd\": {fog}");
+    let name = |i: u32| if i.is_multiple_of(2) { "even" } else { "odd" }.to_owned();
+    let expected = render_channels(&nested(1, &media, name, 40.0), &settings("bpt"), 300);
+    for count in [9, 40] {
+        let balls = nested(count, &media, name, 40.0);
+        let mut renderer =
+            balls.renderer(settings("bpt").validate().expect("valid settings")).expect("a scene");
+        renderer.iterate();
+        let counters = renderer.report().counters;
+        assert_eq!((counters.lost_walks, counters.boundary_conflicts), (0, 0));
+        assert_same(render_channels(&balls, &settings("bpt"), 200), expected, &format!("{count} balls"));
+    }
 }

@@ -1,6 +1,8 @@
 //! Hosts that break the contract of their scene: the renderer drops and counts, or refuses, and never panics; what reaches
 //! the film is finite and not negative; and the contract checkers find every kind of fault.
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use glam::{Vec2, Vec3};
 use upbp_core::check::{check_bsdf, check_camera, check_emitter, check_medium, check_scene};
 use upbp_core::media::{Homogeneous, Medium, PhaseFunction, RaySegment, SegmentDensity};
@@ -8,7 +10,7 @@ use upbp_core::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterId,
     EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
-use upbp_core::{Counters, MediumId, Ray, Renderer, Settings, Spectrum};
+use upbp_core::{BodyId, Counters, Interior, MediumId, Ray, Renderer, Settings, Spectrum};
 use upbp_scene::{Light, Material, PerspectiveCamera, ReadyScene};
 
 /// What the host does wrong.
@@ -22,7 +24,18 @@ enum Fault {
     ShadingOpposite,
     HitBehind,
     HitNan,
+    HitInfinite,
     PositionNan,
+    PositionInfinite,
+    BoundaryNan,
+    /// Null boundaries without an end, of one body or of another each time.
+    Endless,
+    EndlessBodies,
+    /// Null boundaries that are left, of another body whenever one is asked for.
+    NewBodies,
+    NormalInwards,
+    NormalTurned,
+    InteriorMissing,
     PositionElsewhere,
     MediumUnknown,
     EmitterUnknown,
@@ -60,6 +73,7 @@ struct Hostile {
     media: Vec<HostileMedium>,
     camera: HostileCamera,
     fault: Fault,
+    bodies: AtomicU32,
 }
 
 #[derive(Clone, Copy)]
@@ -69,14 +83,19 @@ struct HostileMedium(Homogeneous, Fault);
 struct HostileCamera(PerspectiveCamera, Fault);
 
 impl Hostile {
+    fn new_body(&self) -> u32 {
+        self.bodies.fetch_add(1, Ordering::Relaxed)
+    }
+
     fn new(fault: Fault) -> Self {
         let text = "(version: 1, camera: Perspective(origin: (0, 0.5, 3), target: (0, 0, 0), fov_degrees: 40),
             film: (width: 8, height: 8), media: {\"m\": Homogeneous(sigma_a: 0.1, sigma_s: (1, 0.9, 0.5))},
-            materials: {\"null\": Null, \"grey\": Lambert(0.5), \"black\": Lambert(0)},
+            materials: {\"null\": Null, \"grey\": Lambert(0.5), \"black\": Lambert(0), \"glass\": Dielectric(ior: 1.5)},
             shapes: [
                 (geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"m\"),
                 (geometry: Quad(origin: (-2, -1, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0)), material: \"grey\"),
                 (geometry: Sphere(centre: (0.5, 2, 0), radius: 0.25), material: \"black\", emission: 5),
+                (geometry: Sphere(centre: (-1.5, 0, 0), radius: 0.15), material: \"glass\"),
             ],
             lights: [Point(position: (-1, 2, 0), intensity: 1)])";
         let scene = ReadyScene::from_ron_str(text, "").expect("a valid scene");
@@ -86,6 +105,7 @@ impl Hostile {
             camera: HostileCamera(*scene.camera(), fault),
             scene,
             fault,
+            bodies: AtomicU32::new(100),
         }
     }
 }
@@ -113,10 +133,34 @@ impl Scene for Hostile {
             F::NormalLong => hit.geometric_normal *= 1e20,
             F::ShadingNan => hit.shading_normal = Vec3::NAN,
             F::ShadingOpposite => hit.shading_normal = -hit.geometric_normal,
-            // Null boundaries are asked for again behind the last one: an endless list would be the host's own.
-            F::HitBehind if hit.bsdf.is_some() => hit.t = -1.0,
-            F::HitNan if hit.bsdf.is_some() => hit.t = f32::NAN,
+            F::HitBehind => hit.t = -1.0,
+            F::HitNan => hit.t = f32::NAN,
+            F::HitInfinite => hit.t = f32::INFINITY,
             F::PositionNan => hit.position = Vec3::NAN,
+            F::PositionInfinite => hit.position.x = f32::INFINITY,
+            F::BoundaryNan if hit.bsdf.is_none() => (hit.t, hit.position) = (f32::NAN, Vec3::NAN),
+            F::Endless | F::EndlessBodies => {
+                hit.t = ray.t_min * 1.001 + 1e-6;
+                (hit.bsdf, hit.emitter) = (None, None);
+                hit.position = ray.at(hit.t);
+                (hit.geometric_normal, hit.shading_normal) = (ray.direction, ray.direction);
+                let body = if self.fault == F::Endless { 0 } else { self.new_body() };
+                hit.interior =
+                    Some(Interior { body: BodyId(body), medium: Some(MediumId(0)), priority: 0, ior: 1.0 });
+            }
+            F::NewBodies => {
+                if let Some(interior) = &mut hit.interior {
+                    interior.body = BodyId(self.new_body());
+                    (hit.geometric_normal, hit.shading_normal) = (ray.direction, ray.direction);
+                }
+            }
+            F::NormalInwards if hit.interior.is_some() => {
+                (hit.geometric_normal, hit.shading_normal) = (-hit.geometric_normal, -hit.shading_normal);
+            }
+            F::NormalTurned if hit.geometric_normal.dot(ray.direction) > 0.0 => {
+                (hit.geometric_normal, hit.shading_normal) = (-hit.geometric_normal, -hit.shading_normal);
+            }
+            F::InteriorMissing if hit.bsdf.is_some() => hit.interior = None,
             F::PositionElsewhere => hit.position += 10.0,
             F::MediumUnknown => {
                 if let Some(interior) = &mut hit.interior {
@@ -332,20 +376,34 @@ impl Camera for HostileCamera {
 
 const BAD: [f32; 4] = [f32::NAN, f32::INFINITY, -1.0, 0.0];
 
+/// Faults in what rays meet.
+const GEOMETRY: [Fault; 21] = [
+    F::NormalNan,
+    F::NormalZero,
+    F::NormalLong,
+    F::ShadingNan,
+    F::ShadingOpposite,
+    F::HitBehind,
+    F::HitNan,
+    F::HitInfinite,
+    F::PositionNan,
+    F::PositionInfinite,
+    F::BoundaryNan,
+    F::Endless,
+    F::EndlessBodies,
+    F::NewBodies,
+    F::NormalInwards,
+    F::NormalTurned,
+    F::InteriorMissing,
+    F::PositionElsewhere,
+    F::MediumUnknown,
+    F::EmitterUnknown,
+    F::Distance(f32::NAN),
+];
+
 /// Every kind of fault.
 fn faults() -> Vec<Fault> {
     let mut faults = vec![
-        F::NormalNan,
-        F::NormalZero,
-        F::NormalLong,
-        F::ShadingNan,
-        F::ShadingOpposite,
-        F::HitBehind,
-        F::HitNan,
-        F::PositionNan,
-        F::PositionElsewhere,
-        F::MediumUnknown,
-        F::EmitterUnknown,
         F::BsdfNan,
         F::BsdfNegative,
         F::BsdfInfinite,
@@ -355,6 +413,7 @@ fn faults() -> Vec<Fault> {
         F::CameraDirection,
         F::CameraFilm,
     ];
+    faults.extend(GEOMETRY);
     for bad in BAD {
         faults.extend([F::BsdfPdf(bad), F::BsdfRoulette(bad), F::Reach(bad.into()), F::Stop(bad.into())]);
         faults.extend([F::Distance(bad), F::Continuation(bad), F::LightPdf(bad), F::CameraPdf(bad)]);
@@ -370,10 +429,10 @@ fn faults() -> Vec<Fault> {
 }
 
 /// Renders a little; what was dropped, or the reason not to start.
-fn render(fault: Fault) -> Result<Counters, String> {
+fn render(fault: Fault, techniques: &str) -> Result<Counters, String> {
     let scene = Hostile::new(fault);
     let settings = Settings {
-        techniques: "all".parse().expect("technique names"),
+        techniques: techniques.parse().expect("technique names"),
         light_paths: upbp_core::LightPaths::Count(256),
         max_length: 20,
         ..Settings::default()
@@ -393,14 +452,33 @@ fn render(fault: Fault) -> Result<Counters, String> {
 
 #[test]
 fn nothing_bad_reaches_the_film_and_nothing_panics() {
-    assert_eq!(render(F::None).expect("a good scene").dropped, 0);
-    for fault in faults() {
-        let outcome = std::panic::catch_unwind(|| render(fault));
-        let counters = outcome.unwrap_or_else(|_| panic!("{fault:?} panics"));
-        println!("{fault:?}: {counters:?}");
-        // Values that take part in a contribution are dropped there, and counted.
-        if matches!(fault, F::BsdfNan | F::BsdfNegative | F::BsdfInfinite | F::Radiance(_)) {
-            assert!(counters.expect("renders").dropped > 0, "{fault:?}");
+    for techniques in ["all", "auto", "bpt"] {
+        let good = render(F::None, techniques).expect("a good scene");
+        assert_eq!((good.dropped, good.lost_walks), (0, 0));
+        for fault in if techniques == "all" { faults() } else { GEOMETRY.to_vec() } {
+            let outcome = std::panic::catch_unwind(|| render(fault, techniques));
+            let counters = outcome.unwrap_or_else(|_| panic!("{fault:?} panics"));
+            println!("{fault:?}, {techniques}: {counters:?}");
+            // Values that take part in a contribution are dropped there, and counted. Walks that are told what cannot be are lost.
+            match fault {
+                F::BsdfNan | F::BsdfNegative | F::BsdfInfinite | F::Radiance(_) => {
+                    assert!(counters.expect("renders").dropped > 0, "{fault:?}");
+                }
+                F::NormalNan
+                | F::ShadingNan
+                | F::HitBehind
+                | F::HitNan
+                | F::HitInfinite
+                | F::PositionNan
+                | F::PositionInfinite
+                | F::BoundaryNan
+                | F::Endless
+                | F::EndlessBodies
+                | F::NewBodies
+                | F::LightDirection
+                | F::CameraDirection => assert!(counters.expect("renders").lost_walks > 0, "{fault:?}"),
+                _ => {}
+            }
         }
     }
 }
@@ -408,10 +486,10 @@ fn nothing_bad_reaches_the_film_and_nothing_panics() {
 #[test]
 fn scenes_without_bounds_or_power_are_refused() {
     for bad in [f32::NAN, f32::INFINITY, -1.0] {
-        assert!(render(F::Bounds(bad)).unwrap_err().contains("bounds"), "{bad}");
-        assert!(render(F::Power(bad)).unwrap_err().contains("power"), "{bad}");
+        assert!(render(F::Bounds(bad), "all").unwrap_err().contains("bounds"), "{bad}");
+        assert!(render(F::Power(bad), "all").unwrap_err().contains("power"), "{bad}");
     }
-    assert!(render(F::Bounds(0.0)).unwrap_err().contains("bounds"));
+    assert!(render(F::Bounds(0.0), "all").unwrap_err().contains("bounds"));
 }
 
 /// What the checkers say of a scene, each asked for what it is about.
@@ -444,6 +522,14 @@ fn the_checkers_find_every_fault() {
         }
     }
     assert!(unseen.is_empty(), "not found: {unseen:?}");
+    for (fault, named) in [
+        (F::NormalInwards, "geometric normals point out of a body"),
+        (F::NormalTurned, "does not turn towards the ray"),
+        (F::InteriorMissing, "a surface that refracts encloses a body"),
+    ] {
+        let violation = check(fault).unwrap_err();
+        assert!(violation.contains(named), "{fault:?}: {violation}");
+    }
     for bad in [f32::NAN, f32::INFINITY, -1.0] {
         assert!(check(F::Bounds(bad)).is_err() && check(F::Power(bad)).is_err(), "{bad}");
     }

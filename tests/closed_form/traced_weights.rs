@@ -479,7 +479,7 @@ fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
         let (from, towards) = (point(), point());
         let direction = (towards - from).normalize();
         let mut walk = Stream::new(2, 0, StreamKind::Camera, 0);
-        passage.trace(&scene, from, direction, &scene.stack_at(from), Extent::ToSurface, &mut walk);
+        passage.trace(&scene, from, direction, &scene.stack_at(from), 0.0, Extent::ToSurface, &mut walk);
         for span in &passage.spans {
             let t = span.start + (span.end.min(10.0) - span.start) * random.uniform();
             let found = passage.stack_in(span, t);

@@ -23,11 +23,12 @@ pub struct Counters {
     pub dropped: u64,
     /// Camera sub-paths that were ended by the limit of the path length at a vertex that scatters.
     pub cut_walks: u64,
-    /// Walks that escaped while still inside a body: geometry that is not closed. They are ended.
+    /// Walks that were ended since what they met cannot be: they escaped while still inside a body (geometry that is not closed), or a host
+    /// told of hits that are not ahead or not finite, or of boundaries without an end.
     pub lost_walks: u64,
     /// Boundaries that contradict the bodies that a walk thinks to be in: a body entered twice or left without being inside.
-    /// At a start within rounding of a boundary, or on one, the bodies are corrected; where geometry is not closed or too
-    /// deeply nested, the boundary is ignored.
+    /// At a start within rounding of a boundary, or on one, the bodies are corrected; where geometry is not closed, the
+    /// boundary is ignored.
     pub boundary_conflicts: u64,
 }
 

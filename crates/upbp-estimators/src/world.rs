@@ -1,6 +1,6 @@
 //! A scene made ready for the walks: emitters with their probabilities, bounds, the bodies around the camera.
 
-use upbp_media::{Medium, MediumStack, RaySegment};
+use upbp_media::{Medium, MediumStack, RaySegment, SegmentDensity};
 
 use crate::scene::{BoundingSphere, Camera, Emitter, EmitterId, EmitterKind, Scene};
 
@@ -15,6 +15,7 @@ pub struct World<'a, S: Scene> {
     emission: Selection,
     next_event: Selection,
     environments: Vec<EmitterId>,
+    passes_from_infinity: f64,
     camera_stack: Option<MediumStack>,
     emitting_media: bool,
     dense_media: bool,
@@ -45,12 +46,13 @@ impl<'a, S: Scene> World<'a, S> {
         if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {
             return Err(WorldError::Crop { width, height });
         }
-        // Light from infinity does not get through an infinite medium: such emitters are never chosen.
         let everything =
             RaySegment { origin: bounds.centre, direction: glam::Vec3::Z, start: 0.0, end: f32::INFINITY };
-        let closed = scene
+        let from_infinity = scene
             .outside()
-            .is_some_and(|m| scene.media()[m.0 as usize].segment(&everything).transmittance.is_black());
+            .map_or(SegmentDensity::VACUUM, |medium| scene.media()[medium.0 as usize].segment(&everything));
+        // No light from infinity gets through: such emitters are never chosen.
+        let closed = from_infinity.transmittance.is_black();
         let mut powers = Vec::with_capacity(scene.emitters().len());
         let mut environments = Vec::new();
         for (index, emitter) in scene.emitters().iter().enumerate() {
@@ -89,6 +91,7 @@ impl<'a, S: Scene> World<'a, S> {
             emission,
             next_event,
             environments,
+            passes_from_infinity: from_infinity.reach,
             camera_stack,
             emitting_media,
             dense_media,
@@ -140,6 +143,12 @@ impl<'a, S: Scene> World<'a, S> {
         !self.power.is_empty()
     }
 
+    /// The probability that a walk passes an infinite length of the medium around everything.
+    #[must_use]
+    pub(crate) const fn passes_from_infinity(&self) -> f64 {
+        self.passes_from_infinity
+    }
+
     /// Whether any medium emits light.
     #[must_use]
     pub const fn has_emitting_media(&self) -> bool {
@@ -156,7 +165,7 @@ impl<'a, S: Scene> World<'a, S> {
     /// The bodies around a point of the lens.
     #[must_use]
     pub fn stack_at_camera(&self, lens: glam::Vec3) -> MediumStack {
-        self.camera_stack.unwrap_or_else(|| self.scene.stack_at(lens))
+        self.camera_stack.clone().unwrap_or_else(|| self.scene.stack_at(lens))
     }
 }
 

@@ -17,7 +17,7 @@ pub struct RaySegment {
     pub origin: Vec3,
     /// Direction of the ray, a unit vector.
     pub direction: Vec3,
-    /// Distance from `origin` at which the segment begins, in scene units.
+    /// Distance from `origin` at which the segment begins, in scene units; −∞ for light that has come from infinity.
     pub start: f32,
     /// Distance from `origin` at which the segment ends, in scene units; may be infinite.
     pub end: f32,

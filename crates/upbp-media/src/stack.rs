@@ -38,8 +38,6 @@ pub enum Crossing {
     AlreadyInside,
     /// Left a body that the point is not inside of: ignored.
     NotInside,
-    /// Entered one body more than [`MediumStack::CAPACITY`]: ignored.
-    Overflow,
 }
 
 /// A medium or none, in four bytes.
@@ -79,31 +77,34 @@ impl Entry {
     }
 }
 
-/// The bodies that a point is inside of. A plain value: rays that look ahead walk a copy, so it is small enough
-/// to be copied in a few vector instructions.
-#[derive(Copy, Clone)]
+/// The bodies that a point is inside of, by ascending priority, among equals in order of entering.
+///
+/// Any number of them. Rays that look ahead walk a copy: that of a few bodies takes a few vector instructions.
+#[derive(Clone)]
 pub struct MediumStack {
-    /// The first `len` entries are in use, by ascending priority, among equals in order of entering.
-    bodies: [Entry; Self::CAPACITY],
+    /// The first `few` entries are in use, unless there are more bodies than entries.
+    bodies: [Entry; Self::FEW],
     outside: Filling,
-    len: u8,
+    few: u8,
+    /// All bodies, if there are more than [`FEW`](Self::FEW); else empty.
+    many: Vec<Entry>,
 }
 
 impl MediumStack {
-    /// How many bodies may overlap in one point.
-    pub const CAPACITY: usize = 7;
+    /// So many bodies need no memory of their own.
+    const FEW: usize = 6;
 
     /// A point outside all bodies, in the medium around everything (`None` for vacuum), of index 1.
     #[inline]
     #[must_use]
     pub const fn new(outside: Option<MediumId>) -> Self {
         const UNUSED: Entry = Entry { body: BodyId(0), filling: Filling::new(None), priority: 0, ior: 1.0 };
-        Self { bodies: [UNUSED; Self::CAPACITY], outside: Filling::new(outside), len: 0 }
+        Self { bodies: [UNUSED; Self::FEW], outside: Filling::new(outside), few: 0, many: Vec::new() }
     }
 
     #[inline]
     fn entries(&self) -> &[Entry] {
-        &self.bodies[..usize::from(self.len)]
+        if self.many.is_empty() { &self.bodies[..usize::from(self.few)] } else { &self.many }
     }
 
     /// The bodies that the point is inside of, the current one last.
@@ -150,32 +151,37 @@ impl MediumStack {
     /// How many bodies the point is inside of.
     #[inline]
     #[must_use]
-    pub const fn len(&self) -> usize {
-        self.len as usize
+    pub fn len(&self) -> usize {
+        self.entries().len()
     }
 
     /// Whether the point is outside all bodies.
     #[inline]
     #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.len == 0
+    pub fn is_empty(&self) -> bool {
+        self.entries().is_empty()
     }
 
     /// Goes into a body: above all others of at most its priority.
     #[inline]
     pub fn enter(&mut self, interior: Interior) -> Crossing {
-        let len = self.len();
         if self.contains(interior.body) {
             return Crossing::AlreadyInside;
         }
-        if len == Self::CAPACITY {
-            return Crossing::Overflow;
-        }
         let Interior { body, medium, priority, ior } = interior;
+        let entry = Entry { body, filling: Filling::new(medium), priority, ior };
+        let len = self.len();
         let slot = self.entries().partition_point(|below| below.priority <= priority);
-        self.bodies.copy_within(slot..len, slot + 1);
-        self.bodies[slot] = Entry { body, filling: Filling::new(medium), priority, ior };
-        self.len += 1;
+        if len < Self::FEW {
+            self.bodies.copy_within(slot..len, slot + 1);
+            self.bodies[slot] = entry;
+            self.few += 1;
+        } else {
+            if len == Self::FEW {
+                self.many.extend(self.bodies);
+            }
+            self.many.insert(slot, entry);
+        }
         Crossing::Done
     }
 
@@ -186,8 +192,16 @@ impl MediumStack {
         let Some(slot) = self.entries().iter().position(|entry| entry.body == body) else {
             return Crossing::NotInside;
         };
-        self.bodies.copy_within(slot + 1..len, slot);
-        self.len -= 1;
+        if len <= Self::FEW {
+            self.bodies.copy_within(slot + 1..len, slot);
+            self.few -= 1;
+        } else {
+            self.many.remove(slot);
+            if let Ok(few) = self.many[..].try_into() {
+                self.bodies = few;
+                self.many.clear();
+            }
+        }
         Crossing::Done
     }
 
@@ -270,22 +284,6 @@ mod tests {
     }
 
     #[test]
-    fn a_full_stack_refuses_and_stays_as_it_is() {
-        let mut stack = MediumStack::new(None);
-        for body in 0..MediumStack::CAPACITY as u32 {
-            assert_eq!(stack.enter(interior(body, 0)), Crossing::Done);
-        }
-        let before = stack;
-        assert_eq!(stack.enter(interior(99, 100)), Crossing::Overflow);
-        assert_eq!(stack.enter(interior(3, 100)), Crossing::AlreadyInside);
-        assert_eq!(stack, before);
-        assert_eq!(stack.leave(BodyId(99)), Crossing::NotInside);
-        assert_eq!(stack.leave(BodyId(0)), Crossing::Done);
-        assert_eq!(stack.enter(interior(99, 100)), Crossing::Done);
-        assert_eq!(stack.medium(), Some(MediumId(99)));
-    }
-
-    #[test]
     fn equality_does_not_see_bodies_that_were_left() {
         let (mut one, mut other) = (MediumStack::new(None), MediumStack::new(None));
         for body in [1, 2] {
@@ -300,16 +298,18 @@ mod tests {
 
     proptest! {
         #[test]
-        fn agrees_with_a_search_through_the_history(steps in vec((0_u32..12, -2_i32..3, any::<bool>()), 0..60)) {
+        fn agrees_with_a_search_through_the_history(
+            bodies in prop_oneof![Just(12_u32), Just(60)],
+            steps in vec((0_u32..60, -2_i32..3, prop::bool::weighted(0.6)), 0..160),
+        ) {
             let mut stack = MediumStack::new(Some(MediumId(99)));
             // In order of entering.
             let mut history: Vec<Interior> = Vec::new();
             for (body, priority, entering) in steps {
-                let interior = interior(body, priority);
+                let interior = interior(body % bodies, priority);
                 let inside = history.iter().position(|other| other.body == interior.body);
                 let expected = match (entering, inside) {
                     (true, Some(_)) => Crossing::AlreadyInside,
-                    (true, None) if history.len() == MediumStack::CAPACITY => Crossing::Overflow,
                     (true, None) => { history.push(interior); Crossing::Done }
                     (false, Some(index)) => { history.remove(index); Crossing::Done }
                     (false, None) => Crossing::NotInside,
@@ -325,8 +325,8 @@ mod tests {
 
         #[test]
         fn the_order_of_distinct_priorities_does_not_matter(
-            entering in Just((0_u32..7).collect::<Vec<_>>()).prop_shuffle(),
-            leaving in subsequence((0_u32..7).collect::<Vec<_>>(), 0..7).prop_shuffle(),
+            entering in Just((0_u32..10).collect::<Vec<_>>()).prop_shuffle(),
+            leaving in subsequence((0_u32..10).collect::<Vec<_>>(), 0..10).prop_shuffle(),
         ) {
             let mut stack = MediumStack::new(None);
             for &body in &entering {
@@ -335,7 +335,7 @@ mod tests {
             for &body in &leaving {
                 prop_assert_eq!(stack.leave(BodyId(body)), Crossing::Done);
             }
-            let left: Vec<_> = (0..7)
+            let left: Vec<_> = (0..10)
                 .filter(|body| !leaving.contains(body))
                 .map(|body| interior(body, 10 * body.cast_signed()))
                 .collect();

@@ -83,7 +83,7 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         Site::Medium(_) => None,
     };
     let target = Target { direction, distance, surface };
-    let Some(density) = clear_edge(scene, stack, origin, &target, crossings) else { return };
+    let Some(density) = clear_edge(scene, &stack, origin, &target, crossings) else { return };
 
     let (near, far) = (vertex.site.in_medium(), light.site.in_medium());
     let distance2 = f64::from(distance).powi(2);

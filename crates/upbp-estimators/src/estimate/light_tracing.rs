@@ -46,7 +46,7 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let crosses = vertex.site.crosses(vertex.towards_light, direction);
     let origin = ray_origin(&vertex.site, vertex.position, direction);
     let target = Target { direction, distance, surface: None };
-    let Some(density) = clear_edge(scene, sides.towards(crosses), origin, &target, crossings) else {
+    let Some(density) = clear_edge(scene, &sides.towards(crosses), origin, &target, crossings) else {
         return;
     };
     let in_medium = vertex.site.in_medium();

@@ -67,7 +67,7 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let surface = (kind == EmitterKind::Area).then_some((incident.point.position, incident.point.normal));
     let target = Target { direction, distance: incident.distance, surface };
     let stack = vertex.sides.towards(crosses);
-    let Some(density) = clear_edge(scene, stack, origin, &target, crossings) else { return };
+    let Some(density) = clear_edge(scene, &stack, origin, &target, crossings) else { return };
 
     let in_medium = vertex.site.in_medium();
     let distance2 = if kind.is_infinite() { 1.0 } else { f64::from(incident.distance).powi(2) };

@@ -27,6 +27,19 @@ pub struct Hit<B> {
     pub emitter: Option<EmitterId>,
 }
 
+impl<B> Hit<B> {
+    /// Whether a ray from `t_min` on can have met it: it lies ahead, and all its numbers are finite. A walk that meets another is lost.
+    #[inline]
+    #[must_use]
+    pub fn is_sound(&self, t_min: f32) -> bool {
+        self.t > t_min
+            && self.t.is_finite()
+            && self.position.is_finite()
+            && self.geometric_normal.is_finite()
+            && self.shading_normal.is_finite()
+    }
+}
+
 /// A ray goes into or out of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {

@@ -17,4 +17,4 @@ pub use bsdf::{Bsdf, BsdfSample, Interface, Walk};
 pub use camera::{Camera, CameraConnection, CameraRay, PixelRect};
 pub use emitter::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident};
 pub use hit::{Crossing, EmitterId, Hit};
-pub use world::Scene;
+pub use world::{MAX_CROSSINGS, Scene};

@@ -1,5 +1,7 @@
 //! The scene: where rays go.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 use upbp_accel::Ray;
 use upbp_media::{Medium, MediumId, MediumStack};
@@ -36,7 +38,8 @@ pub trait Scene: Sync {
     /// The camera.
     fn camera(&self) -> &Self::Camera;
 
-    /// The medium around everything, `None` for vacuum. Infinite emitters do not reach into an infinite medium.
+    /// The medium around everything, `None` for vacuum. Of the light of infinite emitters there is what gets through an infinite length of
+    /// it: nothing, but in channels without extinction.
     fn outside(&self) -> Option<MediumId> {
         None
     }
@@ -56,17 +59,19 @@ pub trait Scene: Sync {
     /// boundaries before it, or all along the ray if there is none.
     ///
     /// The default asks [`intersect`](Self::intersect) again behind each boundary, and so misses one of two boundaries
-    /// that coincide to rounding; a host with such geometry overrides this.
+    /// that coincide to rounding; a host with such geometry overrides this. It gives up at [`MAX_CROSSINGS`], and at a hit that is not
+    /// [sound](Hit::is_sound): walks are lost there.
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Self::Bsdf>> {
         let mut rest = *ray;
-        loop {
-            let hit = self.intersect(&rest).filter(|hit| hit.t > rest.t_min)?;
-            if hit.bsdf.is_some() {
+        for _ in 0..MAX_CROSSINGS {
+            let hit = self.intersect(&rest)?;
+            if hit.bsdf.is_some() || !hit.is_sound(rest.t_min) {
                 return Some(hit);
             }
             push_crossing(crossings, ray.direction, &hit);
             rest.t_min = behind(hit.t);
         }
+        None
     }
 
     /// Whether the segment `(ray.t_min, ray.t_max)` is free of surfaces that end every connection: those that scatter
@@ -74,35 +79,44 @@ pub trait Scene: Sync {
     /// they are of no interest if the answer is `false`.
     fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
         let mut rest = *ray;
-        while let Some(hit) = self.intersect(&rest).filter(|hit| hit.t > rest.t_min) {
-            if hit.bsdf.is_some() && hit.interior.is_none() {
+        for _ in 0..MAX_CROSSINGS {
+            let Some(hit) = self.intersect(&rest) else { return true };
+            if (hit.bsdf.is_some() && hit.interior.is_none()) || !hit.is_sound(rest.t_min) {
                 return false;
             }
             push_crossing(crossings, ray.direction, &hit);
             rest.t_min = behind(hit.t);
         }
-        true
+        false
     }
 
     /// The bodies that `point` lies in.
     ///
-    /// The default follows a ray to infinity: a body is around the point if the ray leaves it more often than it enters.
+    /// The default follows a ray to infinity: a body is around the point if the ray leaves it more often than it enters. Beyond
+    /// [`MAX_CROSSINGS`] it has found none.
     fn stack_at(&self, point: Vec3) -> MediumStack {
         // Any direction serves; one without symmetry meets few edges.
         let direction = Vec3::new(0.284_69, 0.867_42, 0.408_03).normalize();
         let mut ray = Ray { origin: point, direction, t_min: 0.0, t_max: f32::INFINITY };
+        let mut stack = MediumStack::new(self.outside());
         let mut balance: Vec<(upbp_media::Interior, i32)> = Vec::new();
-        while let Some(hit) = self.intersect(&ray).filter(|hit| hit.t > ray.t_min) {
+        let mut places = BTreeMap::new();
+        let mut met = 0;
+        while let Some(hit) = self.intersect(&ray).filter(|hit| hit.is_sound(ray.t_min)) {
+            met += 1;
+            if met > MAX_CROSSINGS {
+                return stack;
+            }
             if let Some(interior) = hit.interior {
                 let step = if direction.dot(hit.geometric_normal) > 0.0 { 1 } else { -1 };
-                match balance.iter_mut().find(|(known, _)| known.body == interior.body) {
+                let place = *places.entry(interior.body).or_insert(balance.len());
+                match balance.get_mut(place) {
                     Some((_, count)) => *count += step,
                     None => balance.push((interior, step)),
                 }
             }
             ray.t_min = behind(hit.t);
         }
-        let mut stack = MediumStack::new(self.outside());
         // Met last is farthest out: entered first.
         for (interior, count) in balance.into_iter().rev() {
             if count > 0 {
@@ -112,6 +126,9 @@ pub trait Scene: Sync {
         stack
     }
 }
+
+/// Boundaries on one ray, at most: a ray that meets so many is lost, and so a host's answers cannot keep a walk for ever.
+pub const MAX_CROSSINGS: usize = 4096;
 
 /// The next distance that is certainly not the same intersection again.
 fn behind(t: f32) -> f32 {

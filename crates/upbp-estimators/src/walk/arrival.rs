@@ -30,16 +30,19 @@ pub(super) enum Arrival<B> {
     Escaped,
     /// Grazing a surface.
     Absorbed,
-    /// To infinity, but still inside a body: the geometry is not closed.
+    /// To infinity, but still inside a body: the geometry is not closed. Or to where nothing can be: the scene breaks its contract.
     Lost,
 }
 
 pub(super) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival<S::Bsdf> {
+    if passage.is_lost() {
+        return Arrival::Lost;
+    }
     if let Some((i, t)) = passage.stop {
         let span = &passage.spans[i];
         let Some(medium) = span.medium else { return Arrival::Lost };
         let position = passage.origin + t * passage.direction;
-        if !position.is_finite() {
+        if !(t >= span.start && position.is_finite()) {
             return Arrival::Lost;
         }
         return Arrival::Vertex(Arrived {

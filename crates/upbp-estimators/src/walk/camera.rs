@@ -102,6 +102,10 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let [dx, dy] = stream.pair();
     let film = Vec2::new(pixel[0] as f32 + dx, pixel[1] as f32 + dy);
     let Some(ray) = scene.camera().ray(film, stream.pair()) else { return walk };
+    if !(ray.origin.is_finite() && ray.direction.is_finite()) {
+        counters.lost_walks += 1;
+        return walk;
+    }
     observer.camera_end(ray.origin, ray.direction, ray.pdf);
     let mut out = Output { layers: &mut walk.layers, counters, observer };
     let emission = plan.mis.hit > 0.0 && world.has_emitting_media();
@@ -121,7 +125,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
         edge.depth = depth;
-        scratch.passage.trace(scene, origin, direction, &stack, extent, &mut stream);
+        scratch.passage.trace(scene, origin, direction, &stack, 0.0, extent, &mut stream);
         out.counters.boundary_conflicts += scratch.passage.take_conflicts();
         let passage = &scratch.passage;
         estimate::emission_along(context, passage, &edge, &mut out);

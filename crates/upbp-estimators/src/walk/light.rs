@@ -2,13 +2,14 @@
 
 use glam::Vec3;
 use upbp_accel::{Segment, offset_origin};
-use upbp_media::{MediumStack, Spectrum};
+use upbp_media::{Medium, MediumId, MediumStack, Spectrum};
 
 use super::arrival::{Arrival, Arrived, arrive, pend};
 use super::context::{Context, Scratch};
 use super::passage::{Extent, Passage, Span};
 use super::photon::{EdgeSource, LightChunk, LightVertex, PhotonBeam};
 use super::visibility::ray_origin;
+use crate::counters::Counters;
 use crate::estimate::light_tracing;
 use crate::mis::{BeamExtent, Densities, Edge, Pending};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
@@ -44,7 +45,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     );
     let Context { world, plan } = *context;
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
-    let Some(mut flight) = emit(world, context, index, &mut stream, observer) else { return };
+    let Some(mut flight) = emit(context, index, &mut stream, &mut out.counters, observer) else { return };
     let scene = world.scene;
     let mut survival = Survival::of_light(plan.roulette);
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
@@ -56,7 +57,8 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     for depth in 1..plan.lengths.max {
         out.counters.light_edges += 1;
         let passage = &mut scratch.passage;
-        passage.trace(scene, flight.origin, flight.direction, &flight.stack, extent, &mut stream);
+        let start = if flight.infinite { f32::NEG_INFINITY } else { 0.0 };
+        passage.trace(scene, flight.origin, flight.direction, &flight.stack, start, extent, &mut stream);
         out.counters.boundary_conflicts += passage.take_conflicts();
         if leaves_beams {
             store_beams(context, passage, &flight, depth, index, out);
@@ -126,16 +128,26 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 }
 
 fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
-    world: &World<'_, S>,
     context: &Context<'_, S>,
     index: u32,
     stream: &mut Stream,
+    counters: &mut Counters,
     observer: &mut O,
 ) -> Option<Flight<O::Densities>> {
+    let world = context.world;
     let (emitter, probability) = world.choose_emission(stream.uniform())?;
     let light = &world.scene.emitters()[emitter.0 as usize];
     let emission = light.sample_emission(&world.bounds, stream.pair(), stream.pair())?;
+    if !(emission.point.position.is_finite() && emission.direction.is_finite()) {
+        counters.lost_walks += 1;
+        return None;
+    }
     let kind = light.kind();
+    // With another probability a walk from infinity does not arrive. Those that do have not stopped on the way.
+    let passes = world.passes_from_infinity();
+    if kind.is_infinite() && passes < 1.0 && f64::from(stream.uniform()) >= passes {
+        return None;
+    }
     let cos = match kind {
         EmitterKind::Area => emission.point.normal.dot(emission.direction),
         EmitterKind::Point | EmitterKind::Directional | EmitterKind::Environment => 1.0,
@@ -193,8 +205,8 @@ fn store_beams<S: Scene, D: Densities>(
         BeamExtent::Long => None,
     };
     for (i, span) in passage.spans.iter().enumerate() {
-        if let Some(end) = beam_end(world, passage, span, stop, i)
-            && let Some(medium) = span.medium
+        if let Some(medium) = span.medium
+            && let Some(end) = beam_end(world, passage, span, medium, stop.filter(|(last, _)| *last == i))
         {
             let merges = plan.mis.merges_in(medium);
             if merges.bb1d > 0.0 || merges.bp2d > 0.0 {
@@ -223,21 +235,32 @@ fn store_beams<S: Scene, D: Densities>(
     }
 }
 
-/// The end of a beam in `span`. A long beam in an infinite medium ends where nothing but the medium is left.
+/// Lengths that are tried for a beam without an end, each twice the one before.
+const DOUBLINGS: usize = 64;
+
+/// The end of a beam in `span`, whose medium is `medium`, where the walk may stop.
+///
+/// Where there is none, the beam ends where no channel is attenuated any further: what is scattered beyond is less than single precision tells.
+/// A beam from infinity has none left before the scene.
 fn beam_end<S: Scene>(
     world: &World<'_, S>,
     passage: &Passage<S::Bsdf>,
     span: &Span,
+    medium: MediumId,
     stop: Option<(usize, f32)>,
-    index: usize,
 ) -> Option<f32> {
-    let end = match stop {
-        Some((last, t)) if last == index => t,
-        _ => span.end,
-    };
-    if end.is_finite() {
-        return (end > span.start).then_some(end);
+    let end = stop.map_or(span.end, |(_, t)| t);
+    if end.is_finite() || !span.start.is_finite() {
+        return (end > span.start && span.start.is_finite()).then_some(end);
     }
-    let reach = (passage.origin - world.bounds.centre).length() + 4.0 * world.bounds.radius;
-    Some(span.start + reach)
+    let medium = &world.scene.media()[medium.0 as usize];
+    let transmittance = |end| medium.segment(&passage.segment(span, end)).transmittance;
+    let left = transmittance(f32::INFINITY);
+    let ends = std::iter::successors(Some(world.bounds.radius), |length| Some(2.0 * length))
+        .map(|length| (span.start + length).min(f32::MAX));
+    let is_enough = |end: &f32| {
+        let there = transmittance(*end);
+        (0..3).all(|c| there[c] <= left[c] * (1.0 + 1e-6) + f32::MIN_POSITIVE)
+    };
+    Some(ends.take(DOUBLINGS).find(is_enough).unwrap_or(f32::MAX))
 }

@@ -10,7 +10,7 @@ use upbp_accel::Ray;
 use upbp_media::{EdgeDensity, Interior, Medium, MediumId, MediumStack, RaySegment};
 
 use crate::random::Stream;
-use crate::scene::{Crossing, Hit, Scene};
+use crate::scene::{Crossing, Hit, MAX_CROSSINGS, Scene};
 
 /// How much of a ray's way is needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +57,8 @@ pub struct Passage<B> {
     found: Vec<Crossing>,
     /// Boundaries that contradicted the bodies that the ray was thought to be in, since they were last taken.
     conflicts: u64,
+    /// Whether the ray met what cannot be, or more than can be followed.
+    lost: bool,
 }
 
 /// The medium inside of the bodies of `stack`. One that the scene does not have is vacuum: a broken contract, which
@@ -84,6 +86,14 @@ pub(crate) fn correction_of_escape(stack: &MediumStack, earlier: &[Crossing]) ->
     let crossed = |body| earlier.iter().any(|other| other.interior.body == body);
     let interior = stack.bodies().find(|interior| !crossed(interior.body))?;
     Some(Crossing { t: 0.0, interior, entering: false, scatters: false })
+}
+
+/// Bodies at the start of a ray that may turn out to be others than was thought.
+const MAX_CORRECTIONS: usize = 64;
+
+/// Whether a ray is followed again with one more correction, or is lost: a scene that tells of other bodies each time would never end.
+pub(crate) const fn may_correct(corrections: usize) -> bool {
+    corrections < MAX_CORRECTIONS
 }
 
 /// A distance is followed by this share farther than it was drawn: some roundings.
@@ -127,37 +137,66 @@ impl<B: Copy> Passage<B> {
             crossings: Vec::new(),
             found: Vec::new(),
             conflicts: 0,
+            lost: false,
         }
     }
 
     /// Follows a ray from `origin`, which lies in the bodies of `stack` but for rounding (a boundary that contradicts
     /// them corrects them), and draws from `stream` where the walk stops.
+    ///
+    /// The way begins at distance `start`: 0, or −∞ for light that has come from infinity to `origin`, through the medium around everything
+    /// without a stop. It does not stop in its first stretch, then.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a ray, what is known where it starts, and how it is followed"
+    )]
     pub fn trace<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
         origin: Vec3,
         direction: Vec3,
         stack: &MediumStack,
+        start: f32,
         extent: Extent,
         stream: &mut Stream,
     ) {
         self.origin = origin;
         self.direction = direction;
-        self.start = *stack;
+        self.start.clone_from(stack);
         self.crossings.clear();
+        self.lost = false;
         let mut corrections = 0;
-        while let Some(correction) = self.follow(scene, extent, stream, corrections) {
+        while let Some(correction) = self.follow(scene, start, extent, stream, corrections) {
             self.conflicts += 1;
+            if !may_correct(corrections) {
+                self.lose();
+                return;
+            }
             self.crossings.truncate(corrections);
             self.crossings.push(correction);
             corrections += 1;
         }
     }
 
+    /// Gives the ray up: there is nothing on it.
+    fn lose(&mut self) {
+        self.spans.clear();
+        self.stop = None;
+        self.hit = None;
+        self.lost = true;
+    }
+
+    /// Whether nothing is known of the ray, since the scene's answers cannot be true.
+    #[must_use]
+    pub const fn is_lost(&self) -> bool {
+        self.lost
+    }
+
     /// Follows the ray, after the first crossings, which are corrections. Ends with another one if there must be.
     fn follow<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
+        start: f32,
         extent: Extent,
         stream: &mut Stream,
         corrections: usize,
@@ -165,10 +204,10 @@ impl<B: Copy> Passage<B> {
         self.spans.clear();
         self.stop = None;
         self.hit = None;
-        self.end = self.start;
+        self.end.clone_from(&self.start);
         let mut flight = Flight { extent, decision: None, reach: f32::INFINITY, stop: f32::INFINITY };
         let medium = medium_of(scene, &self.start);
-        let mut span = Span { start: 0.0, end: 0.0, medium, before: EdgeDensity::EMPTY, crossings: 0 };
+        let mut span = Span { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
         for i in 0..corrections {
             let correction = self.crossings[i];
@@ -179,8 +218,13 @@ impl<B: Copy> Passage<B> {
         let mut ray = Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.reach };
         loop {
             self.found.clear();
-            // A hit that is not ahead breaks the contract, and a loop would not end.
-            let hit = scene.trace(&ray, &mut self.found).filter(|hit| hit.t > ray.t_min);
+            let hit = scene.trace(&ray, &mut self.found);
+            // What breaks the contract may come again and again.
+            let is_sound = hit.as_ref().is_none_or(|hit| hit.is_sound(ray.t_min));
+            if !is_sound || self.crossings.len() + self.found.len() >= MAX_CROSSINGS {
+                self.lose();
+                return None;
+            }
             for i in 0..self.found.len() {
                 let crossing = self.found[i];
                 if crossing.t > flight.reach {
@@ -237,7 +281,7 @@ impl<B: Copy> Passage<B> {
     /// Begins `span`: draws the distance in its medium.
     fn enter<S: Scene<Bsdf = B>>(&self, scene: &S, span: &Span, flight: &mut Flight, stream: &mut Stream) {
         flight.reach = f32::INFINITY;
-        if self.stop.is_some() {
+        if self.stop.is_some() || span.start == f32::NEG_INFINITY {
             return;
         }
         let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize]) else { return };
@@ -248,6 +292,7 @@ impl<B: Copy> Passage<B> {
         let u = *flight.decision.get_or_insert_with(|| stream.pair());
         if flight.extent == Extent::ToStop
             && let Some(t) = medium.sample_distance(&self.segment(span, f32::INFINITY), u[0], u[1])
+            && t >= span.start
         {
             flight.reach = t + REACH_MARGIN * t;
             flight.stop = t;
@@ -347,7 +392,7 @@ impl<B: Copy> Passage<B> {
     /// A span may hold crossings of its own: boundaries hidden in a stronger body, which change no medium.
     #[must_use]
     pub fn stack_in(&self, span: &Span, t: f32) -> MediumStack {
-        let mut stack = self.start;
+        let mut stack = self.start.clone();
         for (i, crossing) in self.crossings.iter().enumerate() {
             if i >= span.crossings && crossing.t > t {
                 break;

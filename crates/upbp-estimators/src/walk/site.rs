@@ -32,7 +32,7 @@ pub struct SurfaceSite<B> {
 }
 
 /// The bodies on the two sides of a vertex.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Sides {
     /// Those on the side that the walk comes from.
     near: MediumStack,
@@ -51,7 +51,7 @@ impl Sides {
     #[inline]
     #[must_use]
     pub fn towards(&self, crosses: bool) -> MediumStack {
-        let mut stack = self.near;
+        let mut stack = self.near.clone();
         if let Some((interior, entering)) = self.boundary
             && crosses
         {
@@ -109,11 +109,12 @@ impl<B: Bsdf> Site<B> {
     /// grazed.
     pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, before: &MediumStack) -> Option<(Self, Sides)> {
         let cos = direction.dot(hit.geometric_normal);
-        if cos.abs() < MIN_COSINE || !hit.shading_normal.is_finite() {
+        if cos.abs() < MIN_COSINE {
             return None;
         }
         let entering = cos < 0.0;
-        let sides = Sides { near: *before, boundary: hit.interior.map(|interior| (interior, entering)) };
+        let sides =
+            Sides { near: before.clone(), boundary: hit.interior.map(|interior| (interior, entering)) };
         let near = before.ior();
         let far = if sides.boundary.is_some() { sides.towards(true).ior() } else { near };
         let (above, below) = if entering { (near, far) } else { (far, near) };

@@ -4,9 +4,9 @@ use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
 use upbp_media::{EdgeDensity, Medium, MediumStack, RaySegment};
 
-use super::passage::{correction, correction_of_escape, is_hidden, medium_of};
+use super::passage::{correction, correction_of_escape, is_hidden, may_correct, medium_of};
 use super::site::Site;
-use crate::scene::{Crossing, Scene};
+use crate::scene::{Crossing, MAX_CROSSINGS, Scene};
 
 /// The far end of a connection.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,7 @@ pub(crate) fn ray_origin<B>(site: &Site<B>, position: Vec3, direction: Vec3) -> 
 /// `stack` holds the bodies at the near end, on the side of `target`; the far end has none of its own.
 pub fn clear_edge<S: Scene>(
     scene: &S,
-    stack: MediumStack,
+    stack: &MediumStack,
     origin: Vec3,
     target: &Target,
     crossings: &mut Vec<Crossing>,
@@ -51,17 +51,21 @@ pub fn clear_edge<S: Scene>(
     if !(ray.t_max > 0.0) || !ray.direction.is_finite() || !scene.is_clear(&ray, crossings) {
         return None;
     }
+    if crossings.len() >= MAX_CROSSINGS {
+        return None;
+    }
     // As along a walk, what the ray meets counts more than what was known where it starts.
     let escapes = target.distance == f32::INFINITY;
     let mut corrections = 0;
-    loop {
-        match accumulate(scene, stack, &ray, crossings, corrections, escapes) {
+    while may_correct(corrections) {
+        match accumulate(scene, stack.clone(), &ray, crossings, corrections, escapes) {
             Edge::Clear(density) => return Some(density),
             Edge::Blocked => return None,
             Edge::Corrected(correction) => crossings.insert(corrections, correction),
         }
         corrections += 1;
     }
+    None
 }
 
 /// What an edge turns out to be.

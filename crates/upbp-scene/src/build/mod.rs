@@ -250,7 +250,10 @@ impl Builder<'_> {
     /// A scene without any light is a mistake, and so is a light that cannot reach anything.
     fn check_shines(&mut self, media: &[Homogeneous], ids: &BTreeMap<&str, MediumId>) {
         let description = self.description;
-        if let Some(outside) = &description.outside {
+        let medium_of = |name: &String| ids.get(name.as_str()).and_then(|id| media.get(id.0 as usize));
+        if let Some(outside) = &description.outside
+            && medium_of(outside).is_some_and(is_closed)
+        {
             for (index, light) in description.lights.iter().enumerate() {
                 if lights::is_infinite(light) {
                     let message = format!(
@@ -260,10 +263,7 @@ impl Builder<'_> {
                 }
             }
         }
-        let emits = |name: &String| {
-            let medium = ids.get(name.as_str()).and_then(|id| media.get(id.0 as usize));
-            medium.is_some_and(Homogeneous::emits)
-        };
+        let emits = |name: &String| medium_of(name).is_some_and(Homogeneous::emits);
         let named =
             description.outside.iter().chain(description.shapes.iter().flat_map(|shape| &shape.interior));
         let shines = description.lights.iter().any(lights::shines)
@@ -276,6 +276,11 @@ impl Builder<'_> {
             );
         }
     }
+}
+
+/// Whether no light gets through an infinite length of a medium.
+fn is_closed(medium: &Homogeneous) -> bool {
+    medium.extinction().to_array().iter().all(|sigma| *sigma > 0.0)
 }
 
 /// A name that nobody defines, with those that somebody does.
