@@ -13,6 +13,7 @@ mod bsdf;
 mod camera;
 mod emitter;
 mod medium;
+mod normals;
 mod scene;
 
 pub use bsdf::check_bsdf;

@@ -1,13 +1,17 @@
 //! [`check_scene`]: hits, crossings and bodies of a scene agree.
 
+use glam::Vec3;
+
+use super::normals::Normals;
 use super::{Check, ContractViolation, Random, is_unit, require};
-use crate::scene::{Crossing, Emitter, Scene};
+use crate::scene::{BoundingSphere, Crossing, Emitter, Scene};
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
-/// lie on their ray, `trace` and `is_clear` find what `intersect` does, and the bodies around a point
-/// follow from the boundaries on the way to it.
+/// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside, `trace` and
+/// `is_clear` find what `intersect` does, and the bodies around a point follow from the boundaries on the way to it.
 ///
-/// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree.
+/// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the normals of a body one
+/// in ten.
 pub fn check_scene(scene: &impl Scene) -> Check {
     let bounds = scene.bounds();
     require(bounds.radius.is_finite() && bounds.radius > 0.0, "bounds have a radius", bounds)?;
@@ -24,19 +28,53 @@ pub fn check_scene(scene: &impl Scene) -> Check {
         }
     }
     let mut violations = Vec::new();
+    let mut normals = Normals::default();
     let rays = 2000;
     for _ in 0..rays {
-        let origin = bounds.centre + random.direction() * (1.2 * bounds.radius);
         let target = bounds.centre + random.direction() * (bounds.radius * random.next());
-        let Some(direction) = (target - origin).try_normalize() else { continue };
-        let ray = crate::Ray { origin, direction, t_min: 0.0, t_max: 4.0 * bounds.radius };
+        let Some(ray) = ray_through(&bounds, target, &mut random) else { continue };
+        normals.look(scene, &ray)?;
         violations.extend(check_ray(scene, &ray, &mut random).err());
+        if violations.len() * 100 > rays {
+            break;
+        }
     }
-    if violations.len() * 100 > rays {
+    let agree = violations.len() * 100 <= rays;
+    if agree {
+        // What is small was met by few of them.
+        for _ in 0..10 * rays {
+            let target = bounds.centre + random.direction() * (bounds.radius * random.next());
+            look_through(scene, target, &mut random, &mut normals)?;
+        }
+        for place in normals.rare() {
+            for _ in 0..RAYS_AT_RARE {
+                look_through(scene, place, &mut random, &mut normals)?;
+            }
+        }
+    }
+    normals.check()?;
+    if !agree {
         let first = violations.swap_remove(0);
         return Err(ContractViolation { details: format!("{first:?}"), ..first });
     }
     Ok(())
+}
+
+/// Rays through each place where there is little else.
+const RAYS_AT_RARE: usize = 32;
+
+/// A ray from outside of everything, through `target` and beyond everything.
+fn ray_through(bounds: &BoundingSphere, target: Vec3, random: &mut Random) -> Option<crate::Ray> {
+    let origin = bounds.centre + random.direction() * (1.2 * bounds.radius);
+    let direction = (target - origin).try_normalize()?;
+    Some(crate::Ray { origin, direction, t_min: 0.0, t_max: 4.0 * bounds.radius })
+}
+
+fn look_through(scene: &impl Scene, target: Vec3, random: &mut Random, normals: &mut Normals) -> Check {
+    match ray_through(&scene.bounds(), target, random) {
+        Some(ray) => normals.look(scene, &ray),
+        None => Ok(()),
+    }
 }
 
 fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check {
