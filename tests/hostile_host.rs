@@ -1,7 +1,8 @@
 //! Hosts that break the contract of their scene: the renderer drops and counts, or refuses, and never panics; what reaches
 //! the film is finite and not negative; and the contract checkers find every kind of fault.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use glam::{Vec2, Vec3};
 use upbp_core::check::{check_bsdf, check_camera, check_emitter, check_medium, check_scene};
@@ -10,7 +11,10 @@ use upbp_core::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterId,
     EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
-use upbp_core::{BodyId, Counters, Interior, MediumId, Ray, Renderer, Settings, Spectrum};
+use upbp_core::{
+    BodyId, Canceller, Counters, Interior, MediumId, Ray, RenderError, Renderer, Settings, Spectrum, Start,
+    Stop, StopReason,
+};
 use upbp_scene::{Light, Material, PerspectiveCamera, ReadyScene};
 
 /// What the host does wrong.
@@ -74,6 +78,9 @@ struct Hostile {
     camera: HostileCamera,
     fault: Fault,
     bodies: AtomicU32,
+    /// Rays so far, and what to cancel after how many.
+    rays: AtomicU64,
+    end: Option<(u64, Canceller)>,
 }
 
 #[derive(Clone, Copy)]
@@ -106,6 +113,8 @@ impl Hostile {
             scene,
             fault,
             bodies: AtomicU32::new(100),
+            rays: AtomicU64::new(0),
+            end: None,
         }
     }
 }
@@ -117,6 +126,12 @@ impl Scene for Hostile {
     type Camera = HostileCamera;
 
     fn intersect(&self, ray: &Ray) -> Option<Hit<HostileBsdf>> {
+        let rays = self.rays.fetch_add(1, Ordering::Relaxed);
+        if let Some((last, canceller)) = &self.end
+            && rays == *last
+        {
+            canceller.cancel();
+        }
         let hit = self.scene.intersect(ray)?;
         let mut hit = Hit {
             t: hit.t,
@@ -443,7 +458,7 @@ fn render(fault: Fault, techniques: &str) -> Result<Counters, String> {
         renderer.iterate();
     }
     let film = renderer.film();
-    for (name, image) in film.layers().iter().filter_map(|layer| Some((layer.name(), film.layer(*layer)?))) {
+    for (name, image) in film.layers().filter_map(|layer| Some((layer.name(), film.layer(layer)?))) {
         let fine = image.pixels.iter().flatten().all(|value| value.is_finite() && *value >= 0.0);
         assert!(fine, "{fault:?}: {name}");
     }
@@ -533,4 +548,52 @@ fn the_checkers_find_every_fault() {
     for bad in [f32::NAN, f32::INFINITY, -1.0] {
         assert!(check(F::Bounds(bad)).is_err() && check(F::Power(bad)).is_err(), "{bad}");
     }
+}
+
+/// A renderer of a good scene that is cancelled after so many rays.
+fn begin(scene: &Hostile) -> Result<Renderer<'_>, RenderError> {
+    let settings = Settings { deterministic: true, max_length: 20, ..Settings::default() };
+    let canceller = scene.end.as_ref().map(|(_, canceller)| canceller.clone()).unwrap_or_default();
+    Renderer::start(
+        scene,
+        settings.validate().expect("good settings"),
+        Start { canceller, ..Start::default() },
+    )
+}
+
+#[test]
+fn cancelled_at_any_ray_it_ends_at_once_and_what_is_done_is_not_lost() {
+    let scene = Hostile::new(F::None);
+    let mut whole = begin(&scene).expect("a good scene");
+    let of_preparation = scene.rays.load(Ordering::Relaxed);
+    while whole.film().iterations() < 2 {
+        assert!(whole.iterate());
+    }
+    let of_all = scene.rays.load(Ordering::Relaxed);
+    let (mut refused, mut parts) = (0, 0);
+    for last in (0..of_all).step_by((of_all / 60) as usize) {
+        let cancelled = Hostile { end: Some((last, Canceller::default())), ..Hostile::new(F::None) };
+        match begin(&cancelled) {
+            Err(error) => {
+                assert_eq!(error, RenderError::Cancelled);
+                refused += 1;
+            }
+            Ok(mut renderer) => {
+                let outcome = renderer
+                    .render(&Stop { iterations: Some(2), ..Stop::default() }, |_| ControlFlow::Continue(()));
+                assert_eq!(outcome.reason, StopReason::Cancelled);
+                parts += renderer.film().parts().len();
+                let mut resumed = begin(&scene).expect("a good scene");
+                resumed.resume(renderer.state().clone()).expect("the same render");
+                while resumed.film().iterations() < 2 {
+                    assert!(resumed.iterate());
+                }
+                assert!(resumed.film() == whole.film(), "{last}");
+            }
+        }
+        // The sub-paths in hand, of every thread.
+        let more = cancelled.rays.load(Ordering::Relaxed) - last;
+        assert!(more < 1000 * rayon::current_num_threads() as u64, "{more} rays more than {last}");
+    }
+    assert!(of_preparation < of_all && refused > 0 && parts > 0, "{refused} refused, {parts} parts");
 }

@@ -32,7 +32,7 @@ fn settings(light_paths: u32, beams: f64, correlation: bool, memory: u32) -> Set
         techniques: "all".parse().expect("technique names"),
         light_paths: LightPaths::Count(light_paths),
         correlation,
-        memory,
+        memory: Some(memory),
         ..Settings::default()
     }
 }

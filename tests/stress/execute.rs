@@ -114,7 +114,7 @@ fn render_here(text: &str, settings: Settings, iterations: u64) -> Result<Render
 
 /// No layer has anything that is not finite or negative.
 fn check_film(film: &Film) -> Result<(), String> {
-    let layers = film.layers().iter().filter_map(|layer| Some((layer.name(), film.layer(*layer)?)));
+    let layers = film.layers().filter_map(|layer| Some((layer.name(), film.layer(layer)?)));
     for (name, image) in layers.chain([("image", film.image())]) {
         for (index, pixel) in image.pixels.iter().enumerate() {
             if !pixel.iter().all(|value| value.is_finite() && *value >= 0.0) {

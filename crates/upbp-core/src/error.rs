@@ -48,6 +48,16 @@ pub enum RenderError {
     /// Its canceller was used before there was anything to show.
     #[error("cancelled before the first iteration")]
     Cancelled,
+    /// Techniques of which none can make any light in the scene.
+    #[error("techniques `{chosen}`: none of them can make any light in this scene ({reasons}); expected {}", expected_light(*possible))]
+    NoLight {
+        /// The techniques that were chosen.
+        chosen: TechniqueSet,
+        /// Those that can; none if nothing can be seen in the scene at all.
+        possible: TechniqueSet,
+        /// Why not.
+        reasons: String,
+    },
     /// A setting.
     #[error(transparent)]
     Settings(#[from] SettingsError),
@@ -69,6 +79,14 @@ pub enum RenderError {
         /// The setting.
         budget: u64,
     },
+}
+
+fn expected_light(possible: TechniqueSet) -> String {
+    if possible.is_empty() {
+        "a scene with a light that can be hit, or with a light and a surface or a medium that scatters it in many directions".to_owned()
+    } else {
+        format!("some of `{possible}`")
+    }
 }
 
 /// A state that cannot be read, resumed or merged.

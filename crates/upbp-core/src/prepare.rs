@@ -80,7 +80,7 @@ pub(crate) fn prepare<'a, S: Scene>(
         if canceller.is_cancelled() { Err(RenderError::Cancelled) } else { Ok(()) }
     };
     let mut world = World::new(scene)?;
-    let census = Census::take(&world, settings.techniques.candidates(), settings.max_length);
+    let census = Census::with_light(&world, settings.techniques.candidates(), settings.max_length)?;
     let techniques = census.techniques;
     if let Some(stage) =
         frozen.iter().flat_map(RenderPlan::stages).find(|s| !s.techniques.without(techniques).is_empty())

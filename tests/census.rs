@@ -1,0 +1,107 @@
+//! What is said of a scene before it is rendered: techniques that can make no light, and light that is found by chance.
+
+use upbp_core::{RenderError, Settings, TechniqueSet};
+use upbp_scene::ReadyScene;
+
+/// A scene of shapes and lights, with these settings: what the census says, or why nothing is rendered.
+fn census(parts: &str, settings: &Settings) -> Result<String, RenderError> {
+    // Media count whether or not something is made of them.
+    let media: Vec<String> = [
+        ("fog", "Homogeneous(sigma_s: 1)"),
+        ("smoke", "Homogeneous(sigma_a: 1)"),
+        ("fire", "Homogeneous(sigma_a: 1, emission: 1)"),
+    ]
+    .into_iter()
+    .filter(|(name, _)| parts.contains(name))
+    .map(|(name, medium)| format!("\"{name}\": {medium},"))
+    .collect();
+    let media = media.concat();
+    let text = format!(
+        "(version: 1, camera: Perspective(origin: (0, 0, 3), target: (0, 0, 0), fov_degrees: 40),
+        film: (width: 4, height: 4), media: {{{media}}},
+        materials: {{\"null\": Null, \"grey\": Lambert(0.5), \"mirror\": Mirror(0.9)}}, {parts})"
+    );
+    let scene = ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let settings = settings.clone().validate().expect("valid settings");
+    scene.renderer(settings).map(|renderer| renderer.census().to_string())
+}
+
+fn techniques(names: &str) -> Settings {
+    Settings { techniques: names.parse().expect("technique names"), ..Settings::default() }
+}
+
+fn ball(material: &str, interior: Option<&str>) -> String {
+    let interior = interior.map_or(String::new(), |name| format!(", interior: \"{name}\""));
+    format!("shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"{material}\"{interior})],")
+}
+
+const POINT: &str = "lights: [Point(position: (2, 2, 2), intensity: 1)],";
+const SKY: &str = "lights: [Constant(1)],";
+
+#[test]
+fn techniques_that_can_make_no_light_are_an_error() {
+    for (parts, names, possible) in [
+        // Only a sky: nothing to scatter.
+        (SKY.to_owned(), "lt", "hit"),
+        (SKY.to_owned(), "nee+connect+surf+bb1d", "hit"),
+        (ball("mirror", None) + SKY, "surf", "hit"),
+        (ball("mirror", None) + SKY, "nee", "hit"),
+        (ball("grey", None) + SKY, "pp3d+bb1d", "bpt+surf"),
+        (ball("grey", None) + POINT, "hit", "nee+connect+lt+surf"),
+        (ball("null", Some("smoke")) + SKY, "bb1d", "hit"),
+        (ball("null", Some("fog")) + POINT, "surf", "nee+connect+lt+pp3d+pb2d+bp2d+bb1d"),
+        (ball("null", Some("fire")), "bpt+surf", ""),
+        (ball("null", Some("fire")), "nee+lt", "hit"),
+        // A lamp in the mirror, but no size.
+        (ball("mirror", None) + POINT, "auto", "nothing"),
+        (ball("mirror", None) + POINT, "all", "nothing"),
+    ] {
+        let found = census(&parts, &techniques(names));
+        println!("{parts} {names}: {found:?}");
+        match (found, possible) {
+            (Ok(_), "") => {}
+            (Err(error @ RenderError::NoLight { possible: found, .. }), _) => {
+                let message = error.to_string();
+                if possible == "nothing" {
+                    assert!(
+                        found.is_empty() && message.contains("expected a scene with a light"),
+                        "{message}"
+                    );
+                } else {
+                    assert_eq!(
+                        found,
+                        possible.parse::<TechniqueSet>().expect("technique names"),
+                        "{message}"
+                    );
+                    assert!(message.contains(&format!("expected some of `{found}`")), "{message}");
+                    assert!(message.contains(&format!("`{names}`")) || names.contains("bpt"), "{message}");
+                }
+            }
+            (found, _) => panic!("{parts} {names}: {found:?}"),
+        }
+    }
+    // Connections need three edges, next events two.
+    let short = |names, max_length| {
+        census(&(ball("grey", None) + POINT), &Settings { max_length, ..techniques(names) })
+    };
+    assert!(matches!(short("connect", 2), Err(RenderError::NoLight { .. })));
+    assert!(matches!(short("nee", 1), Err(RenderError::NoLight { .. })));
+    assert!(short("connect", 3).is_ok() && short("nee", 2).is_ok());
+}
+
+#[test]
+fn light_of_emitting_media_is_said_to_be_found_by_chance() {
+    let fire = ball("null", Some("fire"));
+    for names in ["auto", "pt", "all", "hit"] {
+        let text = census(&(fire.clone() + POINT), &techniques(names)).expect("a scene with light");
+        assert!(text.contains("media that emit: their light is found by chance only"), "{names}: {text}");
+    }
+    let text = census(&(ball("null", Some("fog")) + POINT), &techniques("auto")).expect("a scene with light");
+    assert!(!text.contains("emit:"), "{text}");
+    // Without emission hits it is not found at all.
+    let both =
+        "shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"fire\"),
+        (geometry: Sphere(centre: (2, 0, 0), radius: 0.5), material: \"grey\")],";
+    let text = census(&(both.to_owned() + POINT), &techniques("nee+lt")).expect("a scene with light");
+    assert!(text.contains("their light is not found"), "{text}");
+}
