@@ -82,6 +82,8 @@ pub struct ErrorMap {
     /// Estimated `(value − converged)² / (converged² + 0.01)` by channel; their mean is the estimated
     /// relMSE. Infinite with an empty half.
     pub relative: Vec<[f32; 3]>,
+    /// Mean over the channels, if light that one half only has seen was there by luck.
+    upper: Vec<f32>,
     iterations: u64,
     black: bool,
 }
@@ -108,44 +110,25 @@ impl ErrorMap {
         let black = halves.iter().all(|half| half.image.iter().all(|pixel| *pixel == [0.0; 3]));
         let pixels = halves[0].image.len();
         let mut relative = vec![[f32::INFINITY; 3]; pixels];
+        let mut upper = vec![f32::INFINITY; pixels];
         if pixels > 0 && halves.iter().all(|half| half.iterations > 0) {
             let blocks: Vec<Vec<Block>> =
                 (0..pair.height.div_ceil(BLOCK)).into_par_iter().map(|row| pair.blocks(row)).collect();
-            relative
-                .par_chunks_mut(BLOCK * width)
-                .enumerate()
-                .for_each(|(row, relative)| pair.relative(&blocks, row, relative));
+            let rows = relative.par_chunks_mut(BLOCK * width).zip(upper.par_chunks_mut(BLOCK * width));
+            rows.enumerate().for_each(|(row, (relative, upper))| pair.errors(&blocks, row, relative, upper));
         }
-        Self { relative, iterations, black }
+        Self { relative, upper, iterations, black }
     }
 
     /// The estimate for the whole image.
     #[must_use]
     pub fn estimate(&self) -> ErrorEstimate {
-        let mut errors: Vec<f32> = self
-            .relative
-            .par_iter()
-            .map(|[r, g, b]| to_f32((f64::from(*r) + f64::from(*g) + f64::from(*b)) / 3.0))
-            .collect();
-        // Pieces of fixed size, added in their order.
-        let pieces: Vec<[f64; 2]> = errors
-            .par_chunks(4096)
-            .map(|piece| {
-                piece
-                    .iter()
-                    .map(|t| f64::from(*t))
-                    .fold([0.0, 0.0], |[sum, squares], t| [sum + t, squares + t * t])
-            })
-            .collect();
-        let [sum, squares] = pieces.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-        if errors.is_empty() || !self.relative[0][0].is_finite() {
-            return ErrorEstimate::UNKNOWN;
-        }
-        let relative_mse = sum / errors.len() as f64;
-        let standard_error = if sum > 0.0 { squares.sqrt() / sum } else { 0.0 };
-        let factor = 1.0 + SIGMAS * standard_error + DENOMINATORS;
-        let tail_index = tail_index(&mut errors);
-        let doubt = if self.iterations < FEW_ITERATIONS {
+        let mean = |[r, g, b]: &[f32; 3]| to_f32((f64::from(*r) + f64::from(*g) + f64::from(*b)) / 3.0);
+        let mut upper = self.upper.clone();
+        let (relative_mse, below) = mean_and_factor(&self.relative.par_iter().map(mean).collect::<Vec<_>>());
+        let (most, above) = mean_and_factor(&upper);
+        let tail_index = tail_index(&mut upper);
+        let doubt = if self.iterations < FEW_ITERATIONS || !relative_mse.is_finite() {
             Some(Doubt::FewIterations)
         } else if self.black {
             Some(Doubt::Black)
@@ -154,8 +137,9 @@ impl ErrorMap {
         } else {
             None
         };
-        let high = if doubt.is_some() { f64::INFINITY } else { relative_mse * factor };
-        ErrorEstimate { relative_mse, low: relative_mse / factor, high, doubt, tail_index }
+        let low = if relative_mse.is_finite() { relative_mse / below } else { 0.0 };
+        let high = if doubt.is_some() { f64::INFINITY } else { most * above };
+        ErrorEstimate { relative_mse, low, high, doubt, tail_index }
     }
 }
 
@@ -207,6 +191,18 @@ impl fmt::Display for Doubt {
             Self::HeavyTail => "a few pixels make the error",
         })
     }
+/// The mean of the pixels' errors, infinite without any, and the factor between it and the ends of its interval.
+fn mean_and_factor(errors: &[f32]) -> (f64, f64) {
+    // Pieces of fixed size, added in their order.
+    let add = |[sum, squares]: [f64; 2], t: &f32| [sum + f64::from(*t), squares + f64::from(*t).powi(2)];
+    let pieces: Vec<[f64; 2]> =
+        errors.par_chunks(4096).map(|piece| piece.iter().fold([0.0; 2], add)).collect();
+    let [sum, squares] = pieces.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    if errors.is_empty() || sum.is_infinite() {
+        return (f64::INFINITY, 1.0);
+    }
+    let standard_error = if sum > 0.0 { squares.sqrt() / sum } else { 0.0 };
+    (sum / errors.len() as f64, 1.0 + SIGMAS * standard_error + DENOMINATORS)
 }
 
 /// Hill's estimate from the largest hundredth, which is moved to the front: the mean logarithm over the
@@ -295,8 +291,11 @@ impl<'a> Pair<'a> {
         std::array::from_fn(|c| self.parts[0] * f64::from(a[c]) + self.parts[1] * f64::from(b[c]))
     }
 
-    fn seen(&self, i: usize) -> [f64; 3] {
-        self.mean(|half| half.seen.map_or([0.0; 3], |seen| seen[i]))
+    /// Light seen directly: the mean, and what both halves have of it.
+    fn seen(&self, i: usize) -> [[f64; 3]; 2] {
+        let of = |half: &HalfImage<'_>| half.seen.map_or([0.0; 3], |seen| seen[i]);
+        let [a, b] = self.halves.each_ref().map(of);
+        [self.mean(of), std::array::from_fn(|c| f64::from(a[c].min(b[c])))]
     }
 
     /// A difference of the halves, so that its square is the variance of their mean.
@@ -358,13 +357,16 @@ impl<'a> Pair<'a> {
         blocks
     }
 
-    /// The relative errors of the pixels of a row of blocks.
-    fn relative(&self, blocks: &[Vec<Block>], row: usize, relative: &mut [[f32; 3]]) {
+    /// The errors of the pixels of a row of blocks.
+    fn errors(&self, blocks: &[Vec<Block>], row: usize, relative: &mut [[f32; 3]], upper: &mut [f32]) {
         let coarse: Vec<Block> = (0..blocks[row].len()).map(|column| around(blocks, row, column)).collect();
-        for (y, relative) in (row * BLOCK..).zip(relative.chunks_mut(self.width)) {
+        let rows = relative.chunks_mut(self.width).zip(upper.chunks_mut(self.width));
+        for (y, (relative, upper)) in (row * BLOCK..).zip(rows) {
             self.windows(y, |x, value, fine| {
                 let i = y * self.width + x;
-                let (coarse, seen, noise) = (&coarse[x / BLOCK], self.seen(i), self.noise(i));
+                let (coarse, noise) = (&coarse[x / BLOCK], self.noise(i));
+                let [seen, by_both] = self.seen(i);
+                let mut most = 0.0;
                 relative[x] = std::array::from_fn(|c| {
                     let others = if coarse.pixels > 1.0 {
                         (coarse.value[c] - value[c]) / (coarse.pixels - 1.0)
@@ -372,9 +374,12 @@ impl<'a> Pair<'a> {
                         value[c]
                     };
                     let smooth = others + coarse.trust(c) * (fine.others[c] - others);
-                    let converged = seen[c] + smooth + fine.own[c] * (value[c] - smooth);
-                    to_f32(noise[c] / (converged * converged + DARK))
+                    let rest = smooth + fine.own[c] * (value[c] - smooth);
+                    let error = |seen: f64| noise[c] / ((seen + rest).powi(2) + DARK);
+                    most += error(by_both[c]) / 3.0;
+                    to_f32(error(seen[c]))
                 });
+                upper[x] = to_f32(most);
             });
         }
     }
@@ -610,6 +615,9 @@ mod tests {
             [told, halves(&images)].map(|h| ErrorMap::new(SIDE, h).estimate().relative_mse);
         assert!(known < without + 1.5 / (3 * SIDE * SIDE) as f64 && known > without, "{known} {without}");
         assert!(unknown > 10.0 * without);
+        // One half only has seen it: that it was luck is not excluded.
+        let high = ErrorMap::new(SIDE, told).estimate().high;
+        assert!(high > unknown, "{high} {unknown}");
     }
 
     #[test]
