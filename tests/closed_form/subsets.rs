@@ -8,10 +8,12 @@ use std::num::NonZeroU32;
 
 use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, Densities, Heuristic, MergesApart};
-use upbp_estimators::observer::Nobody;
+use upbp_estimators::observer::{Nobody, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::scene::Bsdf;
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, StreamKind, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Spectrum,
+    StreamKind, Technique, World,
 };
 
 use super::scene::ClosedForm;
@@ -128,6 +130,52 @@ const IN_FOG: Vec3 = Vec3::new(0.1, 0.4, 1.0);
 
 /// Lights that can be hit: emission hits cover all paths.
 const HITTABLE: [f32; 5] = [3.0, 1.5, 0.0, 0.0, 2.0];
+
+/// Adds up the light that a camera sub-path meets before the first vertex that can be connected.
+#[derive(Default)]
+struct Seen {
+    light: Spectrum,
+    /// The most edges of a path that brought some of it.
+    depth: u32,
+    scattered: bool,
+}
+
+impl<B: Bsdf> Observer<B> for Seen {
+    type Densities = f64;
+
+    fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
+        self.scattered |= vertex.site.is_connectible();
+    }
+
+    fn sample(&mut self, sample: &ObservedSample<B, f64>) {
+        if sample.technique == Technique::Hit && !self.scattered {
+            self.light += sample.value * sample.weight.value() as f32;
+            self.depth = self.depth.max(sample.camera_depth);
+        }
+    }
+}
+
+#[test]
+fn light_is_seen_up_to_the_first_vertex_that_scatters() {
+    let scene = ClosedForm::new(OUTSIDE, SIZE);
+    let world = World::new(&scene).expect("the scene is in order");
+    let plan = Plan::new(&scene, &choices("hit+nee", PathLengths { min: 1, max: 6 }, 7));
+    let context = Context { world: &world, plan: &plan };
+    let map = LightMap::build(&plan, Vec::new(), Vec::new());
+    let (mut scratch, mut counters) = (Scratch::default(), Counters::default());
+    let (mut deepest, mut less_than_all) = (0, 0);
+    for index in 0..SIZE * SIZE {
+        let (pixel, mut seen) = ([index % SIZE, index / SIZE], Seen::default());
+        let (kind, index) = (StreamKind::Camera, u64::from(index));
+        let walk =
+            trace_camera_path(&context, &map, kind, pixel, index, &mut scratch, &mut counters, &mut seen);
+        let difference = (walk.seen.mean() - seen.light.mean()).abs();
+        assert!(difference <= 1e-5 * seen.light.mean(), "{pixel:?}: {:?}, {:?}", walk.seen, seen.light);
+        deepest = deepest.max(seen.depth);
+        less_than_all += u32::from(walk.layers[0].mean() > walk.seen.mean());
+    }
+    assert!(deepest > 1 && less_than_all > 100, "{deepest}, {less_than_all}");
+}
 
 #[test]
 fn each_technique_beside_hits() {
