@@ -191,6 +191,8 @@ impl fmt::Display for Doubt {
             Self::HeavyTail => "a few pixels make the error",
         })
     }
+}
+
 /// The mean of the pixels' errors, infinite without any, and the factor between it and the ends of its interval.
 fn mean_and_factor(errors: &[f32]) -> (f64, f64) {
     // Pieces of fixed size, added in their order.
