@@ -80,7 +80,6 @@ impl Entry {
 /// The bodies that a point is inside of, by ascending priority, among equals in order of entering.
 ///
 /// Any number of them. Rays that look ahead walk a copy: that of a few bodies takes a few vector instructions.
-#[derive(Clone)]
 pub struct MediumStack {
     /// The first `few` entries are in use, unless there are more bodies than entries.
     bodies: [Entry; Self::FEW],
@@ -209,6 +208,23 @@ impl MediumStack {
     #[inline]
     pub fn cross(&mut self, interior: Interior, entering: bool) -> Crossing {
         if entering { self.enter(interior) } else { self.leave(interior.body) }
+    }
+}
+
+impl Clone for MediumStack {
+    /// Copies of a few bodies do not call anything.
+    #[inline]
+    fn clone(&self) -> Self {
+        let many = if self.many.is_empty() { Vec::new() } else { self.many.clone() };
+        Self { bodies: self.bodies, outside: self.outside, few: self.few, many }
+    }
+
+    #[inline]
+    fn clone_from(&mut self, other: &Self) {
+        (self.bodies, self.outside, self.few) = (other.bodies, other.outside, other.few);
+        if !(self.many.is_empty() && other.many.is_empty()) {
+            self.many.clone_from(&other.many);
+        }
     }
 }
 
