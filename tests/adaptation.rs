@@ -253,7 +253,10 @@ fn a_plan_that_does_not_fit_is_refused() {
     let fog = shipped("reference/mirror_fog");
     let everything = Settings { techniques: TechniqueSet::default().into(), ..settings() };
     let plan = renderer(&fog, everything).report().plan;
-    let checked = || settings().validate().expect("valid settings");
+    let checked = || {
+        let settings = Settings { memory: Some(2048), ..settings() };
+        settings.validate().expect("valid settings")
+    };
     let greedy = plan.to_string().replace("light_paths: 4096,", "light_paths: 4000000000,");
     let greedy = RenderPlan::from_ron(&greedy).expect("a plan");
     let error = fog.start_renderer(checked(), by(greedy)).map(|_| ()).expect_err("too much").to_string();

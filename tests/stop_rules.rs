@@ -28,7 +28,7 @@ fn each_rule_stops() {
     let mut by_error = renderer(&room);
     let stop = Stop { error: Some(1e9), ..Stop::default() };
     assert_eq!(by_error.render(&stop, go_on).reason, StopReason::Error);
-    assert_eq!(by_error.film().iterations(), 4);
+    assert_eq!(by_error.film().iterations(), 8, "fewer tell nothing of rare light");
 
     let mut by_time = renderer(&room);
     let stop = Stop { seconds: Some(1e-6), ..Stop::default() };

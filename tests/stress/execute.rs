@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
-use upbp_core::{Counters, Film, Settings};
+use upbp_core::{Counters, Film, RenderError, Settings};
 use upbp_scene::ReadyScene;
 
 use super::processor;
@@ -35,6 +35,16 @@ pub(crate) struct Render {
 }
 
 impl Render {
+    /// Of a scene that is black.
+    fn black(start: Instant) -> Self {
+        Self {
+            means: [Estimate::exactly(0.0); 3],
+            counters: Counters::default(),
+            camera_paths: 1,
+            seconds: start.elapsed().as_secs_f64(),
+        }
+    }
+
     /// Camera sub-paths that the limit of the length has cut, as a part of all.
     pub(crate) fn cut(&self) -> f64 {
         self.counters.cut_walks as f64 / self.camera_paths as f64
@@ -92,7 +102,11 @@ fn render_here(text: &str, settings: Settings, iterations: u64) -> Result<Render
     let start = Instant::now();
     let scene = ReadyScene::from_ron_str(text, "").map_err(|error| format!("refused: {error}"))?;
     let settings = settings.validate().map_err(|error| format!("refused: {error}"))?;
-    let mut renderer = scene.renderer(settings).map_err(|error| format!("refused: {error}"))?;
+    let mut renderer = match scene.renderer(settings) {
+        // Where nothing scatters and no light can be hit: rightly so.
+        Err(RenderError::NoLight { possible, .. }) if possible.is_empty() => return Ok(Render::black(start)),
+        renderer => renderer.map_err(|error| format!("refused: {error}"))?,
+    };
     let (mut values, mut before): (Vec<[f64; 3]>, _) = (Vec::new(), [0.0; 3]);
     for n in 1..=iterations {
         renderer.iterate();

@@ -114,6 +114,7 @@ impl Film {
     }
 
     /// The layers that are kept, in order.
+    #[must_use]
     pub fn layers(&self) -> impl ExactSizeIterator<Item = Layer> + '_ {
         self.layers.iter().map(|(layer, _)| *layer)
     }
@@ -151,6 +152,11 @@ impl Film {
     #[must_use]
     pub const fn parts(&self) -> &BTreeMap<u64, u32> {
         &self.parts
+    }
+
+    /// Number of pixels.
+    pub(crate) const fn len(&self) -> usize {
+        pixels(self.rect)
     }
 
     /// Whether there is nothing on the film, not even a part of an iteration.
@@ -497,7 +503,7 @@ mod tests {
         parted.add_part(4, 0..1, &iteration(4));
         // Everything is there, coarsely.
         let coarse = parted.image();
-        assert_eq!(coarse.pixels[18 * 0 + 15], [0.5; 3]);
+        assert_eq!(coarse.pixels[15], [0.5; 3]);
         assert_eq!(coarse.pixels[18], [4.0 * 16.0 + 0.5; 3]);
         assert_eq!((parted.is_empty(), parted.iterations(), parted.missing(4)), (false, 0, 1..SETS));
         parted.add_part(7, 0..9, &iteration(7));

@@ -35,6 +35,8 @@ pub struct Renderer<'a> {
     pixels: Vec<Pixel>,
     /// How long the camera sub-paths of a set of pixels took, if known.
     set_time: Option<Duration>,
+    /// How long adding an iteration to the film takes.
+    film_time: Duration,
     /// As it was when it was last due.
     estimated_error: ErrorEstimate,
     canceller: Canceller,
@@ -70,6 +72,10 @@ impl<'a> Renderer<'a> {
     }
 
     fn begin(Prepared { engine, planner, canceller, state }: Prepared<'a>) -> Self {
+        /// Nanoseconds per sum of a pixel, where its memory is used for the first time.
+        const SUM: u64 = 60;
+        let rect = state.film.rect();
+        let sums = u64::from(rect.width) * u64::from(rect.height) * (state.film.layers().len() as u64 + 2);
         Self {
             engine,
             planner,
@@ -77,6 +83,7 @@ impl<'a> Renderer<'a> {
             range: 0..MAX_ITERATIONS,
             pixels: Vec::new(),
             set_time: None,
+            film_time: Duration::from_nanos(SUM.saturating_mul(sums)),
             estimated_error: ErrorEstimate::UNKNOWN,
             canceller,
         }
@@ -156,11 +163,11 @@ impl<'a> Renderer<'a> {
         const PORTION: Duration = Duration::from_millis(200);
         let Some(iteration) = self.next_iteration() else { return false };
         self.plan_up_to(iteration, review_seconds);
+        self.pixels.resize(self.state.film.len(), Pixel::BLACK);
         let plan = self.plan(iteration);
         let halt = Halt { canceller: &self.canceller, deadline };
         let State { record, film, .. } = &mut self.state;
         let rect = film.rect();
-        self.pixels.resize(rect.width as usize * rect.height as usize, Pixel::BLACK);
         let Some(light) = self.engine.trace_light(&plan, rect, &mut self.pixels, &halt) else { return false };
         let missing = film.missing(iteration);
         let (mut counters, mut times) = (light.counters, light.times);
@@ -186,6 +193,7 @@ impl<'a> Renderer<'a> {
         if done > missing.start {
             counters.dropped += film.add_part(iteration, missing.start..done, &self.pixels);
             times.film = clock.lap();
+            self.film_time = times.film;
             // What a state file says may be of any size: sums that saturate.
             record.counters.add(&counters);
         }
@@ -217,11 +225,13 @@ impl<'a> Renderer<'a> {
         stop: &Stop,
         mut progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> Outcome {
-        self.estimate_error();
+        self.estimated_error = self.state.film.estimated_error();
         loop {
             if let Some(reason) = self.reason_to_stop(stop) {
                 return Outcome { reason };
             }
+            // Memory for a large picture is not had in no time.
+            self.pixels.resize(self.state.film.len(), Pixel::BLACK);
             if !self.iterate_until(self.deadline(stop), stop.seconds.map(|seconds| 0.05 * seconds)) {
                 let cancelled = self.canceller.is_cancelled();
                 return Outcome { reason: if cancelled { StopReason::Cancelled } else { StopReason::Time } };
@@ -246,9 +256,9 @@ impl<'a> Renderer<'a> {
     fn deadline(&self, stop: &Stop) -> Option<Instant> {
         let limit = stop.seconds?;
         let patience = (0.05 * limit).max(1.0);
-        let left = limit + patience - self.seconds();
+        let left = limit + patience - self.seconds() - self.film_time.as_secs_f64();
         // However long the preparation took, there is a picture.
-        let left = left.max(if self.state.film.is_empty() { patience } else { 0.0 });
+        let left = left.max(if self.state.film.is_empty() { 0.5 * patience } else { 0.0 });
         // What is longer than a clock can tell is no limit.
         Instant::now().checked_add(Duration::try_from_secs_f64(left).ok()?)
     }
@@ -269,13 +279,13 @@ impl<'a> Renderer<'a> {
         stop.error.is_some_and(reached).then_some(StopReason::Error)
     }
 
-    /// Estimates the error when a stop rule asks for it, and while hardly anything is known, for those who watch.
+    /// Estimates the error when a stop rule asks for it, and now and then before, for those who watch.
     fn estimate_error(&mut self) {
-        /// Iterations of which each is looked at.
-        const FIRST: u64 = 8;
         let done = self.state.film.iterations();
-        if done < FIRST || ErrorEstimate::is_due(done) {
+        if done.is_power_of_two() || ErrorEstimate::is_due(done) {
+            let start = Instant::now();
             self.estimated_error = self.state.film.estimated_error();
+            self.state.record.times.add(&PassTimes { film: start.elapsed(), ..PassTimes::default() });
         }
     }
 

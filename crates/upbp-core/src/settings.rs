@@ -49,7 +49,7 @@ pub struct Settings {
     pub roulette: Option<Roulette>,
     /// Balance or power heuristic.
     pub heuristic: Heuristic,
-    /// Extent of photon beams. In a scene with a medium around everything that scatters they are short.
+    /// Extent of photon beams.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,

@@ -125,7 +125,7 @@ pub struct PlanChoices {
     pub look_ups: LookUps,
     /// Heuristic of the weights.
     pub heuristic: Heuristic,
-    /// Extent of photon beams; with a medium around everything that scatters they are short.
+    /// Extent of photon beams.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,
@@ -186,11 +186,6 @@ impl Plan {
         } else {
             0.0
         };
-        // The medium around everything has no next surface. Wherever a long beam were cut there, the weights of other techniques could not
-        // know: short ones stop by themselves.
-        let outside = scene.outside().and_then(|medium| scene.media().get(medium.0 as usize));
-        let photon_beams =
-            if outside.is_some_and(Medium::scatters) { BeamExtent::Short } else { choices.photon_beams };
         let mis = MisPlan {
             heuristic: choices.heuristic,
             hit: on(Technique::Hit, 1.0),
@@ -199,7 +194,7 @@ impl Plan {
             light_tracing: on(Technique::LightTracing, paths),
             surf: on(Technique::Surf, paths * kernels.surf.effective_volume()),
             volume,
-            photon_beams,
+            photon_beams: choices.photon_beams,
             query_beams: choices.query_beams,
             damping: choices.damping.then(|| kernels.damping()),
             correlation: choices.correlation.map(f64::from),

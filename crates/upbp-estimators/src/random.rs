@@ -67,7 +67,8 @@ impl Stream {
             }
             StreamKind::Camera => {
                 let (half, point) = half(iteration);
-                (point as u32, mix(mix(common ^ of_index) ^ half as u64), STRATIFIED_DRAWS)
+                let of_half = (half as u64).wrapping_mul(0x2545_f491_4f6c_dd1d);
+                (point as u32, mix(common ^ of_index) ^ of_half, STRATIFIED_DRAWS)
             }
             StreamKind::PilotCamera => (0, mix(common ^ of_index), COMMON_DRAWS),
             StreamKind::LookUps => (0, 0, 0),

@@ -69,7 +69,9 @@ impl Film {
         };
         let height = self.rect().height as usize;
         let rows: Vec<_> = (0..height).into_par_iter().map_init(Vec::new, of_row).collect();
-        rows.iter().for_each(|row| checksum.add(&row.to_le_bytes()));
+        for row in rows {
+            checksum.add(&row.to_le_bytes());
+        }
         format!("{:016x}", checksum.value())
     }
 

@@ -237,10 +237,13 @@ fn store_beams<S: Scene, D: Densities>(
 
 /// Lengths that are tried for a beam without an end, each twice the one before.
 const DOUBLINGS: usize = 64;
+/// Part of the light at its start that may get farther than such a beam, in any channel: what single precision does not tell.
+const NEGLIGIBLE: f32 = 1e-7;
 
 /// The end of a beam in `span`, whose medium is `medium`, where the walk may stop.
 ///
-/// Where there is none, the beam ends where no channel is attenuated any further: what is scattered beyond is less than single precision tells.
+/// Where there is none, the beam ends where what is left in every channel is [negligible](NEGLIGIBLE), or is not attenuated any further. So weights
+/// may take it to be without an end.
 /// A beam from infinity has none left before the scene.
 fn beam_end<S: Scene>(
     world: &World<'_, S>,
@@ -260,7 +263,7 @@ fn beam_end<S: Scene>(
         .map(|length| (span.start + length).min(f32::MAX));
     let is_enough = |end: &f32| {
         let there = transmittance(*end);
-        (0..3).all(|c| there[c] <= left[c] * (1.0 + 1e-6) + f32::MIN_POSITIVE)
+        (0..3).all(|c| there[c] <= left[c] + NEGLIGIBLE)
     };
     Some(ends.take(DOUBLINGS).find(is_enough).unwrap_or(f32::MAX))
 }
