@@ -597,3 +597,28 @@ fn cancelled_at_any_ray_it_ends_at_once_and_what_is_done_is_not_lost() {
     }
     assert!(of_preparation < of_all && refused > 0 && parts > 0, "{refused} refused, {parts} parts");
 }
+
+#[test]
+fn a_choice_that_is_cancelled_is_made_anew() {
+    /// Iterations before the plan is chosen again.
+    const FIRST: u64 = 512;
+    let iterate_to = |renderer: &mut Renderer<'_>, count| {
+        while renderer.film().iterations() < count && renderer.iterate() {}
+    };
+    let scene = Hostile::new(F::None);
+    let mut whole = begin(&scene).expect("a good scene");
+    iterate_to(&mut whole, FIRST);
+    let before = scene.rays.load(Ordering::Relaxed);
+    iterate_to(&mut whole, FIRST + 1);
+    assert_eq!(whole.report().plan.stages().len(), 2);
+
+    let cancelled = Hostile { end: Some((before + 50, Canceller::default())), ..Hostile::new(F::None) };
+    let mut renderer = begin(&cancelled).expect("a good scene");
+    iterate_to(&mut renderer, FIRST + 1);
+    assert_eq!((renderer.film().iterations(), renderer.report().plan.stages().len()), (FIRST, 1));
+    let mut resumed = begin(&scene).expect("a good scene");
+    resumed.resume(renderer.state().clone()).expect("the same render");
+    iterate_to(&mut resumed, FIRST + 1);
+    assert!(resumed.film() == whole.film());
+    assert_eq!(resumed.report().plan, whole.report().plan);
+}

@@ -144,6 +144,10 @@ impl<'a> Renderer<'a> {
         while let Some(from) = adapt::REVIEWS.get(plan.stages().len()).filter(|from| **from <= iteration) {
             let review = plan.stages().len() as u32;
             let stage = self.engine.stage(planner, census, review, &self.canceller, seconds);
+            if self.canceller.is_cancelled() {
+                // What was chosen in a hurry is not what would have been chosen.
+                return;
+            }
             plan.push(Stage { from: *from, ..stage });
         }
         let times = PassTimes { pilot: start.elapsed(), ..PassTimes::default() };
@@ -163,6 +167,9 @@ impl<'a> Renderer<'a> {
         const PORTION: Duration = Duration::from_millis(200);
         let Some(iteration) = self.next_iteration() else { return false };
         self.plan_up_to(iteration, review_seconds);
+        if self.canceller.is_cancelled() {
+            return false;
+        }
         self.pixels.resize(self.state.film.len(), Pixel::BLACK);
         let plan = self.plan(iteration);
         let halt = Halt { canceller: &self.canceller, deadline };
