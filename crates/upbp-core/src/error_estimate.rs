@@ -89,16 +89,6 @@ pub struct ErrorMap {
 }
 
 impl ErrorMap {
-    /// The variance of the mean of both halves, by pixel and channel; infinite with an empty half.
-    ///
-    /// # Panics
-    /// If the halves are of different sizes.
-    #[must_use]
-    pub fn variance(halves: [HalfImage<'_>; 2]) -> Vec<[f32; 3]> {
-        let pair = Pair::new(1, halves);
-        (0..halves[0].image.len()).into_par_iter().map(|i| pair.noise(i).map(to_f32)).collect()
-    }
-
     /// Estimates the error of the mean of both halves.
     ///
     /// # Panics
@@ -659,7 +649,7 @@ mod tests {
         let estimate = |a: &[[f32; 3]], b: &[[f32; 3]], iterations: [u64; 2]| {
             let half = |image, iterations| HalfImage { image, seen: None, iterations };
             let halves = [half(a, iterations[0]), half(b, iterations[1])];
-            assert_eq!(ErrorMap::variance(halves)[0][0].is_infinite(), iterations[1] == 0);
+            assert_eq!(Pair::new(4, halves).noise(0)[0].is_infinite(), iterations[1] == 0);
             ErrorMap::new(4, halves).estimate()
         };
         let one = estimate(&image, &other, [9, 0]);
@@ -685,7 +675,7 @@ mod tests {
                 HalfImage { image: &[a], seen: None, iterations: 12 },
                 HalfImage { image: &[b], seen: None, iterations: 4 },
             ];
-            sum += f64::from(ErrorMap::variance(halves)[0][0]);
+            sum += Pair::new(1, halves).noise(0)[0];
         }
         assert!((sum / f64::from(count) * 16.0 - 1.0).abs() < 0.05);
     }

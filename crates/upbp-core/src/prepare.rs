@@ -55,8 +55,8 @@ pub struct Preparing {
     pub fraction: f64,
 }
 
-/// Part of the render's time that the preparation may take.
-const TIME: f64 = 0.05;
+/// Part of the render's time that the preparation may take, and every later choice of techniques.
+pub(crate) const PREPARATION: f64 = 0.05;
 /// Part of the preparation's time that measuring emitters may take, and looking around for radii; the rest is for the choice of techniques.
 const TIME_FOR_EMITTERS: f64 = 0.3;
 const TIME_FOR_RADII: f64 = 0.2;
@@ -72,7 +72,7 @@ pub(crate) fn prepare<'a, S: Scene>(
     let start = Instant::now();
     let Start { plan: frozen, canceller, seconds, mut progress } = begin;
     let seconds = seconds.filter(|_| !settings.deterministic);
-    let budget = Budget::new(&canceller, seconds.map(|seconds| TIME * seconds));
+    let budget = Budget::new(&canceller, seconds.map(|seconds| PREPARATION * seconds));
     let mut tell = |step, fraction| {
         if let Some(progress) = &mut progress {
             progress(Preparing { step, fraction });

@@ -14,7 +14,7 @@ use crate::error_estimate::ErrorEstimate;
 use crate::film::{Film, Pixel};
 use crate::iterations::MAX_ITERATIONS;
 use crate::planner::Planner;
-use crate::prepare::{Prepared, Start, prepare};
+use crate::prepare::{PREPARATION, Prepared, Start, prepare};
 use crate::report::{ErrorPoint, PassTimes, Report};
 use crate::settings::CheckedSettings;
 use crate::stage::Stage;
@@ -158,21 +158,22 @@ impl<'a> Renderer<'a> {
     /// Renders the next iteration: the first of the [range](Self::set_range) that is not on the film yet, or what is missing of it. `false`
     /// if there is none, or if it was cancelled: then some of it may be on the film.
     pub fn iterate(&mut self) -> bool {
-        self.iterate_until(None, None)
+        self.iterate_until(&Stop::default())
     }
 
-    /// As [`iterate`](Self::iterate), but ends at a time, too.
-    fn iterate_until(&mut self, deadline: Option<Instant>, review_seconds: Option<f64>) -> bool {
+    /// As [`iterate`](Self::iterate), but ends when the time of `stop` is up, too.
+    fn iterate_until(&mut self, stop: &Stop) -> bool {
         /// Sets of pixels that are traced together take about so long: what is lost when a render is stopped.
         const PORTION: Duration = Duration::from_millis(200);
         let Some(iteration) = self.next_iteration() else { return false };
-        self.plan_up_to(iteration, review_seconds);
+        self.plan_up_to(iteration, stop.seconds.map(|seconds| PREPARATION * seconds));
         if self.canceller.is_cancelled() {
             return false;
         }
+        // Before the deadline is set: memory for a large picture is not had in no time.
         self.pixels.resize(self.state.film.len(), Pixel::BLACK);
         let plan = self.plan(iteration);
-        let halt = Halt { canceller: &self.canceller, deadline };
+        let halt = Halt { canceller: &self.canceller, deadline: self.deadline(stop) };
         let State { record, film, .. } = &mut self.state;
         let rect = film.rect();
         let Some(light) = self.engine.trace_light(&plan, rect, &mut self.pixels, &halt) else { return false };
@@ -237,9 +238,7 @@ impl<'a> Renderer<'a> {
             if let Some(reason) = self.reason_to_stop(stop) {
                 return Outcome { reason };
             }
-            // Memory for a large picture is not had in no time.
-            self.pixels.resize(self.state.film.len(), Pixel::BLACK);
-            if !self.iterate_until(self.deadline(stop), stop.seconds.map(|seconds| 0.05 * seconds)) {
+            if !self.iterate_until(stop) {
                 let cancelled = self.canceller.is_cancelled();
                 return Outcome { reason: if cancelled { StopReason::Cancelled } else { StopReason::Time } };
             }
