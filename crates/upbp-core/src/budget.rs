@@ -3,9 +3,43 @@
 //! What is looked at before the first iteration is a sample of the scene, and any size of it will do: so it is made to fit. A small run
 //! tells what a larger one takes.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::stop::{Canceller, Halt};
+/// Stops a render from any thread, its preparation included: within the time of a few sub-paths. Of the iteration in hand the sets of
+/// pixels that are done stay on the film.
+///
+/// It may be made before the render ([`Start`](crate::Start)); all copies stop the same renders.
+#[derive(Clone, Debug, Default)]
+pub struct Canceller(Arc<AtomicBool>);
+
+impl Canceller {
+    /// Stops the render, for good.
+    pub fn cancel(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it was stopped.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// When work has to stop: asked between sub-paths.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Halt<'a> {
+    pub(crate) canceller: &'a Canceller,
+    pub(crate) deadline: Option<Instant>,
+}
+
+impl Halt<'_> {
+    /// Whether work has to stop now.
+    pub(crate) fn now(&self) -> bool {
+        self.canceller.is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
 
 /// A time that preparations may take, and whether they are to end at once.
 #[derive(Clone, Copy, Debug)]

@@ -6,10 +6,10 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use upbp_estimators::{Counters, Technique};
 
-use crate::census::Census;
-use crate::error_estimate::ErrorEstimate;
-use crate::iterations::IterationSet;
-use crate::stage::RenderPlan;
+use crate::auto::support::Census;
+use crate::film::ErrorEstimate;
+use crate::film::IterationSet;
+use crate::plan::RenderPlan;
 use crate::state::State;
 
 /// Wall seconds of the passes.

@@ -9,10 +9,9 @@ use std::path::Path;
 use exr::prelude::*;
 use serde::Serialize;
 
-use super::write_whole;
 use crate::error::OutputError;
+use crate::files::{open_exr, write_whole};
 use crate::film::{Film, Image as Picture};
-use crate::input::open_exr;
 use crate::report::Report;
 use crate::settings::Settings;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::write_whole;
 use crate::error::OutputError;
+use crate::files::write_whole;
 use crate::film::Image;
 
 /// Writes `image` times `exposure`, clipped to `[0, 1]`, with the sRGB transfer curve, 8 bits per channel.

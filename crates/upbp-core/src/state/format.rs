@@ -22,9 +22,9 @@ use super::checksum::Checksum;
 use super::{Identity, Record, State};
 use crate::error::StateError;
 use crate::film::Film;
-use crate::interleave::SETS;
-use crate::iterations::{IterationSet, MAX_ITERATIONS};
-use crate::sum::{self, MAX_ENCODED, Sum3};
+use crate::film::exact_sum::{self, MAX_ENCODED, Sum3};
+use crate::film::interleave::SETS;
+use crate::film::{IterationSet, MAX_ITERATIONS};
 
 /// How every state file begins.
 const MAGIC: [u8; 8] = *b"UPBPSTAT";
@@ -77,7 +77,7 @@ impl Film {
 
     fn encode_row(&self, row: usize, bytes: &mut Vec<u8>) {
         bytes.clear();
-        self.row(row).for_each(|sum| sum::encode(sum, bytes));
+        self.row(row).for_each(|sum| exact_sum::encode(sum, bytes));
     }
 }
 
@@ -169,7 +169,7 @@ fn decode(bytes: &mut &[u8], count: usize, numbers: u64, sums: &mut Vec<Sum3>) -
     // An empty sum takes three bytes: no more memory than for what can be there.
     sums.try_reserve(count.min(bytes.len() / 3)).ok()?;
     for _ in 0..count {
-        sums.push(sum::decode(bytes, numbers)?);
+        sums.push(exact_sum::decode(bytes, numbers)?);
     }
     Some(())
 }

@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 use upbp_estimators::scene::PixelRect;
 
-use crate::census::Census;
+use crate::auto::support::Census;
 use crate::error::StateError;
+use crate::plan::{RenderPlan, Stage};
 use crate::settings::Settings;
-use crate::stage::{RenderPlan, Stage};
 
 /// All that the iterations of a render depend on, besides their index.
 ///

@@ -15,10 +15,9 @@ use upbp_estimators::Counters;
 pub use identity::Identity;
 
 use crate::error::{OutputError, StateError};
+use crate::files::{open_file, write_whole};
 use crate::film::Film;
-use crate::input::open_file;
-use crate::iterations::MAX_ITERATIONS;
-use crate::output::write_whole;
+use crate::film::MAX_ITERATIONS;
 use crate::report::{ErrorSeries, PassTimes, Report};
 
 pub(crate) use format::fingerprint;

@@ -1,13 +1,16 @@
 //! What a user may choose, and its validation.
 
+mod techniques;
+
 use serde::{Deserialize, Serialize};
 use upbp_estimators::Roulette;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 
 use crate::error::SettingsError;
+use crate::plan::PER_VERTEX;
 use crate::radius::{Radii, Radius};
-use crate::stage::PER_VERTEX;
-use crate::techniques::Techniques;
+
+pub use techniques::{Techniques, UnknownTechniques};
 
 /// A number of light sub-paths per iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

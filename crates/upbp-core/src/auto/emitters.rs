@@ -13,7 +13,7 @@ use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, tra
 use upbp_estimators::{Counters, EmitterShares, LightMap, Plan, StreamKind, World};
 
 use crate::budget::Budget;
-use crate::stop::Halt;
+use crate::budget::Halt;
 
 /// Camera sub-paths, if there are many emitters.
 const CAMERA_PATHS: u64 = 2048;

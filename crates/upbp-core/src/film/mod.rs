@@ -1,5 +1,10 @@
 //! The film: running sums of all iterations, one layer per technique.
 
+mod error_estimate;
+pub(crate) mod exact_sum;
+pub(crate) mod interleave;
+mod iterations;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -7,10 +12,10 @@ use rayon::prelude::*;
 use upbp_estimators::scene::PixelRect;
 use upbp_estimators::{Layer, Spectrum, TechniqueSet, half};
 
-use crate::error_estimate::{ErrorEstimate, ErrorMap, HalfImage};
-use crate::interleave::{self, SETS, set_of, stand_ins};
-use crate::iterations::{IterationSet, MAX_ITERATIONS};
-use crate::sum::{self, Sum3};
+pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap, HalfImage};
+use exact_sum::Sum3;
+use interleave::{SETS, set_of, stand_ins};
+pub use iterations::{IterationSet, MAX_ITERATIONS};
 
 /// A pixel of one iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +68,7 @@ pub struct Image {
 
 /// Sums of nothing, one per pixel.
 fn black(rect: PixelRect) -> Vec<Sum3> {
-    vec![sum::ZERO; pixels(rect)]
+    vec![exact_sum::ZERO; pixels(rect)]
 }
 
 const fn pixels(rect: PixelRect) -> usize {
@@ -210,7 +215,7 @@ impl Film {
                 for (x, (own, pixel)) in sums.iter_mut().zip(pixels).enumerate() {
                     if sets.contains(&set_of(x, y)) {
                         let (value, left_out) = value(pixel);
-                        sum::add(own, value);
+                        exact_sum::add(own, value);
                         dropped += left_out;
                     }
                 }
@@ -245,7 +250,7 @@ impl Film {
         debug_assert_eq!(self.rect, other.rect);
         debug_assert_eq!(self.overlap(other), None);
         let merge = |own: &mut [Sum3], others: &[Sum3]| {
-            own.par_iter_mut().zip(others).for_each(|(own, other)| sum::merge(own, other));
+            own.par_iter_mut().zip(others).for_each(|(own, other)| exact_sum::merge(own, other));
         };
         for (layer, sums) in &other.layers {
             merge(self.keep_layer(*layer), sums);
@@ -305,7 +310,7 @@ impl Film {
     #[must_use]
     pub fn layer(&self, layer: Layer) -> Option<Image> {
         let (_, sums) = self.layers.iter().find(|(own, _)| *own == layer)?;
-        Some(self.collect(|i, [even, odd]| sum::values(&sums[i]).map(|v| v / (even + odd))))
+        Some(self.collect(|i, [even, odd]| exact_sum::values(&sums[i]).map(|v| v / (even + odd))))
     }
 
     /// The means of the even and of the odd iterations, which are independent of each other. `None` while some pixel has samples of one
@@ -315,9 +320,9 @@ impl Film {
         if self.counts().as_flattened().contains(&0.0) {
             return None;
         }
-        let even = self.collect(|i, [even, _]| sum::values(&self.even[i]).map(|v| v / even));
+        let even = self.collect(|i, [even, _]| exact_sum::values(&self.even[i]).map(|v| v / even));
         let odd = self.collect(|i, [_, odd]| {
-            let (total, even) = (self.total(i), sum::values(&self.even[i]));
+            let (total, even) = (self.total(i), exact_sum::values(&self.even[i]));
             // Sums are cut off far below their last digits in single precision: so may be their difference, below zero.
             std::array::from_fn(|c| ((total[c] - even[c]) / odd).max(0.0))
         });
@@ -333,7 +338,7 @@ impl Film {
             if n < 2.0 {
                 return [f64::INFINITY; 3];
             }
-            let (total, squares) = (self.total(i), sum::values(&self.squares[i]));
+            let (total, squares) = (self.total(i), exact_sum::values(&self.squares[i]));
             std::array::from_fn(|c| {
                 let mean = total[c] / n;
                 ((squares[c] / n - mean * mean) / (n - 1.0)).max(0.0)
@@ -348,8 +353,8 @@ impl Film {
         // Pixels of a part may have one more.
         let odd: u64 = self.iterations.ranges().iter().map(|range| range.end / 2 - range.start / 2).sum();
         let iterations = [self.iterations() - odd, odd];
-        let seen =
-            [0, 1].map(|h| self.collect(|i, counts| sum::values(&self.seen[h][i]).map(|v| v / counts[h])));
+        let seen = [0, 1]
+            .map(|h| self.collect(|i, counts| exact_sum::values(&self.seen[h][i]).map(|v| v / counts[h])));
         let half = |h: usize| HalfImage {
             image: &halves[h].pixels,
             seen: Some(&seen[h].pixels),
@@ -368,7 +373,7 @@ impl Film {
     #[must_use]
     pub fn shares(&self) -> Vec<(Layer, f64)> {
         let luminance = |sum: &Sum3| {
-            let [r, g, b] = sum::values(sum);
+            let [r, g, b] = exact_sum::values(sum);
             0.2126 * r + 0.7152 * g + 0.0722 * b
         };
         let sums: Vec<f64> =
@@ -379,7 +384,7 @@ impl Film {
     }
 
     fn total(&self, pixel: usize) -> [f64; 3] {
-        self.layers.iter().fold([0.0; 3], |total, (_, sums)| plus(total, sum::values(&sums[pixel])))
+        self.layers.iter().fold([0.0; 3], |total, (_, sums)| plus(total, exact_sum::values(&sums[pixel])))
     }
 
     /// Even and odd iterations of the pixels of each set.

@@ -2,15 +2,21 @@
 //!
 //! The walks carry the densities of every technique for itself, so that a sample comes with the part of each in its weight.
 
+pub(crate) mod grid;
+pub(crate) mod recorder;
+pub(crate) mod roulette;
+mod trace;
+pub(crate) mod watch;
+
 use upbp_estimators::observer::Observer;
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Counters, Plan, Technique, World};
 
-use super::grid::Grid;
-use super::recorder::{ByRoulette, MOST_SAMPLES, Recorder, Sample, TECHNIQUES, add, reach};
-use super::trace::{CHUNK, Pass, Piece, Room};
-use super::watch::{PARTS, WALK, Watch};
-use crate::stop::Halt;
+use crate::budget::Halt;
+use grid::Grid;
+use recorder::{ByRoulette, MOST_SAMPLES, Recorder, Sample, TECHNIQUES, add, reach};
+use trace::{CHUNK, Pass, Piece, Room};
+use watch::{PARTS, WALK, Watch};
 
 /// Looks at each cell: enough to tell what they have in common.
 pub(crate) const PASSES: u32 = 2;

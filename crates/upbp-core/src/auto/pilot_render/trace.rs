@@ -10,9 +10,9 @@ use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratc
 use upbp_estimators::walk::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
 
+use super::PASSES;
 use super::grid::Grid;
-use super::trial::PASSES;
-use crate::stop::Halt;
+use crate::budget::Halt;
 
 /// Sub-paths per piece of work.
 pub(super) const CHUNK: usize = 16;

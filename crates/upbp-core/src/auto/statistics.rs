@@ -15,14 +15,14 @@ use upbp_estimators::{
     TechniqueSet, World,
 };
 
-use crate::choices::usual_roulette;
-use crate::emitters::pixel;
-use crate::engine::Clock;
-use crate::memory::LightCounts;
-use crate::neighbours::{Nearest, Neighbours, median};
-use crate::passes::{Lists, light_pass};
+use crate::auto::choices::usual_roulette;
+use crate::auto::emitters::pixel;
+use crate::auto::memory::LightCounts;
+use crate::auto::neighbours::{Nearest, Neighbours, median};
+use crate::budget::Halt;
+use crate::render::engine::Clock;
+use crate::render::passes::{Lists, light_pass};
 use crate::settings::CheckedSettings;
-use crate::stop::Halt;
 
 /// Light sub-paths of the pilot: of a first, quick one, and at most of the one that counts,
 pub(crate) const LIGHT_PATHS: [u32; 2] = [1024, 8192];

@@ -5,16 +5,16 @@ use std::ops::RangeInclusive;
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Technique, TechniqueSet, World};
 
-use crate::adapt::{self, roulette};
+use crate::auto::choices::{BEAMS, correlation, plan};
+use crate::auto::emitters;
+use crate::auto::memory::LightCounts;
+use crate::auto::statistics::Pilot;
+use crate::auto::support::Census;
+use crate::auto::{self, pilot_render::roulette};
 use crate::budget::Budget;
-use crate::census::Census;
-use crate::choices::{BEAMS, correlation, plan};
-use crate::emitters;
-use crate::memory::LightCounts;
-use crate::pilot::Pilot;
+use crate::plan::Stage;
 use crate::radius::{Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths};
-use crate::stage::Stage;
 
 /// What chooses stages.
 pub(crate) struct Planner {
@@ -46,14 +46,14 @@ impl Planner {
             RadiusSchedule { surf, ..everything.radii }
         };
         let trial = Stage { roulette: of_trial, radii: radii(1.0), ..everything.clone() };
-        let plan = plan(world, settings, &trial, adapt::REVIEWS[review as usize]);
-        let choice = adapt::Choice {
+        let plan = plan(world, settings, &trial, auto::REVIEWS[review as usize]);
+        let choice = auto::Choice {
             everything: &plan,
             bounds: self.bounds(world, census, pilot, plan.techniques, widest),
             most_paths: emitters::light_paths(pilot.vertices_per_path),
             timed: !settings.deterministic,
         };
-        let candidate = adapt::choose(world, &choice, review, budget);
+        let candidate = auto::choose(world, &choice, review, budget);
         let count = |planned: u32, factor: f64| ((f64::from(planned) * factor) as u32).max(1);
         let light_paths =
             if candidate.needs_light() { count(everything.light_paths, candidate.light_paths) } else { 0 };
@@ -83,7 +83,7 @@ impl Planner {
         pilot: &Pilot,
         techniques: TechniqueSet,
         widest: f64,
-    ) -> adapt::Bounds {
+    ) -> auto::Bounds {
         /// Numbers of light sub-paths, relative to one per pixel.
         const LIGHT_PATHS: [f64; 3] = [0.0625, 0.25, 1.0];
         const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
@@ -96,7 +96,7 @@ impl Planner {
             *factor <= 1.0
                 || counts.peak_bytes::<S::Bsdf>(everything.correlation.is_some()) < self.bytes as f64
         };
-        adapt::Bounds {
+        auto::Bounds {
             techniques,
             always: if census.needs_merges { floor(census.techniques) } else { TechniqueSet::EMPTY },
             careful: if world.scene.has_specular_surfaces() {

@@ -1,10 +1,6 @@
 //! When a render stops, and what it tells meanwhile.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
-
-use crate::error_estimate::ErrorEstimate;
+use crate::film::ErrorEstimate;
 use crate::film::Film;
 use crate::state::State;
 
@@ -39,40 +35,6 @@ pub enum StopReason {
 pub struct Outcome {
     /// Why it stopped.
     pub reason: StopReason,
-}
-
-/// Stops a render from any thread, its preparation included: within the time of a few sub-paths. Of the iteration in hand the sets of
-/// pixels that are done stay on the film.
-///
-/// It may be made before the render ([`Start`](crate::Start)); all copies stop the same renders.
-#[derive(Clone, Debug, Default)]
-pub struct Canceller(Arc<AtomicBool>);
-
-impl Canceller {
-    /// Stops the render, for good.
-    pub fn cancel(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether it was stopped.
-    #[must_use]
-    pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-}
-
-/// When work has to stop: asked between sub-paths.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Halt<'a> {
-    pub(crate) canceller: &'a Canceller,
-    pub(crate) deadline: Option<Instant>,
-}
-
-impl Halt<'_> {
-    /// Whether work has to stop now.
-    pub(crate) fn now(&self) -> bool {
-        self.canceller.is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
-    }
 }
 
 /// Where a render is, after an iteration.

@@ -1,31 +1,33 @@
 //! The choice of techniques and sample counts by efficiency (`docs/theory.md`, section 6(a)).
 //!
-//! A [trial] of a few thousand sub-paths with everything on is written down; from it follow the [variance](prediction) and the
+//! A [trial](pilot_render) of a few thousand sub-paths with everything on is written down; from it follow the [variance](variance) and the
 //! [cost] of any other plan; a [search] takes the one with the least product of both. The sub-paths of trials have random numbers of their
 //! own and add nothing to the picture: whatever is chosen, the picture is unbiased.
 
+pub(crate) mod choices;
 mod cost;
-mod grid;
-mod prediction;
-mod recorder;
-pub(crate) mod roulette;
+pub(crate) mod emitters;
+pub(crate) mod memory;
+mod neighbours;
+mod pilot_render;
+pub(crate) mod planner;
 mod search;
-mod trace;
-mod trial;
-mod watch;
+pub(crate) mod statistics;
+pub(crate) mod support;
+mod variance;
 
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{Plan, TechniqueSet, World};
 
 use cost::Costs;
-use grid::Grid;
-use prediction::Prediction;
+use pilot_render::PASSES;
+use pilot_render::grid::Grid;
 pub(crate) use search::Bounds;
 use search::Candidate;
-use trial::PASSES;
+use variance::Prediction;
 
 use crate::budget::Budget;
-use crate::stop::Halt;
+use crate::budget::Halt;
 
 /// The iterations before which the plan is chosen, again and again: radii have shrunk, and a larger trial is worth its time.
 pub(crate) const REVIEWS: [u64; 3] = [0, 512, 4096];
@@ -84,7 +86,7 @@ fn choose_by_part<S: Scene>(
     while cells >= LEAST_CELLS {
         let grid = Grid::new(crop, cells);
         let paths = choice.most_paths.min(LIGHT_PATHS_PER_CELL * cells);
-        let trial = trial::run(world, plan, &grid, paths, PASSES * review, choice.timed, halt);
+        let trial = pilot_render::run(world, plan, &grid, paths, PASSES * review, choice.timed, halt);
         if halt.now() {
             return None;
         }

@@ -5,10 +5,10 @@ use proptest::prelude::*;
 use upbp_estimators::Technique;
 use upbp_estimators::scene::PixelRect;
 
-use super::super::roulette::{COUNT, OF_TRIAL, TRIAL, numbered, relative_reach};
-use super::super::trial::{PASSES, Work};
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
+use crate::auto::pilot_render::roulette::{COUNT, OF_TRIAL, TRIAL, numbered, relative_reach};
+use crate::auto::pilot_render::{PASSES, Work};
 
 const SIDE: u32 = 128;
 

@@ -6,20 +6,21 @@ use std::time::{Duration, Instant};
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Counters, Plan};
 
-use crate::adapt;
-use crate::census::Census;
-use crate::engine::{Clock, Engine};
+use crate::auto;
+use crate::auto::planner::Planner;
+use crate::auto::support::Census;
+use crate::budget::{Canceller, Halt};
 use crate::error::{RenderError, StateError};
-use crate::error_estimate::ErrorEstimate;
+use crate::film::ErrorEstimate;
+use crate::film::MAX_ITERATIONS;
 use crate::film::{Film, Pixel};
-use crate::iterations::MAX_ITERATIONS;
-use crate::planner::Planner;
-use crate::prepare::{PREPARATION, Prepared, Start, prepare};
+use crate::plan::Stage;
+use crate::render::engine::{Clock, Engine};
+use crate::render::prepare::{PREPARATION, Prepared, Start, prepare};
+use crate::render::stop::{Outcome, Progress, Stop, StopReason};
 use crate::report::{ErrorPoint, PassTimes, Report};
 use crate::settings::CheckedSettings;
-use crate::stage::Stage;
 use crate::state::{Identity, State, fingerprint};
-use crate::stop::{Canceller, Halt, Outcome, Progress, Stop, StopReason};
 
 /// A render of one scene.
 ///
@@ -141,7 +142,7 @@ impl<'a> Renderer<'a> {
         let Identity { census, plan, settings, .. } = &mut self.state.identity;
         let seconds = seconds.filter(|_| !settings.deterministic);
         let start = Instant::now();
-        while let Some(from) = adapt::REVIEWS.get(plan.stages().len()).filter(|from| **from <= iteration) {
+        while let Some(from) = auto::REVIEWS.get(plan.stages().len()).filter(|from| **from <= iteration) {
             let review = plan.stages().len() as u32;
             let stage = self.engine.stage(planner, census, review, &self.canceller, seconds);
             if self.canceller.is_cancelled() {

@@ -7,12 +7,12 @@
 
 use upbp_estimators::{Technique, TechniqueSet};
 
-use super::recorder::TECHNIQUES;
-use super::roulette::TRIAL;
+use super::pilot_render::recorder::TECHNIQUES;
+use super::pilot_render::roulette::TRIAL;
+use super::pilot_render::watch::WALK;
+use super::pilot_render::{Trial, Work};
 use super::search::Candidate;
-use super::trial::{Trial, Work};
-use super::watch::WALK;
-use crate::choices::BEAMS;
+use crate::auto::choices::BEAMS;
 
 /// Nanoseconds of one edge of a camera sub-path, and of a light sub-path.
 const EDGE: [f64; 2] = [300.0, 300.0];

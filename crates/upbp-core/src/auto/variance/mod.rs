@@ -12,10 +12,10 @@ mod tests;
 
 use glam::DVec3;
 
-use super::grid::Grid;
-use super::recorder::{Sample, TECHNIQUES};
-use super::trial::Trial;
-use crate::choices::BEAMS;
+use super::pilot_render::Trial;
+use super::pilot_render::grid::Grid;
+use super::pilot_render::recorder::{Sample, TECHNIQUES};
+use crate::auto::choices::BEAMS;
 use limits::{reductions, relative_to, surroundings};
 use pairs::{Looks, View};
 

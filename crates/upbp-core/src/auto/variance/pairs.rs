@@ -5,10 +5,10 @@ use std::num::NonZeroU32;
 use glam::{DVec3, Vec3};
 use upbp_estimators::Technique;
 
-use super::super::recorder::{Sample, TECHNIQUES};
-use super::super::roulette::{COUNT, relative_reach};
-use super::super::trial::Trial;
 use super::Counts;
+use crate::auto::pilot_render::Trial;
+use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
+use crate::auto::pilot_render::roulette::{COUNT, relative_reach};
 
 /// The samples of a trial, ready for being looked at by many plans.
 pub(super) struct Looks {

@@ -5,22 +5,22 @@ use std::time::Instant;
 use upbp_estimators::scene::{Camera, EmitterId, Scene};
 use upbp_estimators::{LightMap, Technique, TechniqueSet, World};
 
+use crate::auto::choices::{self, everything, stage};
+use crate::auto::emitters::{self, EmitterChoices};
+use crate::auto::memory::{self, LightCounts};
+use crate::auto::planner::Planner;
+use crate::auto::statistics::{self, Pilot};
+use crate::auto::support::Census;
 use crate::budget::Budget;
-use crate::census::Census;
-use crate::choices::{self, everything, stage};
-use crate::emitters::{self, EmitterChoices};
-use crate::engine::{Engine, Map, SceneEngine};
+use crate::budget::{Canceller, Halt};
 use crate::error::RenderError;
 use crate::film::Film;
-use crate::memory::{self, LightCounts};
-use crate::pilot::{self, Pilot};
-use crate::planner::Planner;
+use crate::plan::{RenderPlan, Stage};
+use crate::render::engine::{Engine, Map, SceneEngine};
 use crate::report::PassTimes;
 use crate::settings::CheckedSettings;
-use crate::stage::{RenderPlan, Stage};
+use crate::settings::Techniques;
 use crate::state::{Identity, Record, State, fingerprint};
-use crate::stop::{Canceller, Halt};
-use crate::techniques::Techniques;
 
 /// A render that has not begun.
 pub(crate) struct Prepared<'a> {
@@ -116,10 +116,11 @@ pub(crate) fn prepare<'a, S: Scene>(
         if only_light_tracing && !(seconds.is_some() && techniques.has(Technique::LightTracing)) {
             return Ok(Pilot::default());
         }
-        let run = |part, halt: &Halt<'_>| pilot::run(world, &settings, techniques, light_paths, part, halt);
+        let run =
+            |part, halt: &Halt<'_>| statistics::run(world, &settings, techniques, light_paths, part, halt);
         budget.part(part).largest(true, run).ok_or(RenderError::Cancelled)
     };
-    let [few, many] = pilot::LIGHT_PATHS;
+    let [few, many] = statistics::LIGHT_PATHS;
     tell("measuring lights", 0.0)?;
     let measure = || -> Result<_, RenderError> {
         let pilot = look(&world, few, 0.2 * TIME_FOR_EMITTERS)?;

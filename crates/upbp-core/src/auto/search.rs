@@ -7,10 +7,10 @@ use rayon::prelude::*;
 use upbp_estimators::{LookUps, Technique, TechniqueSet};
 
 use super::cost::Costs;
-use super::prediction::{Counts, GROUPS, Prediction};
-use super::recorder::TECHNIQUES;
-use super::roulette::TRIAL;
-use crate::choices::BEAMS;
+use super::pilot_render::recorder::TECHNIQUES;
+use super::pilot_render::roulette::TRIAL;
+use super::variance::{Counts, GROUPS, Prediction};
+use crate::auto::choices::BEAMS;
 
 /// A plan that may be chosen. Numbers of sub-paths are relative to the trial's plan.
 #[derive(Clone, Copy, Debug, PartialEq)]

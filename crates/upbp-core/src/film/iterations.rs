@@ -6,7 +6,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 /// Indices of iterations are below this: as many numbers fit into the sums of a film.
-pub const MAX_ITERATIONS: u64 = crate::sum::MAX_COUNT;
+pub const MAX_ITERATIONS: u64 = super::exact_sum::MAX_COUNT;
 
 /// A set of iterations. What a film holds, and what a state file says that it holds.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

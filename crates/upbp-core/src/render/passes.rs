@@ -13,10 +13,10 @@ use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratc
 use upbp_estimators::walk::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, Layer, LightMap, StreamKind};
 
+use crate::auto::memory::LightCounts;
+use crate::budget::Halt;
 use crate::film::Pixel;
-use crate::interleave::set_of;
-use crate::memory::LightCounts;
-use crate::stop::Halt;
+use crate::film::interleave::set_of;
 
 /// Light sub-paths per piece of work.
 const LIGHT_CHUNK: u32 = 64;

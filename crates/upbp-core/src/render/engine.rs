@@ -12,19 +12,19 @@ use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::walk::Context;
 use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
 
+use crate::auto::choices;
+use crate::auto::emitters::EmitterChoices;
+use crate::auto::memory::LightCounts;
+use crate::auto::planner::Planner;
+use crate::auto::statistics::Pilot;
+use crate::auto::support::Census;
 use crate::budget::Budget;
-use crate::census::Census;
-use crate::choices;
-use crate::emitters::EmitterChoices;
+use crate::budget::{Canceller, Halt};
 use crate::film::Pixel;
-use crate::memory::LightCounts;
-use crate::passes::{Lists, add_splats, camera_pass, light_pass};
-use crate::pilot::Pilot;
-use crate::planner::Planner;
+use crate::plan::Stage;
+use crate::render::passes::{Lists, add_splats, camera_pass, light_pass};
 use crate::report::PassTimes;
 use crate::settings::Settings;
-use crate::stage::Stage;
-use crate::stop::{Canceller, Halt};
 
 /// A scene at work.
 pub(crate) trait Engine: Send + Sync {

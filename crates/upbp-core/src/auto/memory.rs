@@ -7,7 +7,7 @@
 use upbp_estimators::mis::MergesApart;
 use upbp_estimators::walk::{LightVertex, PhotonBeam};
 
-use crate::pilot::Pilot;
+use crate::auto::statistics::Pilot;
 
 /// What light sub-paths and their look-ups may take where that must not depend on the machine.
 pub(crate) const LIGHT_BYTES: u64 = 2 << 30;

@@ -3,12 +3,12 @@
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{LookUps, PathLengths, Plan, PlanChoices, Roulette, Technique, TechniqueSet, World};
 
-use crate::memory::LightCounts;
-use crate::neighbours::Neighbours;
-use crate::pilot::Pilot;
+use crate::auto::memory::LightCounts;
+use crate::auto::neighbours::Neighbours;
+use crate::auto::statistics::Pilot;
+use crate::plan::Stage;
 use crate::radius::{Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
-use crate::stage::Stage;
 
 /// The techniques with photon beams.
 pub(crate) const BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Bp2d).with(Technique::Bb1d);
