@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::packed::WIDTH;
-use super::wide::{Task, Wide, run};
+use super::lanes::{Task, WIDTH, Wide, run};
 
 /// The box around some items: least and greatest corner.
 pub(super) type Bounds = (Vec3, Vec3);

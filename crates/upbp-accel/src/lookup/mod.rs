@@ -1,19 +1,19 @@
 //! Where photons and beams are near a point or a ray.
 //!
-//! Both structures rest on one [packed tree](packed): items are sorted into blocks of eight, blocks into
+//! Both structures rest on one [packed tree](tree): items are sorted into blocks of eight, blocks into
 //! nodes of eight. The search radius belongs to the query, which widens the boxes that it tests.
 
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
 
 mod approach;
 mod boxes;
-mod packed;
+mod lanes;
 mod point_tree;
-mod probe;
+mod query;
 mod segment_tree;
 mod sort;
 mod split;
-mod wide;
+mod tree;
 
 pub use approach::{ClosestApproach, PARALLEL_SIN2, Segment, closest_approach};
 pub use point_tree::PointTree;

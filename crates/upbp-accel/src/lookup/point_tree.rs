@@ -4,10 +4,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::boxes::{Boxes, Rounded};
-use super::packed::{PackedTree, Query, WAITING, WIDTH};
-use super::probe::{BallProbe, RayProbe, lanes};
+use super::lanes::{WIDTH, Wide};
+use super::query::{BallProbe, RayProbe, lanes};
 use super::sort::Item;
-use super::wide::Wide;
+use super::tree::{PackedTree, Query, WAITING};
 use crate::ray::Ray;
 
 /// Eight points; with small payloads two cache lines. An unused lane is NaN, which no comparison accepts.

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::approach::{ClosestApproach, Segment, closest_approach};
 use super::boxes::{Boxes, Exact};
-use super::packed::{PackedTree, Query, WIDTH};
-use super::probe::{BallProbe, RayProbe, lanes};
+use super::lanes::{WIDTH, Wide};
+use super::query::{BallProbe, RayProbe, lanes};
 use super::sort::Item;
 use super::split::{Piece, SplitParams, split};
-use super::wide::Wide;
+use super::tree::{PackedTree, Query};
 use crate::ray::Ray;
 
 /// Eight pieces; what most of them fail by is in three cache lines. An unused lane is NaN, which no comparison

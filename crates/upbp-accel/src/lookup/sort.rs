@@ -9,8 +9,7 @@ use std::cmp::Ordering;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::packed::WIDTH;
-use super::wide::{Task, Wide, run};
+use super::lanes::{Task, WIDTH, Wide, run};
 
 /// Something with a place.
 pub(super) type Item<T> = (Vec3, T);

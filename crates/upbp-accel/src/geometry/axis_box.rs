@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::error::{GeometryError, finite};
+use super::error::{GeometryError, finite};
 
 /// A box along the axes; its normals point outwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,7 +92,7 @@ impl AxisBox {
     }
 
     /// Distance and face at which the line enters and leaves. A face is `2·axis`, plus one on the upper side.
-    pub(crate) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[(f64, u32); 2]> {
+    pub(super) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[(f64, u32); 2]> {
         let direction = direction.as_dvec3();
         let low = self.min.as_dvec3() - origin.as_dvec3();
         let high = self.max.as_dvec3() - origin.as_dvec3();
@@ -118,14 +118,14 @@ impl AxisBox {
     }
 
     /// The outward normal of a face.
-    pub(crate) fn face_normal(face: u32) -> Vec3 {
+    pub(super) fn face_normal(face: u32) -> Vec3 {
         let mut normal = [0.0; 3];
         normal[face as usize / 2] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
         normal.into()
     }
 
     /// The point of the face nearest to `position`.
-    pub(crate) fn on_face(&self, face: u32, position: Vec3) -> Vec3 {
+    pub(super) fn on_face(&self, face: u32, position: Vec3) -> Vec3 {
         let axis = face as usize / 2;
         let mut position = position.clamp(self.min, self.max);
         position[axis] = if face.is_multiple_of(2) { self.min[axis] } else { self.max[axis] };
@@ -133,7 +133,7 @@ impl AxisBox {
     }
 
     /// Where a point of a face lies along the other two axes, each mapped to `[0, 1]`.
-    pub(crate) fn uv(&self, face: u32, position: Vec3) -> [f32; 2] {
+    pub(super) fn uv(&self, face: u32, position: Vec3) -> [f32; 2] {
         let relative = ((position - self.min) / (self.max - self.min)).clamp(Vec3::ZERO, Vec3::ONE);
         let axis = face as usize / 2;
         [relative[(axis + 1) % 3], relative[(axis + 2) % 3]]

@@ -4,9 +4,13 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::{Candidate, ShapeId};
+use super::axis_box::AxisBox;
+use super::hit::{Candidate, ShapeId};
+use super::quad::Quad;
+use super::shape::Shape;
+use super::sphere::Sphere;
+use super::triangle::RayShear;
 use crate::ray::Ray;
-use crate::shape::{AxisBox, Quad, RayShear, Shape, Sphere};
 
 /// A primitive with what its test needs, so that a leaf is read in one go.
 #[derive(Clone, Copy, Debug)]

@@ -9,11 +9,8 @@ use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
 use super::boxes::{Bounds, Boxes, Exact, union};
+use super::lanes::{Task, WIDTH, Wide, run};
 use super::sort::{Buckets, Item, split, split_few};
-use super::wide::{Task, Wide, run};
-
-/// Items per block and children per node.
-pub(super) const WIDTH: usize = 8;
 
 /// Items of a leaf, of all its blocks.
 const LEAF: usize = WIDTH * WIDTH;

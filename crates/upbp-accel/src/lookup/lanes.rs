@@ -6,7 +6,8 @@
 
 use pulp::Arch;
 
-use super::packed::WIDTH;
+/// Items per block, and children per node of a tree.
+pub(super) const WIDTH: usize = 8;
 
 /// The operations on eight numbers. Masks have one bit per lane.
 pub(super) trait Wide: Copy {

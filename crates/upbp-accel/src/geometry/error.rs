@@ -51,6 +51,6 @@ pub enum GeometryError {
 }
 
 /// Passes `value` if all its components are finite.
-pub(crate) fn finite(value: glam::Vec3, what: &'static str) -> Result<glam::Vec3, GeometryError> {
+pub(super) fn finite(value: glam::Vec3, what: &'static str) -> Result<glam::Vec3, GeometryError> {
     if value.is_finite() { Ok(value) } else { Err(GeometryError::NonFinite { what }) }
 }

@@ -1,65 +1,23 @@
 //! All surfaces of a scene behind one hierarchy.
 
-mod bvh;
-mod primitive;
-
 use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use self::bvh::Bvh;
-use self::primitive::Item;
-use crate::error::GeometryError;
+use super::axis_box::AxisBox;
+use super::error::GeometryError;
+use super::hierarchy::Hierarchy;
+use super::hit::{Candidate, ShapeId, SurfacePoint, Visit};
+use super::primitive::{self, Item};
+use super::shape::Shape;
+use super::sphere::Sphere;
 use crate::ray::Ray;
-use crate::shape::{AxisBox, Shape, Sphere};
-
-/// The place of a shape in the list that a [`SceneGeometry`] was built from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ShapeId(pub u32);
-
-/// An intersection of a ray with a surface, as the traversal finds it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
-    /// Distance along the ray, scene units.
-    pub t: f32,
-    /// The shape that is met.
-    pub shape: ShapeId,
-    /// Which part of the shape: the triangle of a mesh, the face of a box (`2·axis`, plus one on the upper
-    /// side), 0 where a line enters a sphere and 1 where it leaves, 0 for a quad.
-    pub primitive: u32,
-    /// Where on a quad (`[0, 1]²`), or the weights of the second and third corner of a triangle. Zero
-    /// for spheres and boxes: see [`SceneGeometry::uv`].
-    pub uv: [f32; 2],
-}
-
-/// What a visitor of intersections wants next.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Visit {
-    /// Go on.
-    Continue,
-    /// Go on, but only with intersections nearer than this distance. A greater distance than before has no
-    /// effect.
-    ShrinkTo(f32),
-    /// No more.
-    Stop,
-}
-
-/// Surface data at an intersection.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
-    /// The point, recomputed on the surface and rounded once, whatever the distance that the ray came from.
-    pub position: Vec3,
-    /// Unit normal of the surface: outwards for closed shapes, by the winding for quads and triangles.
-    pub geometric_normal: Vec3,
-    /// Interpolated unit normal, in the hemisphere of the geometric one.
-    pub shading_normal: Vec3,
-}
 
 /// The shapes of a scene, ready for rays.
 #[derive(Clone, Debug)]
 pub struct SceneGeometry {
     shapes: Vec<Shape>,
-    bvh: Bvh,
+    hierarchy: Hierarchy,
     /// Primitives in the order of the hierarchy's leaves.
     items: Vec<Item>,
     /// Whether there is any mesh: a ray is prepared for triangles only then.
@@ -74,10 +32,10 @@ impl SceneGeometry {
             return Err(GeometryError::TooManyPrimitives { count: items.len().max(shapes.len()) });
         }
         let boxes: Vec<(Vec3, Vec3)> = items.iter().map(Item::aabb).collect();
-        let (bvh, order) = Bvh::build(&boxes);
+        let (hierarchy, order) = Hierarchy::build(&boxes);
         let items = order.iter().map(|&index| items[index as usize]).collect();
         let triangles = shapes.iter().any(|shape| matches!(shape, Shape::Mesh(_)));
-        Ok(Self { shapes, bvh, items, triangles })
+        Ok(Self { shapes, hierarchy, items, triangles })
     }
 
     /// The least and the greatest coordinates; both zero for an empty scene.
@@ -109,7 +67,7 @@ impl SceneGeometry {
     /// or stop.
     pub fn for_each_hit(&self, ray: Ray, mut visit: impl FnMut(&Candidate) -> Visit) {
         let probe = primitive::Probe::new(&ray, self.triangles);
-        self.bvh.traverse(&ray, |range, t_max| {
+        self.hierarchy.traverse(&ray, |range, t_max| {
             for item in &self.items[range] {
                 probe.intersect(item, ray.t_min, t_max, |candidate, t_max| {
                     match visit(candidate) {

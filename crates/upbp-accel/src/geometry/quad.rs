@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::error::{GeometryError, finite};
+use super::error::{GeometryError, finite};
 
 /// A parallelogram `origin + u·edge_u + v·edge_v` with `u` and `v` in `[0, 1]`.
 ///
@@ -87,7 +87,7 @@ impl Quad {
     /// Where the line meets the quad: the distance, and the coordinates on the quad.
     ///
     /// In double precision: what leaks between neighbours is then what their corners differ by.
-    pub(crate) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<(f64, [f32; 2])> {
+    pub(super) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<(f64, [f32; 2])> {
         let [edge_u, edge_v] = [self.edge_u, self.edge_v].map(Vec3::as_dvec3);
         let direction = direction.as_dvec3();
         let to_corner = self.origin.as_dvec3() - origin.as_dvec3();

@@ -9,7 +9,7 @@
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// What a ray's tests against triangles have in common.
-pub(crate) struct RayShear {
+pub(super) struct RayShear {
     origin: Vec3,
     direction: DVec3,
     axes: [usize; 3],
@@ -17,15 +17,15 @@ pub(crate) struct RayShear {
 }
 
 /// Where a line meets a triangle.
-pub(crate) struct TriangleHit {
+pub(super) struct TriangleHit {
     /// Distance along the ray; may be negative.
-    pub(crate) t: f64,
+    pub(super) t: f64,
     /// Weights of the second and third corner.
-    pub(crate) weights: [f32; 2],
+    pub(super) weights: [f32; 2],
 }
 
 impl RayShear {
-    pub(crate) fn new(origin: Vec3, direction: Vec3) -> Self {
+    pub(super) fn new(origin: Vec3, direction: Vec3) -> Self {
         let size = direction.abs();
         let z = if size.x > size.y && size.x > size.z {
             0
@@ -47,7 +47,7 @@ impl RayShear {
 
     /// Where the line meets the triangle, if it does. Both sides count.
     #[inline]
-    pub(crate) fn intersect(&self, corners: [Vec3; 3]) -> Option<TriangleHit> {
+    pub(super) fn intersect(&self, corners: [Vec3; 3]) -> Option<TriangleHit> {
         let [a, b, c] = corners.map(|corner| self.project(corner - self.origin));
         // Rounding is monotonic: a product of two differences can come out as zero, but not with the
         // wrong sign. So mixed signs are certain already in single precision.

@@ -30,7 +30,7 @@ struct Node {
 
 /// A binary hierarchy of boxes.
 #[derive(Clone, Debug)]
-pub(super) struct Bvh {
+pub(super) struct Hierarchy {
     /// Root first; empty without primitives.
     nodes: Vec<Node>,
 }
@@ -47,7 +47,7 @@ impl Boundable for Group {
     }
 }
 
-impl Bvh {
+impl Hierarchy {
     /// Builds over boxes; also returns the order in which leaves refer to them.
     pub(super) fn build(boxes: &[(Vec3, Vec3)]) -> (Self, Vec<u32>) {
         if boxes.is_empty() {

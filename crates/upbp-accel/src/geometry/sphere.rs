@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{DVec3, Vec3};
 
-use crate::error::{GeometryError, finite};
+use super::error::{GeometryError, finite};
 
 /// A sphere; its normal points away from the centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,7 +82,7 @@ impl Sphere {
     ///
     /// In double precision: with single precision a small sphere far away is missed, and the roots of a
     /// large one are off by more than the offset of secondary rays.
-    pub(crate) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[f64; 2]> {
+    pub(super) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[f64; 2]> {
         let direction = direction.as_dvec3();
         let from_centre = origin.as_dvec3() - self.centre.as_dvec3();
         let radius = f64::from(self.radius);
@@ -103,12 +103,12 @@ impl Sphere {
     }
 
     /// The point of the surface in the direction `normal`, rounded once.
-    pub(crate) fn on_surface(&self, normal: DVec3) -> Vec3 {
+    pub(super) fn on_surface(&self, normal: DVec3) -> Vec3 {
         (self.centre.as_dvec3() + normal.normalize() * f64::from(self.radius)).as_vec3()
     }
 
     /// Azimuth and polar angle around the y axis, both mapped to `[0, 1]`.
-    pub(crate) fn uv(normal: Vec3) -> [f32; 2] {
+    pub(super) fn uv(normal: Vec3) -> [f32; 2] {
         let azimuth = normal.z.atan2(normal.x) * (0.5 * FRAC_1_PI);
         [azimuth.rem_euclid(1.0), normal.y.clamp(-1.0, 1.0).acos() * FRAC_1_PI]
     }

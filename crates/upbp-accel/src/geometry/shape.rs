@@ -1,17 +1,11 @@
 //! The shapes that a scene is made of, validated once when they are made.
 
-mod axis_box;
-mod mesh;
-mod quad;
-mod sphere;
-mod triangle;
-
-pub use axis_box::AxisBox;
 use glam::Vec3;
-pub use mesh::TriangleMesh;
-pub use quad::Quad;
-pub use sphere::Sphere;
-pub(crate) use triangle::RayShear;
+
+use super::axis_box::AxisBox;
+use super::mesh::TriangleMesh;
+use super::quad::Quad;
+use super::sphere::Sphere;
 
 /// One surface of a scene.
 #[derive(Clone, Debug)]

@@ -2,8 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
+use super::error::GeometryError;
 use super::triangle::RayShear;
-use crate::error::GeometryError;
 
 /// Triangles over shared vertices.
 ///
@@ -101,7 +101,7 @@ impl TriangleMesh {
     }
 
     /// The corners of a triangle.
-    pub(crate) fn corners(&self, triangle: u32) -> [Vec3; 3] {
+    pub(super) fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
     }
 
@@ -176,19 +176,19 @@ impl TriangleMesh {
     }
 
     /// The point with weights `b` and `c` for the second and third corner, rounded once.
-    pub(crate) fn point(&self, triangle: u32, b: f64, c: f64) -> Vec3 {
+    pub(super) fn point(&self, triangle: u32, b: f64, c: f64) -> Vec3 {
         let [p, q, r] = self.corners(triangle).map(Vec3::as_dvec3);
         // From one corner along the edges: the point stays in the plane whatever the weights' errors.
         (p + (q - p) * b + (r - p) * c).as_vec3()
     }
 
     /// The unit normal of the plane of a triangle.
-    pub(crate) fn geometric_normal(&self, triangle: u32) -> Vec3 {
+    pub(super) fn geometric_normal(&self, triangle: u32) -> Vec3 {
         cross(&self.positions, self.triangles[triangle as usize]).normalize().as_vec3()
     }
 
     /// The interpolated normal, in the hemisphere of `geometric`.
-    pub(crate) fn shading_normal(&self, triangle: u32, b: f32, c: f32, geometric: Vec3) -> Vec3 {
+    pub(super) fn shading_normal(&self, triangle: u32, b: f32, c: f32, geometric: Vec3) -> Vec3 {
         let Some(normals) = &self.normals else { return geometric };
         let [p, q, r] = self.triangles[triangle as usize].map(|vertex| normals[vertex as usize]);
         match (p * (1.0 - b - c) + q * b + r * c).try_normalize() {

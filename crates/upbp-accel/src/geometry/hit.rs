@@ -1,0 +1,45 @@
+//! Where a ray meets a surface.
+
+use glam::Vec3;
+
+/// The place of a shape in the list that a [`SceneGeometry`](super::SceneGeometry) was built from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ShapeId(pub u32);
+
+/// An intersection of a ray with a surface, as the traversal finds it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Distance along the ray, scene units.
+    pub t: f32,
+    /// The shape that is met.
+    pub shape: ShapeId,
+    /// Which part of the shape: the triangle of a mesh, the face of a box (`2·axis`, plus one on the upper
+    /// side), 0 where a line enters a sphere and 1 where it leaves, 0 for a quad.
+    pub primitive: u32,
+    /// Where on a quad (`[0, 1]²`), or the weights of the second and third corner of a triangle. Zero
+    /// for spheres and boxes: see [`SceneGeometry::uv`](super::SceneGeometry::uv).
+    pub uv: [f32; 2],
+}
+
+/// What a visitor of intersections wants next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Visit {
+    /// Go on.
+    Continue,
+    /// Go on, but only with intersections nearer than this distance. A greater distance than before has no
+    /// effect.
+    ShrinkTo(f32),
+    /// No more.
+    Stop,
+}
+
+/// Surface data at an intersection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// The point, recomputed on the surface and rounded once, whatever the distance that the ray came from.
+    pub position: Vec3,
+    /// Unit normal of the surface: outwards for closed shapes, by the winding for quads and triangles.
+    pub geometric_normal: Vec3,
+    /// Interpolated unit normal, in the hemisphere of the geometric one.
+    pub shading_normal: Vec3,
+}

@@ -1,0 +1,22 @@
+//! Surfaces: shapes, meshes and the hierarchy over them.
+
+mod axis_box;
+mod error;
+mod hierarchy;
+mod hit;
+mod mesh;
+mod primitive;
+mod quad;
+mod scene;
+mod shape;
+mod sphere;
+mod triangle;
+
+pub use axis_box::AxisBox;
+pub use error::GeometryError;
+pub use hit::{Candidate, ShapeId, SurfacePoint, Visit};
+pub use mesh::TriangleMesh;
+pub use quad::Quad;
+pub use scene::SceneGeometry;
+pub use shape::Shape;
+pub use sphere::Sphere;
