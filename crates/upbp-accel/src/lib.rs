@@ -1,11 +1,14 @@
-#![doc = include_str!("../README.md")]
+#![cfg_attr(feature = "geometry", doc = include_str!("../README.md"))]
+#![cfg_attr(not(feature = "geometry"), doc = "Look-up structures for photon points and beams.")]
 
+#[cfg(feature = "geometry")]
 mod geometry;
 mod lookup;
 mod ray;
 
 pub use glam;
 
+#[cfg(feature = "geometry")]
 pub use geometry::{
     AxisBox, Candidate, GeometryError, Quad, SceneGeometry, Shape, ShapeId, Sphere, SurfacePoint,
     TriangleMesh, Visit,

@@ -1,10 +1,10 @@
-//! Rays, and where a ray that leaves a surface may start.
+//! Rays, and the offset of a ray that leaves a surface.
 
 use glam::Vec3;
 
 /// A piece of a half-line: the points `origin + t·direction` with `t` between `t_min` and `t_max`.
 ///
-/// `t_max` may be infinite. Whether the ends belong to the range is said by each query.
+/// Each query says whether the ends belong to the range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start, scene units.
@@ -39,16 +39,16 @@ impl Ray {
 
 /// Offset from the surface in units of the rounding error of the largest coordinate.
 ///
-/// A [`SurfacePoint`](crate::SurfacePoint) is off its surface by at most `√3/2` such units, as is the sum
-/// that is returned; 4 would do for the shapes of this crate. The rest is margin for hosts, whose own
-/// intersections may be good to fewer digits.
+/// A point that is rounded once is off its surface by at most `√3/2` such units, as is the sum that is
+/// returned; 4 would do for the shapes of this crate. The rest is margin for hosts, whose own intersections may
+/// be good to fewer digits.
 const OFFSET_ULPS: f32 = 32.0;
 
 /// Moves a surface point off its surface, to the side that `direction` points to.
 ///
-/// `position` must come from [`SceneGeometry::surface`](crate::SceneGeometry::surface), `normal` is the
-/// geometric normal. A ray from the result along `direction` does not meet the same planar or convex
-/// surface again on the near side. The offset is relative to the coordinates, so that it holds at any
+/// `position` must be a point of the surface that is rounded once, as those of `SceneGeometry::surface` are;
+/// `normal` is the geometric normal. A ray from the result along `direction` does not meet the same planar or
+/// convex surface again on the near side. The offset is relative to the coordinates, so that it holds at any
 /// scale and far from the origin.
 ///
 /// After Wächter and Binder, "A Fast and Robust Method for Avoiding Self-Intersection" (Ray Tracing

@@ -1,5 +1,7 @@
 //! Rays against scenes equal rays against every primitive.
 
+#![cfg(feature = "geometry")]
+
 mod support;
 
 use glam::{DVec3, Vec3};

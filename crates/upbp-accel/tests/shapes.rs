@@ -1,5 +1,7 @@
 //! Shapes by themselves: validation, area sampling, inside and outside, leaving a surface.
 
+#![cfg(feature = "geometry")]
+
 mod support;
 
 use glam::Vec3;
