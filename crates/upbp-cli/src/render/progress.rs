@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use upbp_core::{ErrorPoint, ErrorSeries, Image, Progress, Renderer, State, Stop, StopReason};
 
-use crate::bar::Bar;
+use super::bar::Bar;
 use crate::exit::{complain, describe};
 
 /// What is done besides rendering.

@@ -1,4 +1,4 @@
-//! How the programs end: messages and exit codes.
+//! How the program ends: messages and exit codes.
 
 use std::error::Error;
 use std::io::{self, Write};
@@ -13,7 +13,6 @@ pub(crate) enum Failure {
     /// A file or the standard output that could not be written.
     Output(String),
     /// A signal. What was done is saved if there is a state file.
-    #[allow(dead_code, reason = "not every program that shares this file can be interrupted")]
     Interrupted(String),
 }
 

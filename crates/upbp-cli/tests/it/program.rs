@@ -1,11 +1,8 @@
-//! The example programs, run as processes.
-
-#![allow(dead_code, reason = "no test uses all of it")]
+//! The program, run as a process.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
 
 /// A scene with a surface, a medium and a lamp.
 pub(crate) const SMALL: &str = r#"(
@@ -21,28 +18,11 @@ pub(crate) const SMALL: &str = r#"(
   lights: [ Point(position: (0, 3, 0), intensity: (5, 5, 5)) ],
 )"#;
 
-/// An example program with its arguments, in a folder.
+/// `upbp` with a command of its own and its arguments, in a folder.
 pub(crate) fn command(name: &str, folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(examples().join(format!("{name}{}", std::env::consts::EXE_SUFFIX)));
-    command.args(arguments).current_dir(folder);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_upbp"));
+    command.arg(name).args(arguments).current_dir(folder);
     command
-}
-
-/// Where the programs are. A run of one test alone does not build them; if they are up to date this takes a moment.
-fn examples() -> &'static Path {
-    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| {
-        let built = Command::new(env!("CARGO"))
-            .args(["build", "--quiet", "--example", "cornell_media", "--example", "merge"])
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .status()
-            .expect("cargo runs");
-        assert!(built.success());
-        let mut path = std::env::current_exe().expect("the path of this test");
-        path.pop();
-        path.pop();
-        path.join("examples")
-    })
 }
 
 /// A folder of its own for each test.

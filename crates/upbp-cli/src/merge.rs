@@ -1,26 +1,19 @@
-//! Puts the states of several runs of one render together.
+//! `upbp merge`: puts the states of several runs of one render together.
 //!
-//! `cargo run --release --example merge -- a.state b.state --state whole.state -o whole.exr` merges states with disjoint
+//! `upbp merge a.state b.state --state whole.state -o whole.exr` merges states with disjoint
 //! iterations, in any order, to the bits of a single run. Without an output it says what the states hold.
 
-#[path = "../support/exit.rs"]
-mod exit;
-#[path = "../support/files.rs"]
-mod files;
-
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
-use clap::Parser;
+use clap::Args;
 use upbp_core::{Content, Output, OutputError, State, check_outputs, check_writable};
 
-use exit::{Failure, finish, say};
-use files::Images;
+use crate::exit::{Failure, say};
+use crate::files::{self, Images};
 
 /// Merges states of one render with disjoint iterations, in any order, to the bits of a single run.
-#[derive(Debug, Parser)]
-#[command(version, about)]
-struct Options {
+#[derive(Debug, Args)]
+pub(crate) struct Options {
     /// State files, of the same scene and settings
     #[arg(required = true, value_name = "STATE")]
     states: Vec<PathBuf>,
@@ -50,11 +43,7 @@ impl Options {
     }
 }
 
-fn main() -> ExitCode {
-    finish(run(&Options::parse()))
-}
-
-fn run(options: &Options) -> Result<(), Failure> {
+pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     let outputs = options.outputs();
     let inputs: Vec<_> = options.states.iter().map(|path| ("a state to merge", path.as_path())).collect();
     check_outputs(&outputs, &inputs).map_err(Failure::input)?;

@@ -1,16 +1,13 @@
 //! Bad input to the program: a clear error that names the place, exit code 2, and no output file.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use program::{SMALL, folder};
+use crate::program::{self, SMALL, folder};
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
-    program::command("cornell_media", folder, arguments).output().expect("the program runs")
+    program::command("render", folder, arguments).output().expect("the program runs")
 }
 
 /// Runs, and checks that it was refused with all of `words` and left nothing behind.

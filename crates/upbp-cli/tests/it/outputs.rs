@@ -2,10 +2,6 @@
 //! of its kind.
 //!
 //! `UPBP_COMMANDS=10000` sets how many random command lines are run; some hundred by default.
-#![cfg(unix)]
-
-#[path = "support/program.rs"]
-mod program;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::OnceLock;
 
-use program::{SMALL, command};
+use crate::program::{self, SMALL, command};
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::test_runner::{Config, TestRunner};
@@ -57,7 +53,7 @@ fn originals() -> &'static Snapshot {
         let folder = program::folder("originals");
         let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("a writable folder");
         let render = |arguments: &[&str]| {
-            let (code, text) = run("cornell_media", &folder, &[&LITTLE[..], arguments].concat());
+            let (code, text) = run("render", &folder, &[&LITTLE[..], arguments].concat());
             assert_eq!(code, Some(0), "{arguments:?}: {text}");
         };
         let other = SMALL.replace("width: 8, height: 8", "width: 2, height: 2");
@@ -164,7 +160,7 @@ fn an_output_that_would_destroy_a_file_is_refused() {
     ];
     for (arguments, words) in cases {
         let arguments = [&["scene.ron", "--iterations", "1"], &LITTLE[..], arguments].concat();
-        refused("cornell_media", &folder, &arguments, words, &before);
+        refused("render", &folder, &arguments, words, &before);
     }
     let (to, from) = ("the state, ", "a state to merge, ");
     let cases: &[(&[&str], &[&str])] = &[
@@ -183,9 +179,7 @@ fn an_output_that_would_destroy_a_file_is_refused() {
 fn a_name_that_ends_in_png_makes_a_png_alone() {
     let folder = prepared("png");
     let before = snapshot(&folder);
-    for (program, input) in
-        [("cornell_media", &["scene.ron", "--iterations", "1"][..]), ("merge", &["a.state"])]
-    {
+    for (program, input) in [("render", &["scene.ron", "--iterations", "1"][..]), ("merge", &["a.state"])] {
         let (code, text) = run(program, &folder, &[input, &["-o", "o.PNG", "--quiet"]].concat());
         assert_eq!(code, Some(0), "{text}");
         let image = folder.join("o.PNG");
@@ -201,7 +195,7 @@ fn slices_that_cannot_be_merged_are_mentioned() {
     let note = "cannot be merged";
     let render = |arguments: &[&str]| {
         let (code, text) =
-            run("cornell_media", &folder, &[&["scene.ron", "-o", "o.exr"], &LITTLE[..], arguments].concat());
+            run("render", &folder, &[&["scene.ron", "-o", "o.exr"], &LITTLE[..], arguments].concat());
         assert_eq!(code, Some(0), "{text}");
         text
     };
@@ -303,7 +297,7 @@ fn commands() -> impl Strategy<Value = (&'static str, Vec<Words>)> {
         select(&["1", "2", "0..1", "4..5"][..]).prop_map(|n| vec!["--iterations", n]),
     );
     let rest = rest.prop_map(|(a, b, c, d, e)| vec![a, b, c, d, e]);
-    let renders = (files, rest).prop_map(|(files, rest)| ("cornell_media", [files, rest].concat()));
+    let renders = (files, rest).prop_map(|(files, rest)| ("render", [files, rest].concat()));
     let states = prop::collection::vec(
         prop_oneof![8 => select(&["a.state", "b.state"][..]), 1 => select(&NAMES[..])],
         1..3,
@@ -316,7 +310,7 @@ fn commands() -> impl Strategy<Value = (&'static str, Vec<Words>)> {
 /// The files that a command reads and does not write on purpose.
 fn read<'a>(program: &str, words: &'a [Words]) -> Vec<&'a str> {
     let (mut files, options) = (words[0].clone(), &words[1..]);
-    if program == "cornell_media" {
+    if program == "render" {
         files.extend(["floor.obj", "sky.png"]);
     }
     for option in options {
@@ -362,7 +356,7 @@ fn random_commands_keep_what_they_read() {
     let config = Config { cases: count, failure_persistence: None, ..Config::default() };
     let judged = TestRunner::new(config).run(&commands(), |(program, words)| {
         let mut arguments = words.concat();
-        if program == "cornell_media" {
+        if program == "render" {
             arguments.extend(LITTLE);
         }
         let (code, text) = run(program, &folder, &arguments);

@@ -2,15 +2,15 @@
 
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-root=$(cd "$here/../.." && pwd)
-(cd "$root" && cargo build --quiet --locked --release --example cornell_media --example merge)
-PATH=$root/target/release/examples:$PATH
+root=$(cd "$here/../../../.." && pwd)
+(cd "$root" && cargo build --quiet --locked --release --package upbp-cli)
+PATH=$root/target/release:$PATH
 export SCENE=$root/examples/scenes/cornell_media.ron
 work=$(mktemp -d)
 
 # Fingerprint of the film in a state file.
 film() {
-    merge "$1" | sed -n '1s/.*film //p'
+    upbp merge "$1" | sed -n '1s/.*film //p'
 }
 
 # Ends with success if two state files hold the same film.

@@ -1,48 +1,36 @@
-//! Renders a scene file with every technique.
-//!
-//! `cargo run --release --example cornell_media` renders the shipped scene; `-- --help` lists the options.
+//! `upbp render`: renders a scene file.
 
 mod bar;
-#[path = "../support/exit.rs"]
-mod exit;
-#[path = "../support/files.rs"]
-mod files;
 mod interrupt;
 mod options;
-mod render;
-#[path = "../support/threads.rs"]
-mod threads;
+mod progress;
 
 use std::error::Error;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::path::Path;
 
-use clap::Parser;
 use upbp_core::{
     OutputError, Preparing, RenderError, RenderPlan, Renderer, Settings, Start, State, StateError,
     StopReason, check_outputs, check_writable, read_exr, read_text, remove_leftovers, write_text,
 };
 use upbp_scene::ReadyScene;
 
+use crate::exit::{Failure, complain, say};
+use crate::files;
 use bar::Bar;
-use exit::{Failure, complain, finish, say};
-use options::Options;
-use render::{Beside, render};
+pub(crate) use options::Options;
+use progress::{Beside, render};
 
-fn main() -> ExitCode {
-    let options = Options::parse();
+pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     // A pool of its own: reading the scene works in parallel too.
     let threads = options.threads.map_or(0, NonZeroUsize::get);
-    finish(match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| run(&options)),
-        Err(error) => Err(Failure::input(error)),
-    })
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::input)?;
+    pool.install(|| run_in_pool(options))
 }
 
-fn run(options: &Options) -> Result<(), Failure> {
+fn run_in_pool(options: &Options) -> Result<(), Failure> {
     let canceller = interrupt::install().map_err(Failure::input)?;
-    let path = options.scene.clone().unwrap_or_else(shipped_scene);
+    let path = options.scene.clone();
     let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
     let scene = load(&path, options).map_err(Failure::input)?;
     let outputs = options.outputs();
@@ -175,11 +163,6 @@ fn load(path: &Path, options: &Options) -> Result<ReadyScene, upbp_scene::SceneE
             description.film.crop = None;
         }
     })
-}
-
-/// The scene that comes with the project, from wherever the program is started.
-fn shipped_scene() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cornell_media.ron")
 }
 
 impl Options {

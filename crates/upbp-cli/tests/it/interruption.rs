@@ -2,12 +2,6 @@
 //! result is the same to the bit.
 //!
 //! `UPBP_KILLS=200` sets how often a render is killed; a few times by default.
-#![cfg(unix)]
-
-#[path = "support/processor.rs"]
-mod processor;
-#[path = "support/program.rs"]
-mod program;
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -16,13 +10,14 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, SystemTime};
 
-use program::{SMALL, command, folder};
+use crate::processor;
+use crate::program::{SMALL, command, folder};
 use upbp_core::State;
 
 /// As [`program::command`], silent, one thread.
 fn render(folder: &Path, arguments: &[&str]) -> Command {
     let mut command =
-        command("cornell_media", folder, &["scene.ron", "--quiet", "--threads", "1", "--deterministic"]);
+        command("render", folder, &["scene.ron", "--quiet", "--threads", "1", "--deterministic"]);
     command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
@@ -248,7 +243,7 @@ fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
     assert!(text.contains("warning") && text.contains("gone/a.state"), "{text}");
 
     // Nobody reads what it says: the files are there all the same.
-    let mut child = command("cornell_media", &folder, &["scene.ron", "--iterations", "2", "-o", "e.exr"])
+    let mut child = command("render", &folder, &["scene.ron", "--iterations", "2", "-o", "e.exr"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -258,7 +253,7 @@ fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
     assert_eq!(code, Some(74), "{text}");
     assert!(text.contains("standard output") && !text.contains("panicked"), "{text}");
     assert!(folder.join("e.exr").exists());
-    let mut child = command("cornell_media", &folder, &["scene.ron", "--iterations", "2", "-o", "f.exr"])
+    let mut child = command("render", &folder, &["scene.ron", "--iterations", "2", "-o", "f.exr"])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()

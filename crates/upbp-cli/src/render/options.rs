@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::Parser;
+use clap::Args;
 use upbp_core::{Content, LightPaths, MAX_ITERATIONS, Output, Settings, Stop, Techniques};
 use upbp_scene::description::Count;
 
@@ -15,15 +15,15 @@ use crate::threads::threads;
 /// Seconds of rendering if nothing else says when to stop.
 const DEFAULT_SECONDS: f64 = 60.0;
 
-/// Renders light in participating media: photon points, photon beams and bidirectional paths in one estimate.
-#[derive(Debug, Parser)]
-#[command(version, about)]
+/// Renders a scene file.
+#[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct Options {
-    /// Scene file (RON) [default: the one that comes with the project]
-    pub(crate) scene: Option<PathBuf>,
+    /// Scene file (RON)
+    #[arg(value_name = "SCENE.ron")]
+    pub(crate) scene: PathBuf,
     /// Image to write: OpenEXR, and a PNG of the same name beside it; or OUT.png, a PNG alone
-    #[arg(short, long, value_name = "OUT.exr", default_value = "cornell_media.exr", value_parser = files::path(Images::named))]
+    #[arg(short, long, value_name = "OUT.exr", default_value = "render.exr", value_parser = files::path(Images::named))]
     pub(crate) output: Images,
     /// Size of the film in pixels instead of the scene's, such as 640x360
     #[arg(long, value_name = "WxH", value_parser = size)]

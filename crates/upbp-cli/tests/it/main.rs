@@ -1,0 +1,11 @@
+//! The program `upbp` as its users have it: what it is told, what it writes, and how it ends.
+
+mod bad_input;
+#[cfg(unix)]
+mod interruption;
+#[cfg(unix)]
+mod outputs;
+#[cfg(unix)]
+#[path = "../../../../tests/support/processor.rs"]
+mod processor;
+mod program;
