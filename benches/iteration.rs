@@ -1,9 +1,9 @@
 //! Seconds of one iteration, and of one weight.
 //!
-//! `iteration/SCENE/SET` is one iteration of a shipped scene at 64 x 64 pixels, as it follows on the first ones. Radii
-//! shrink on the way, which changes little. `weight/recursion/K` is what a merge and a connection pay for their weights on
-//! a path of K edges: the arrival of both walks at their last vertex and the sum there. It must not depend on K, unlike
-//! `weight/enumeration/K`, the same weights by the definition.
+//! `iteration/SCENE/SET` is one iteration of a shipped scene at 64 x 64 pixels, as it follows on the first
+//! ones. Radii shrink on the way, which changes little. `weight/recursion/K` is what a merge and a connection
+//! pay for their weights on a path of K edges: the arrival of both walks at their last vertex and the sum
+//! there. It must not depend on K, unlike `weight/enumeration/K`, the same weights by the definition.
 
 use std::f64::consts::PI;
 use std::hint::black_box;

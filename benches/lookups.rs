@@ -1,9 +1,10 @@
 //! Look-ups of photon points and photon beams, and the build of their trees.
 //!
-//! Names are `question/structure/elements/spread/hits`, as in `ball/tree/100k/uniform/10`; the radius is such that a
-//! query has that many hits on average. `cargo bench --bench lookups -- ray/tree/1m` runs a part. Throughput is
-//! in queries, or in elements for a build. Brute force is there for the smallest number of elements only, and has to
-//! find as many hits as the tree; the other structures may differ by what their boxes lose to rounding.
+//! Names are `question/structure/elements/spread/hits`, as in `ball/tree/100k/uniform/10`; the radius is such
+//! that a query has that many hits on average. `cargo bench --bench lookups -- ray/tree/1m` runs a part.
+//! Throughput is in queries, or in elements for a build. Brute force is there for the smallest number of
+//! elements only, and has to find as many hits as the tree; the other structures may differ by what their
+//! boxes lose to rounding.
 
 #[path = "lookups/alternatives.rs"]
 mod alternatives;
@@ -31,13 +32,13 @@ const TRIALS: usize = 256;
 /// Queries of a batch that looks at all elements.
 const BRUTE_QUERIES: usize = 16;
 
-/// Where all light comes from in [`Spread::FromOnePoint`].
+/// The lamp of [`Spread::FromOnePoint`].
 const LAMP: Vec3 = Vec3::new(0.1, 0.9, 0.05);
 
-/// Where it ends in [`Spread::Clustered`].
+/// The middle of the caustic in [`Spread::Clustered`].
 const FOCUS: Vec3 = Vec3::new(0.3, -0.2, 0.1);
 
-/// How elements lie in the cube `[−1, 1]³`.
+/// Distribution of the elements in the cube `[−1, 1]³`.
 #[derive(Clone, Copy)]
 enum Spread {
     /// Everywhere alike: fog after many scatterings.
@@ -161,7 +162,8 @@ fn centres(count: usize, spread: Spread) -> Vec<Vec3> {
 /// Another structure over the elements, for one radius: counts the hits of a query.
 type Other<E, Q> = for<'a> fn(&'a [E], f32) -> Box<dyn Fn(&Q) -> usize + 'a>;
 
-/// One kind of look-up: elements `E` in a tree `T`, asked with `Q`. Every way to ask returns the number of hits.
+/// One kind of look-up: elements `E` in a tree `T`, asked with `Q`. Every way to ask returns the number of
+/// hits.
 struct Question<E, T, Q> {
     name: &'static str,
     elements: fn(usize, Spread) -> Vec<E>,
@@ -246,7 +248,7 @@ fn radius_for(hits: f64, count: impl Fn(f32) -> usize) -> f32 {
     high
 }
 
-/// What a visitor does at the least: it uses the payload.
+/// The least that a visitor does: it uses the payload.
 fn visited(count: &mut usize, payload: u32) {
     *count += 1;
     black_box(payload);
@@ -336,7 +338,7 @@ fn ends(segment: &Segment) -> (Vec3, Vec3) {
     (a.min(b), a.max(b))
 }
 
-/// As the renderer builds it.
+/// The tree of beams, with the splits that the renderer chooses.
 fn beam_tree(segments: Vec<(Segment, u32)>) -> SegmentTree<u32> {
     let split = SplitParams::choose(&segments);
     SegmentTree::build(segments, split)

@@ -1,8 +1,8 @@
 //! A scene file rendered for a minute: how the crates are wired together.
 //!
-//! `cargo run --release --example cornell_media [-- SCENE.ron [OUT.exr]]` renders the shipped scene, or another one, and
-//! writes an OpenEXR image and a PNG beside it. The program `upbp` (`crates/upbp-cli`) does the same with options, signals,
-//! and states to go on from.
+//! `cargo run --release --example cornell_media [-- SCENE.ron [OUT.exr]]` renders the shipped scene, or
+//! another one, and writes an OpenEXR image and a PNG beside it. The program `upbp` (`crates/upbp-cli`) does
+//! the same with options, signals, and states to go on from.
 
 use std::error::Error;
 use std::ops::ControlFlow;
@@ -43,7 +43,8 @@ fn render(path: &Path, exr: &Path) -> Result<(), Box<dyn Error>> {
     // (`examples/host_renderer`).
     let scene = ReadyScene::load(path)?;
 
-    // Nothing is written over what is read, or over a file of another kind; and better now than after the work.
+    // Nothing is written over what is read, or over a file of another kind; and better now than after the
+    // work.
     let png = exr.with_extension("png");
     let outputs = [
         Output { role: "the image", path: exr, content: Content::Exr },

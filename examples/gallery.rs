@@ -1,7 +1,8 @@
 //! The pictures of the documentation: the shipped scene with everything, its layers, each technique alone.
 //!
-//! `cargo run --release --example gallery [-- SECONDS [FOLDER]]` renders six pictures of equal time and writes the
-//! PNG files of `docs/images`. Layers are the weighted contributions to the first picture, at the same exposure.
+//! `cargo run --release --example gallery [-- SECONDS [FOLDER]]` renders six pictures of equal time and
+//! writes the PNG files of `docs/images`. Layers are the weighted contributions to the first picture, at the
+//! same exposure.
 
 use std::error::Error;
 use std::ops::ControlFlow;

@@ -1,10 +1,11 @@
-//! Makes the references of `examples/scenes/suite`: long renders in batches of different seeds, so that the standard error
-//! of every pixel is known.
+//! Makes the references of `examples/scenes/suite`: long renders in batches of different seeds, so that the
+//! standard error of every pixel is known.
 //!
-//! `cargo run --release --example make_reference -- --scenes caustic_in_fog --sets "bpt+surf+pb2d;bpt+surf+pb2d@0.002"` writes
-//! `tests/data/suite/caustic_in_fog.exr` from the first set. The others get a quarter of the time. They are there to be
-//! compared with: the table has the means of all of them, the noise, and the difference in tiles and pixels, which is bias where
-//! it is more than noise. `@` is followed by the first radius of all kernels, relative to the scene.
+//! `cargo run --release --example make_reference -- --scenes caustic_in_fog --sets
+//! "bpt+surf+pb2d;bpt+surf+pb2d@0.002"` writes `tests/data/suite/caustic_in_fog.exr` from the first set. The
+//! others get a quarter of the time. They are there to be compared with: the table has the means of all of
+//! them, the noise, and the difference in tiles and pixels, which is bias where it is more than noise. `@` is
+//! followed by the first radius of all kernels, relative to the scene.
 
 #[path = "support/scenes.rs"]
 mod scenes;
@@ -37,8 +38,8 @@ struct Options {
     /// Names of scenes of the suite, or paths of scene files [default: the suite]
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
-    /// Sets of techniques, separated by semicolons: that of the reference, then those to compare it with; SET@R for the first
-    /// radius R of all kernels, relative to the scene
+    /// Sets of techniques, separated by semicolons: that of the reference, then those to compare it with;
+    /// SET@R for the first radius R of all kernels, relative to the scene
     #[arg(long, value_delimiter = ';', default_value = "bpt+surf+pb2d+bb1d;bpt")]
     sets: Vec<Set>,
     /// Batches of the first set
@@ -176,7 +177,8 @@ impl Batches {
         Ok(Self { images, iterations, seconds, mean, error })
     }
 
-    /// Mean of a rectangle of pixels, and its standard error from the batches: pixels of a batch share light sub-paths.
+    /// Mean of a rectangle of pixels, and its standard error from the batches: pixels of a batch share light
+    /// sub-paths.
     fn region(&self, pixels: &[usize], c: usize) -> (f64, f64) {
         let means: Vec<f64> = self
             .images

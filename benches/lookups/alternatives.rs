@@ -1,4 +1,4 @@
-//! What else could answer the questions: other structures, each with its own scalar test of an element.
+//! Other structures that answer the questions, each with its own scalar test of an element.
 
 use glam::{Vec3, Vec3A};
 use kiddo::SquaredEuclidean;

@@ -1,7 +1,8 @@
-//! A scene that shares nothing with the ready-made one: a room of six planes full of haze, a ball of milk, a lamp.
+//! A scene that shares nothing with the ready-made one: a room of six planes full of haze, a ball of milk, a
+//! lamp.
 //!
-//! Everything is in closed form; there is no mesh, no acceleration structure, no scene file. It shows how little a host
-//! renderer has to say.
+//! Everything is in closed form; there is no mesh, no acceleration structure, no scene file. It shows how
+//! little a host renderer has to say.
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -122,7 +123,7 @@ impl Emitter for Lamp {
 
 /// A pinhole that looks along −z.
 pub(crate) struct Pinhole {
-    /// Where it stands.
+    /// Place of the pinhole, in scene units.
     pub position: Vec3,
     /// Pixels per side of the square film.
     pub size: u32,

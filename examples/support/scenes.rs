@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Who made the reference of a scene.
+/// The renderer that made the reference of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Group {
     /// Another renderer: what is measured against it says something about agreement, too.
@@ -18,7 +18,7 @@ pub(crate) struct Shipped {
     pub(crate) group: Group,
 }
 
-/// All of them.
+/// The scenes with references.
 pub(crate) const SCENES: [Shipped; 18] = [
     reference("absorb_only"),
     reference("chromatic_sphere"),

@@ -1,7 +1,7 @@
-//! What the errors over time say: slope, time to an error, efficiency.
+//! Slope, time to an error and efficiency, from errors over time.
 //!
-//! The noise of the reference is independent of the render's, so that its part of a mean squared error is known and
-//! taken away. Near that part the rest is uncertain: what is below a tenth of it is left out.
+//! The noise of the reference is independent of the render's, so that its part of a mean squared error is
+//! known and taken away. Near that part the rest is uncertain: what is below a tenth of it is left out.
 
 use upbp_core::ErrorPoint;
 
@@ -20,7 +20,7 @@ pub(crate) struct Curve {
     mean: Vec<ErrorPoint>,
 }
 
-/// When an error was reached.
+/// The moment at which an error was reached, in seconds.
 pub(crate) enum Reached {
     /// Before the first point.
     Before(f64),
@@ -50,7 +50,8 @@ impl Curve {
         self.mean.iter().map(|point| [point.seconds, point.rmse]).collect()
     }
 
-    /// Slope of log RMSE over log seconds, least squares in the last two thirds on the logarithmic axis of time.
+    /// Slope of log RMSE over log seconds, least squares in the last two thirds on the logarithmic axis of
+    /// time.
     pub(crate) fn slope(&self) -> Option<f64> {
         let points: Vec<[f64; 2]> = self.rmse().into_iter().map(|point| point.map(f64::ln)).collect();
         let (first, last) = (points.first()?[0], points.last()?[0]);
@@ -58,7 +59,7 @@ impl Curve {
         slope(&late.collect::<Vec<_>>())
     }
 
-    /// When the relMSE fell to `error` for the first time.
+    /// Seconds until the relMSE fell to `error` for the first time.
     pub(crate) fn time_to(&self, error: f64) -> Option<Reached> {
         let (first, last) = (self.mean.first()?, self.mean.last()?);
         if first.relative_mse <= error {
@@ -68,8 +69,8 @@ impl Curve {
         Some(crossing.map_or(Reached::Not(last.seconds), |pair| Reached::At(crossing_time(pair, error))))
     }
 
-    /// When the relMSE fell to `error` for good. If it did not, the time at which it would, were the curve continued with
-    /// relMSE ∝ 1/t.
+    /// Seconds until the relMSE fell to `error` for good. If it did not, the time at which it would, were the
+    /// curve continued with relMSE ∝ 1/t.
     pub(crate) fn time_below(&self, error: f64) -> Option<Reached> {
         let (first, last) = (self.mean.first()?, self.mean.last()?);
         if last.relative_mse > error {
@@ -104,7 +105,7 @@ impl Curve {
     }
 }
 
-/// When the straight line in logarithmic axes between two points has an error between theirs.
+/// Seconds at which the straight line in logarithmic axes between two points has an error between theirs.
 fn crossing_time(pair: &[ErrorPoint], error: f64) -> f64 {
     let [from, to] = [pair[0], pair[1]].map(|point| [point.relative_mse, point.seconds]);
     interpolate(from, to, error)

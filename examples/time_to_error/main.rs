@@ -1,11 +1,12 @@
 //! Error over time, of any scenes with a reference and any sets of techniques.
 //!
-//! `cargo run --release --example time_to_error -- --scenes fog_cornell,glass_env --sets "pt;bpt;default" --time 30 --out
-//! target/errors` writes `errors.csv` with all that was measured, and a plot per scene as SVG and as PNG, and prints
-//! tables, which are in `summary.md` too. In tables and plots the noise of the reference is taken away.
+//! `cargo run --release --example time_to_error -- --scenes fog_cornell,glass_env --sets "pt;bpt;default"
+//! --time 30 --out target/errors` writes `errors.csv` with all that was measured, and a plot per scene as SVG
+//! and as PNG, and prints tables, which are in `summary.md` too. In tables and plots the noise of the
+//! reference is taken away.
 //!
-//! Without `--scenes` and `--sets` it renders the whole suite in half an hour on two cores, with `--quick` in less than five
-//! minutes, and judges the choice of techniques by the program (`verdict`).
+//! Without `--scenes` and `--sets` it renders the whole suite in half an hour on two cores, with `--quick` in
+//! less than five minutes, and judges the choice of techniques by the program (`verdict`).
 
 mod analysis;
 mod measure;
@@ -106,8 +107,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 /// Errors over time, by seed.
 type Series = Vec<(u64, Vec<ErrorPoint>)>;
 
-/// Renders a scene with all sets and seeds; a series for each set. A scene may not have what a set needs, so that two sets are the
-/// same in it: those are rendered once. The choice of the program costs time of its own and is always rendered.
+/// Renders a scene with all sets and seeds; a series for each set. A scene may not have what a set needs, so
+/// that two sets are the same in it: those are rendered once. The choice of the program costs time of its own
+/// and is always rendered.
 fn series(
     subject: &Subject,
     sets: &[NamedSet],
@@ -139,7 +141,7 @@ fn series(
     Ok(series)
 }
 
-/// Where the plots of a scene go: SVG and PNG.
+/// The files of the plots of a scene: SVG and PNG.
 fn plots(subject: &Subject, folder: &Path) -> [PathBuf; 2] {
     ["svg", "png"].map(|ending| folder.join(format!("{}.{ending}", subject.name)))
 }

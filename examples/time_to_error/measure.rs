@@ -25,10 +25,11 @@ pub(crate) fn prepare(subject: &Subject, settings: Settings) -> Result<Renderer<
     Ok(renderer)
 }
 
-/// Renders each for some time and takes errors after iterations at geometric distances, and after the last one. Seconds are those of
-/// rendering, the pilot included; taking errors does not count.
+/// Renders each for some time and takes errors after iterations at geometric distances, and after the last
+/// one. Seconds are those of rendering, the pilot included; taking errors does not count.
 ///
-/// They take turns: the speed of a machine that others use changes within seconds, and so it does for all of them alike.
+/// They take turns: the speed of a machine that others use changes within seconds, and so it does for all of
+/// them alike.
 pub(crate) fn measure(subject: &Subject, renderers: Vec<Renderer<'_>>, seconds: f64) -> Vec<Vec<ErrorPoint>> {
     let mut lines: Vec<Line<'_>> =
         renderers.into_iter().map(|renderer| Line::new(subject, renderer)).collect();
@@ -59,7 +60,7 @@ impl<'a> Line<'a> {
         Self { subject, renderer, points: Vec::new(), next: 1, pilot, done: false }
     }
 
-    /// Goes on until it has taken so many seconds, of which there are `limit` in all.
+    /// Goes on until `until` seconds are taken, of `limit` in all.
     fn go_on(&mut self, until: f64, limit: f64) {
         loop {
             let seconds = self.renderer.report().seconds.total();

@@ -41,12 +41,12 @@ const QUICK_SECONDS: f64 = 2.0;
 #[derive(Debug, Parser)]
 #[command(version, about)]
 pub(crate) struct Options {
-    /// Scenes: names of shipped ones, `suite` for all of them, `all` for the ten whose reference another renderer
+    /// Scenes: names of shipped ones, `suite` for all 18, `all` for the ten whose reference another renderer
     /// made, or pairs SCENE.ron=REF.exr
     #[arg(long, value_delimiter = ',', default_value = "suite")]
     pub(crate) scenes: Vec<String>,
-    /// Sets of techniques, separated by semicolons; `auto` is the choice of the program, `everything` bpt+surf+pp3d+pb2d+bb1d
-    /// [default: auto, everything, and eight smaller ones]
+    /// Sets of techniques, separated by semicolons; `auto` is the choice of the program, `everything`
+    /// bpt+surf+pp3d+pb2d+bb1d [default: auto, everything, and eight smaller ones]
     #[arg(long, value_delimiter = ';')]
     sets: Vec<NamedSet>,
     /// Seeds; curves are geometric means over them [default: 1,2,3]

@@ -1,4 +1,4 @@
-//! What is rendered: a scene and its reference, with the noise of the latter.
+//! A scene and its reference, with the noise of the latter.
 
 use std::collections::HashSet;
 use std::error::Error;
@@ -25,11 +25,11 @@ pub(crate) struct Subject {
     pub(crate) scene: ReadyScene,
     pub(crate) reference: Image,
     pub(crate) floor: Floor,
-    /// All that was read for it.
+    /// Files that were read for the scene and the reference.
     pub(crate) files: Vec<PathBuf>,
 }
 
-/// Where a scene and its reference are.
+/// The files of a scene and of its reference.
 struct Files {
     name: String,
     scene: PathBuf,

@@ -1,13 +1,14 @@
 //! The verdict: how long the automatic choice takes to an error, beside every fixed choice.
 //!
-//! Each scene has a target of its own: the lowest relMSE that any fixed set has at [`TARGET_PART`] of the time of a line, the
-//! geometric mean over the seeds. That set is the best fixed one, with hindsight: no single choice is as good on all
-//! scenes, and the lowest of many noisy values is too low by some per cent, so that a ratio of 1 is more than can be
-//! asked for. The part is below 1 so that a set that is somewhat slower still gets there in time.
+//! Each scene has a target of its own: the lowest relMSE that any fixed set has at [`TARGET_PART`] of the
+//! time of a line, the geometric mean over the seeds. That set is the best fixed one, with hindsight: no
+//! single choice is as good on all scenes, and the lowest of many noisy values is too low by some per cent,
+//! so that a ratio of 1 is more than can be asked for. The part is below 1 so that a set that is somewhat
+//! slower still gets there in time.
 //!
-//! The time to the target is where the curve falls below it for good, so that a lucky start followed by a bright sample does
-//! not count. A curve that ends above is continued with relMSE ∝ 1/t. This is generous to a set that cannot find all the
-//! light, which would never get there.
+//! The time to the target is where the curve falls below it for good, so that a lucky start followed by a
+//! bright sample does not count. A curve that ends above is continued with relMSE ∝ 1/t. This is generous to
+//! a set that cannot find all the light, which would never get there.
 
 use std::fmt::Write as _;
 
@@ -51,7 +52,7 @@ impl Verdict {
         Some(self.time(set)?.seconds() / self.time(to)?.seconds())
     }
 
-    /// What the choice of the program lost to the best fixed one.
+    /// Time of the choice of the program over that of the best fixed set.
     fn loss(&self) -> Option<f64> {
         self.ratio(AUTO, &self.best)
     }

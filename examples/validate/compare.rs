@@ -1,7 +1,7 @@
 //! A render against a reference image: whole picture, tiles, pixels, in standard errors.
 //!
-//! Errors of a render come from the spread of its iterations, which are independent; pixels of one iteration are
-//! not, since they share light sub-paths.
+//! Errors of a render come from the spread of its iterations, which are independent; pixels of one iteration
+//! are not, since they share light sub-paths.
 
 use std::path::Path;
 
@@ -83,8 +83,9 @@ impl Estimate {
     /// Difference to an independent estimate in standard errors.
     pub(crate) fn sigmas(&self, other: &Self) -> f64 {
         let difference = self.mean - other.mean;
-        // What was the same in every iteration, such as an environment that is seen directly, is exact only up to
-        // rounding and to what is too rare to have happened, such as the corner of a body in the corner of a pixel.
+        // What was the same in every iteration, such as an environment that is seen directly, is exact only
+        // up to rounding and to what is too rare to have happened, such as the corner of a body in the corner
+        // of a pixel.
         let unseen = 1e-4 * other.mean.abs();
         difference / self.error.max(unseen).hypot(other.error).max(f64::MIN_POSITIVE)
     }
@@ -103,8 +104,8 @@ impl std::ops::Sub for Estimate {
     }
 }
 
-/// Means over tiles of [`TILE`] pixels, row by row. The last of them are the mean of the whole picture, so that it is
-/// gathered in the same way.
+/// Means over tiles of [`TILE`] pixels, row by row. The last is the mean of the whole picture, gathered in
+/// the same way.
 fn tiles(image: &Image) -> Vec<[f64; 3]> {
     let (width, height) = (image.width as usize, image.height as usize);
     let (across, down) = (width / TILE, height / TILE);
@@ -167,7 +168,7 @@ pub(crate) struct Comparison {
     pub(crate) mean: [Estimate; 3],
     /// Its difference to the reference in standard errors.
     pub(crate) sigmas: [f64; 3],
-    /// The same in percent.
+    /// Difference of the means of the picture in percent.
     pub(crate) percent: [f64; 3],
     /// Mean square of the pixels' differences in standard errors, expected 1.
     pub(crate) chi_square: f64,

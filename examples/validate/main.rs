@@ -1,13 +1,14 @@
-//! Renders the reference scenes with many sets of techniques and compares them with images of an independent renderer.
+//! Renders the reference scenes with many sets of techniques and compares them with images of an independent
+//! renderer.
 //!
-//! `cargo run --release --example validate` takes the better part of an hour; `-- --quick` some minutes. Prints a table and
-//! ends with exit code 1 if a bar was missed.
+//! `cargo run --release --example validate` takes the better part of an hour; `-- --quick` some minutes.
+//! Prints a table and ends with exit code 1 if a bar was missed.
 //!
-//! Sets without merges are unbiased: mean of the picture, tiles and pixels must agree within the noise, and the noise of
-//! the mean must be low. With merges there is kernel bias, which the default settings must keep below 1 %. Merges alone
-//! (`hit` sees lights directly, merging at any vertex that is not specular covers the rest) are stated, and rendered
-//! once more with fixed radii r, r/2, r/4: where kernels lie inside of their medium bias falls like r², what sticks out
-//! of it is a loss that falls like r.
+//! Sets without merges are unbiased: mean of the picture, tiles and pixels must agree within the noise, and
+//! the noise of the mean must be low. With merges there is kernel bias, which the default settings must keep
+//! below 1 %. Merges alone (`hit` sees lights directly, merging at any vertex that is not specular covers the
+//! rest) are stated, and rendered once more with fixed radii r, r/2, r/4: where kernels lie inside of their
+//! medium bias falls like r², what sticks out of it is a loss that falls like r.
 
 mod compare;
 #[path = "../support/scenes.rs"]
@@ -40,7 +41,8 @@ const SETS: [&str; 8] = [
     "hit+surf+bb1d",
 ];
 
-/// Scenes for the exponents: no specular surfaces, so that `hit` is needed for nothing but the lights themselves.
+/// Scenes for the exponents: no specular surfaces, so that `hit` is needed for nothing but the lights
+/// themselves.
 const EXPONENT_SCENES: [&str; 1] = ["fog_cornell"];
 
 /// Largest of the three radii, relative to the scene.

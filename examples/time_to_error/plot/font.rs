@@ -8,7 +8,8 @@ const CAPITAL: f32 = 8.0;
 /// Space between letters, grid units.
 const SPACE: f32 = 1.7;
 
-/// The lines of a text with capitals of the given height, from the origin to the right, heights upwards; and its length.
+/// The lines of a text with capitals of the given height, from the origin to the right, heights upwards; and
+/// its length.
 pub(super) fn lines(text: &str, height: f32) -> (Vec<Vec<Point>>, f32) {
     let unit = height / (CAPITAL - BASE);
     let mut lines = Vec::new();
@@ -28,8 +29,8 @@ pub(super) fn lines(text: &str, height: f32) -> (Vec<Vec<Point>>, f32) {
     (lines, (left - SPACE).max(0.0) * unit)
 }
 
-/// A letter on a grid: lines between points of two digits, across and up. Most capitals look like small letters; a box
-/// is what has no picture.
+/// A letter on a grid: lines between points of two digits, across and up. Most capitals look like small
+/// letters; a box is what has no picture.
 fn glyph(letter: char) -> &'static str {
     match letter {
         ' ' => "12",

@@ -15,7 +15,7 @@ type Colour = [u8; 3];
 /// A place, units from the top left corner.
 type Point = [f32; 2];
 
-/// Where a text has its place.
+/// The end of a text that is at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Anchor {
     Start,

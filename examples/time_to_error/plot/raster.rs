@@ -7,7 +7,7 @@ use super::{Anchor, Colour, Drawing, INK, LETTER, Point, Shape, font};
 /// A line of a letter relative to its height.
 const PEN: f32 = 0.13;
 
-/// An image of the drawing on white, so many pixels per unit.
+/// An image of the drawing on white, `scale` pixels per unit.
 pub(crate) fn rasterise(drawing: &Drawing, scale: f32) -> Image {
     let (width, height) = ((drawing.width * scale) as u32, (drawing.height * scale) as u32);
     let pixels = vec![[1.0; 3]; width as usize * height as usize];
