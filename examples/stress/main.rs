@@ -3,9 +3,7 @@
 //! `cargo run --release --example stress` takes minutes on two cores; `-- --filter transform` runs the
 //! cases whose line contains the words. Ends with exit code 1 if any case failed.
 
-#[path = "../../tests/stress/mod.rs"]
-mod stress;
-#[path = "../../tests/support/mod.rs"]
+#[path = "../../tests/it/support/mod.rs"]
 mod support;
 #[path = "../support/threads.rs"]
 mod threads;
@@ -19,8 +17,8 @@ use std::time::Instant;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use stress::execute::in_parallel;
-use stress::grid::{Case, all};
+use support::stress::execute::in_parallel;
+use support::stress::grid::{Case, all};
 
 /// Renders scenes at the ends of what a description can say.
 #[derive(Debug, Parser)]

@@ -2,7 +2,7 @@
 
 #![no_main]
 
-#[path = "../../tests/support/readers.rs"]
+#[path = "../../tests/it/support/readers.rs"]
 mod readers;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

@@ -1,0 +1,276 @@
+//! Shapes by themselves: validation, area sampling, inside and outside, leaving a surface.
+
+use crate::support::Random;
+use glam::Vec3;
+use upbp_accel::{
+    AxisBox, GeometryError, Quad, Ray, SceneGeometry, Shape, Sphere, TriangleMesh, Visit, offset_origin,
+};
+
+fn cube_mesh(min: Vec3, max: Vec3) -> TriangleMesh {
+    let corner = |i: u32| {
+        let pick = |bit: u32, low: f32, high: f32| if i >> bit & 1 == 0 { low } else { high };
+        Vec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
+    };
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriangleMesh::new((0..8).map(corner).collect(), triangles, None).unwrap()
+}
+
+fn every_kind(scale: f32, offset: Vec3) -> Vec<Shape> {
+    let (u, v) = (Vec3::new(1.0, 0.5, -0.2), Vec3::new(-0.3, 1.0, 0.7));
+    vec![
+        Sphere::new(offset, scale).unwrap().into(),
+        AxisBox::new(offset - scale, offset + Vec3::new(0.5, 1.0, 2.0) * scale).unwrap().into(),
+        Quad::new(offset - (u + v) * 0.5 * scale, u * scale, v * scale).unwrap().into(),
+        cube_mesh(offset - scale, offset + scale).into(),
+        TriangleMesh::new(
+            vec![offset - u * scale, offset + v * scale, offset + (u - v) * scale],
+            vec![[0, 1, 2]],
+            None,
+        )
+        .unwrap()
+        .into(),
+    ]
+}
+
+#[test]
+fn bad_input_is_refused_with_its_place() {
+    let nan = f32::NAN;
+    assert!(matches!(Sphere::new(Vec3::NAN, 1.0), Err(GeometryError::NonFinite { .. })));
+    assert!(matches!(Sphere::new(Vec3::ZERO, nan), Err(GeometryError::NonFinite { .. })));
+    assert!(matches!(Sphere::new(Vec3::ZERO, 0.0), Err(GeometryError::Degenerate { .. })));
+    assert!(matches!(Sphere::new(Vec3::ZERO, -1.0), Err(GeometryError::Degenerate { .. })));
+    assert!(matches!(
+        AxisBox::new(Vec3::ZERO, Vec3::new(1.0, 0.0, 1.0)),
+        Err(GeometryError::Degenerate { .. })
+    ));
+    assert!(matches!(AxisBox::new(Vec3::ZERO, Vec3::INFINITY), Err(GeometryError::NonFinite { .. })));
+    assert!(matches!(Quad::new(Vec3::ZERO, Vec3::X, Vec3::X * 2.0), Err(GeometryError::Degenerate { .. })));
+    assert!(matches!(Quad::new(Vec3::ZERO, Vec3::X, Vec3::ZERO), Err(GeometryError::Degenerate { .. })));
+    assert!(Quad::new(Vec3::ZERO, Vec3::X * 1e-30, Vec3::Y * 1e-30).is_ok());
+
+    let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X * 2.0];
+    let mesh = |positions: &[Vec3], triangles: &[[u32; 3]], normals: Option<Vec<Vec3>>| {
+        TriangleMesh::new(positions.to_vec(), triangles.to_vec(), normals)
+    };
+    assert_eq!(
+        mesh(&corners, &[[0, 1, 2], [0, 9, 1]], None).unwrap_err(),
+        GeometryError::IndexOutOfRange { triangle: 1, vertex: 9, vertices: 4 }
+    );
+    assert_eq!(
+        mesh(&[Vec3::ZERO, Vec3::NAN], &[], None).unwrap_err(),
+        GeometryError::NonFiniteElement { what: "position", index: 1 }
+    );
+    assert_eq!(
+        mesh(&corners, &[[0, 1, 2]], Some(vec![Vec3::Z])).unwrap_err(),
+        GeometryError::NormalCount { positions: 4, normals: 1 }
+    );
+    let normals = Some(vec![Vec3::Z, Vec3::Z, Vec3::INFINITY, Vec3::Z]);
+    assert_eq!(
+        mesh(&corners, &[[0, 1, 2]], normals).unwrap_err(),
+        GeometryError::NonFiniteElement { what: "normal", index: 2 }
+    );
+    assert!(matches!(mesh(&corners, &[[0, 1, 3]], None), Err(GeometryError::Degenerate { .. })));
+    assert!(matches!(mesh(&corners, &[], None), Err(GeometryError::Degenerate { .. })));
+    let partly = mesh(&corners, &[[0, 1, 3], [0, 1, 2], [2, 2, 1]], None).unwrap();
+    assert_eq!((partly.triangles(), partly.dropped_triangles()), (&[[0, 1, 2]][..], 2));
+}
+
+#[test]
+fn areas_and_bounds_are_right() {
+    let scale = 2.0;
+    let areas: Vec<f32> = every_kind(scale, Vec3::ONE).iter().map(Shape::area).collect();
+    let quad = Vec3::new(1.0, 0.5, -0.2).cross(Vec3::new(-0.3, 1.0, 0.7)).length() * 4.0;
+    for (area, expected) in areas.iter().zip([50.265_484, 2.0 * (24.0 + 12.0 + 18.0), quad, 96.0, 1.5 * quad])
+    {
+        assert!((area / expected - 1.0).abs() < 1e-5, "{area} instead of {expected}");
+    }
+    let bounds: Vec<f32> = every_kind(scale, Vec3::ONE).iter().map(Shape::volume_bound).collect();
+    for (bound, expected) in bounds.iter().zip([33.510_323, 72.0, 0.0, 64.0, 0.0]) {
+        assert!((bound - expected).abs() < 1e-4, "{bound} instead of {expected}");
+    }
+    assert!((cube_mesh(Vec3::splat(9.0), Vec3::splat(11.0)).signed_volume() - 8.0).abs() < 1e-5);
+}
+
+#[test]
+fn area_samples_are_uniform() {
+    let count = 40_000;
+    let mut random = Random::new(21);
+    for shape in every_kind(1.0, Vec3::new(3.0, -2.0, 1.0)) {
+        let scene = SceneGeometry::build(vec![shape.clone()]).unwrap();
+        let (min, max) = shape.aabb();
+        // The true mean of position and normal from a fine grid, with the jittered one against it.
+        let side = 500_u16;
+        let grid = (0..side).flat_map(|i| (0..side).map(move |j| (i, j)));
+        let centre = |i: u16| (f32::from(i) + 0.5) / f32::from(side);
+        let mean =
+            grid.map(|(i, j)| shape.sample_area([centre(i), centre(j)]).0.as_dvec3()).sum::<glam::DVec3>()
+                / f64::from(side).powi(2);
+        let mut sum = glam::DVec3::ZERO;
+        for _ in 0..count {
+            let (position, normal) = shape.sample_area(random.square());
+            sum += position.as_dvec3();
+            assert!((normal.length() - 1.0).abs() < 1e-5);
+            // A ray straight at the sample meets the surface there.
+            let ray = Ray::new(position + normal, -normal).with_range(0.99, 1.01);
+            assert!(
+                scene.closest(ray).is_some_and(|hit| (hit.t - 1.0).abs() < 1e-5) || {
+                    let outside = |p: Vec3| p.cmplt(min).any() || p.cmpgt(max).any();
+                    outside(position + normal * 1e-3) || !shape.is_closed()
+                }
+            );
+        }
+        let sigma = f64::from((max - min).length()) / (f64::from(count) * 12.0).sqrt();
+        assert!((sum / f64::from(count) - mean).length() < 5.0 * sigma, "{shape:?}");
+    }
+
+    // Against exact moments, which do not come from the sampler: E[z²] on a unit sphere is 1/3, and a
+    // box's share of samples per face is its share of the area.
+    let sphere = Sphere::new(Vec3::ZERO, 1.0).unwrap();
+    let block = AxisBox::new(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)).unwrap();
+    let cube = cube_mesh(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0));
+    let (mut z2, mut faces) = (0.0_f64, [[0.0_f64; 3]; 2]);
+    for _ in 0..count {
+        let u = random.square();
+        z2 += f64::from(sphere.sample_area(u).0.z).powi(2);
+        for (kind, normal) in [block.sample_area(u).1, cube.sample_area(u).1].into_iter().enumerate() {
+            faces[kind][normal.abs().max_position()] += 1.0;
+        }
+    }
+    assert!((z2 / f64::from(count) - 1.0 / 3.0).abs() < 5.0 * 0.3 / f64::from(count).sqrt());
+    for shares in faces {
+        for (share, area) in shares.iter().zip([6.0, 3.0, 2.0]) {
+            assert!((share / f64::from(count) - area / 11.0).abs() < 5.0 * 0.5 / f64::from(count).sqrt());
+        }
+    }
+    // Extremes of the random numbers stay on the surface.
+    let top = 1.0_f32.next_down();
+    for shape in every_kind(1.0, Vec3::ZERO) {
+        for u in [[0.0, 0.0], [top, top], [0.0, top], [top, 0.0]] {
+            let (position, normal) = shape.sample_area(u);
+            let (min, max) = shape.aabb();
+            assert!(position.cmpge(min - 1e-6).all() && position.cmple(max + 1e-6).all());
+            assert!((normal.length() - 1.0).abs() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn inside_and_outside_are_told_apart() {
+    let mut random = Random::new(22);
+    for (scale, offset) in [(1e-6, Vec3::ZERO), (1.0, Vec3::ZERO), (1e6, Vec3::ZERO), (1.0, Vec3::splat(1e4))]
+    {
+        let cube = cube_mesh(offset - scale, offset + scale);
+        let block = AxisBox::new(offset - scale, offset + scale).unwrap();
+        assert_eq!(cube.aabb(), block.aabb());
+        for _ in 0..2000 {
+            let point = offset + random.cube() * 1.5 * scale;
+            let (min, max) = block.aabb();
+            if point.cmpeq(min).any() || point.cmpeq(max).any() {
+                continue;
+            }
+            assert_eq!(cube.contains(point), Some(block.contains(point)), "{point} at {scale} {offset}");
+        }
+        // Straight through corners and along diagonals of the faces.
+        for point in [Vec3::ZERO, Vec3::splat(0.5), Vec3::new(0.5, 0.5, -0.5)] {
+            assert_eq!(cube.contains(offset + point * scale), Some(true));
+        }
+        let sphere = Sphere::new(offset, scale).unwrap();
+        assert!(sphere.contains(offset) && !sphere.contains(offset + Vec3::splat(0.6) * scale));
+    }
+    for shape in every_kind(1.0, Vec3::ZERO) {
+        assert_eq!(shape.contains(Vec3::splat(0.1)).is_some(), shape.is_closed());
+    }
+}
+
+#[test]
+fn only_meshes_without_a_border_are_closed() {
+    let cube = cube_mesh(Vec3::ZERO, Vec3::ONE);
+    let (positions, triangles) = (cube.positions().to_vec(), cube.triangles().to_vec());
+    assert!(cube.is_closed());
+    let closed = |triangles: &[[u32; 3]]| {
+        TriangleMesh::new(positions.clone(), triangles.to_vec(), None).unwrap().is_closed()
+    };
+    assert!(!closed(&triangles[1..]), "a hole");
+    assert!(!closed(&[&triangles[..], &triangles[..1]].concat()), "a doubled triangle");
+    assert!(!closed(&[&triangles[..], &triangles[..]].concat()), "a doubled cube");
+    let mut flipped = triangles.clone();
+    flipped[3].swap(0, 1);
+    assert!(!closed(&flipped), "a triangle wound the other way");
+
+    // Own vertices for every triangle, as files with flat normals have.
+    let separate = triangles.iter().flatten().map(|&vertex| positions[vertex as usize]).collect();
+    let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    assert!(TriangleMesh::new(separate, indices, None).unwrap().is_closed());
+}
+
+#[test]
+fn shading_normals_are_interpolated_on_the_side_of_the_surface() {
+    let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+    let normals = vec![Vec3::Z, Vec3::new(1.0, 0.0, 1.0), -Vec3::new(0.0, 1.0, 1.0)];
+    let mesh = TriangleMesh::new(corners, vec![[0, 1, 2]], Some(normals)).unwrap();
+    let scene = SceneGeometry::build(vec![mesh.into()]).unwrap();
+    let shade = |x: f32, y: f32| {
+        let ray = Ray::new(Vec3::new(x, y, 1.0), -Vec3::Z);
+        scene.surface(&ray, &scene.closest(ray).unwrap())
+    };
+    let point = shade(0.5, 0.01);
+    assert_eq!(point.geometric_normal, Vec3::Z);
+    assert!(point.shading_normal.dot(Vec3::new(0.5, 0.0, 1.0).normalize()) > 0.99);
+    assert!(shade(0.05, 0.9).shading_normal.z > 0.0);
+}
+
+#[test]
+fn a_ray_that_leaves_a_surface_does_not_meet_it_again() {
+    let mut random = Random::new(23);
+    let (mut lost, mut total) = (0, 0);
+    for scale in [1e-6, 1e-3, 1.0, 1e6] {
+        for place in [
+            Vec3::ZERO,
+            // The scene's origin close to the surface.
+            Vec3::new(1.0, 0.0, 0.0),
+            Vec3::new(-1.0, 1.0, 1.0 + 1e-6),
+            Vec3::new(10.0, -3.0, 7.0),
+            Vec3::new(-1e3, 2e3, 5e3),
+        ] {
+            for shape in every_kind(scale, place * scale) {
+                let scene = SceneGeometry::build(vec![shape.clone()]).unwrap();
+                for _ in 0..500 {
+                    let target = shape.sample_area(random.square()).0;
+                    let origin = target + random.direction() * scale * 10_f32.powf(random.unit() * 3.0 - 1.0);
+                    let Some(towards) = (target - origin).try_normalize() else { continue };
+                    let ray = Ray::new(origin, towards);
+                    let Some(hit) = scene.closest(ray) else { continue };
+                    let point = scene.surface(&ray, &hit);
+                    let normal = point.geometric_normal;
+                    for _ in 0..8 {
+                        // Grazing directions are the hard ones.
+                        let sideways = random.direction();
+                        let direction = match random.below(3) {
+                            0 => sideways,
+                            1 => (sideways.reject_from(normal).normalize_or(Vec3::X) + normal * 1e-3)
+                                .normalize(),
+                            _ => (sideways.reject_from(normal).normalize_or(Vec3::X) - normal * 1e-3)
+                                .normalize(),
+                        };
+                        let leaving = direction.dot(normal) > 0.0;
+                        let start = offset_origin(point.position, normal, direction);
+                        assert!((start - point.position).length() <= 1e-5 * point.position.length() + 1e-30);
+                        let mut again = 0;
+                        scene.for_each_hit(Ray::new(start, direction), |_| {
+                            again += 1;
+                            Visit::Continue
+                        });
+                        // Outwards nothing; inwards the far side of what is closed, once, unless the point
+                        // rounds to an edge.
+                        let expected = usize::from(shape.is_closed() && !leaving);
+                        assert!(again <= expected, "{shape:?} from {} along {direction}", point.position);
+                        lost += expected - again;
+                        total += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(total > 100_000 && lost * 10_000 < total, "{lost} of {total}");
+}

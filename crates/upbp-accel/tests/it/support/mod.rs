@@ -1,0 +1,99 @@
+//! Random input and hard cases that the tests of this crate share.
+
+use glam::Vec3;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+
+/// Uniform numbers from a fixed seed.
+pub(crate) struct Random(Xoshiro256PlusPlus);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(Xoshiro256PlusPlus::seed_from_u64(seed))
+    }
+
+    /// Uniform in `[0, 1)`.
+    pub(crate) fn unit(&mut self) -> f32 {
+        (self.0.next_u64() >> 40) as f32 / (1_u64 << 24) as f32
+    }
+
+    /// Uniform in `[0, 1)²`.
+    pub(crate) fn square(&mut self) -> [f32; 2] {
+        [self.unit(), self.unit()]
+    }
+
+    /// Uniform in `[−1, 1)³`.
+    pub(crate) fn cube(&mut self) -> Vec3 {
+        Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
+    }
+
+    /// Uniform on the unit sphere.
+    pub(crate) fn direction(&mut self) -> Vec3 {
+        loop {
+            let point = self.cube();
+            if (1e-4..1.0).contains(&point.length_squared()) {
+                return point.normalize();
+            }
+        }
+    }
+
+    /// Uniform below `count`.
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        (self.next_u64() % count as u64) as usize
+    }
+
+    pub(crate) fn next_u64(&mut self) -> u64 {
+        self.0.next_u64()
+    }
+}
+
+/// How positions are spread.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Spread {
+    Uniform,
+    Clustered,
+    Coincident,
+    Collinear,
+    Grid,
+}
+
+pub(crate) const SPREADS: [Spread; 5] =
+    [Spread::Uniform, Spread::Clustered, Spread::Coincident, Spread::Collinear, Spread::Grid];
+
+/// Positions of a spread in about `[−1, 1]³`, scaled and moved.
+pub(crate) fn positions(
+    spread: Spread,
+    count: usize,
+    scale: f32,
+    offset: Vec3,
+    random: &mut Random,
+) -> Vec<Vec3> {
+    let centre = random.cube() * 0.5;
+    let along = random.direction();
+    (0..count)
+        .map(|_| {
+            let local = match spread {
+                Spread::Uniform => random.cube(),
+                Spread::Clustered => centre + random.cube() * random.unit().powi(6),
+                Spread::Coincident => centre,
+                Spread::Collinear => centre + along * (random.unit() - 0.5),
+                Spread::Grid => (random.cube() * 4.0).floor() / 4.0,
+            };
+            offset + local * scale
+        })
+        .collect()
+}
+
+/// Directions of all kinds: along the axes with zeros of both signs, in a plane, any.
+pub(crate) fn any_direction(random: &mut Random) -> Vec3 {
+    let axes = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
+    match random.below(4) {
+        0 => axes[random.below(6)],
+        1 => {
+            let mut direction = random.direction();
+            direction[random.below(3)] = if random.unit() < 0.5 { 0.0 } else { -0.0 };
+            direction.normalize()
+        }
+        _ => random.direction(),
+    }
+}

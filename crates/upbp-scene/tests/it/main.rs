@@ -1,0 +1,6 @@
+//! Scenes from files: what is refused, what ships, and what the checkers say.
+
+mod checkers;
+mod errors;
+mod shipped_scenes;
+mod vessels;

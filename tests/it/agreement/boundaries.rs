@@ -1,0 +1,150 @@
+//! Starts of rays on, or within rounding of, the boundary of a body.
+
+use crate::support::{assert_same, render, render_channels};
+use upbp_core::Settings;
+use upbp_core::check::check_scene;
+use upbp_scene::ReadyScene;
+
+fn scene(text: &str) -> ReadyScene {
+    match ReadyScene::from_ron_str(text, "") {
+        Ok(scene) => scene,
+        Err(error) => panic!("{error}\n{text}"),
+    }
+}
+
+fn settings(techniques: &str) -> Settings {
+    Settings { techniques: techniques.parse().expect("technique names"), ..Settings::default() }
+}
+
+/// A glowing cube of side 2 that a narrow camera looks into from `(0, 0, z)`.
+fn glow(z: f32) -> f64 {
+    let scene = scene(&format!(
+        "(version: 1, camera: Perspective(origin: (0.0, 0.0, {z:?}), target: (0.0, 0.0, {:?}), fov_degrees: 0.01),
+        film: (width: 4, height: 4), media: {{\"m\": Homogeneous(sigma_a: 0.5, emission: 1.0)}}, materials: {{\"null\": Null}},
+        shapes: [(geometry: Box(min: (-1, -1, -1), max: (1, 1, 1)), material: \"null\", interior: \"m\")])",
+        z - 1.0
+    ));
+    render(&scene, &settings("hit"), 2).0.mean
+}
+
+#[test]
+fn a_camera_on_a_boundary_looks_into_the_body() {
+    let through = 1.0 - (-1.0_f64).exp();
+    for z in [3.0, 1.0_f32.next_up(), 1.0, 1.0_f32.next_down()] {
+        assert!((glow(z) - through).abs() < 1e-5, "z = {z}: {} instead of {through}", glow(z));
+    }
+    // On the far side, looking away from it.
+    assert_eq!(glow(-1.0), 0.0);
+}
+
+#[test]
+fn a_camera_on_a_boundary_is_inside_even_if_no_ray_gets_out() {
+    let mean = |z: f32| {
+        let scene = scene(&format!(
+            "(version: 1, camera: Perspective(origin: (0.0, 0.0, {z:?}), target: (0.0, 0.0, {:?}), fov_degrees: 0.01),
+            film: (width: 4, height: 4), media: {{\"m\": Homogeneous(sigma_a: 1.0)}},
+            materials: {{\"null\": Null, \"black\": Lambert(0.0)}},
+            shapes: [
+                (geometry: Box(min: (-1, -1, -1), max: (1, 1, 1)), material: \"null\", interior: \"m\"),
+                (geometry: Sphere(centre: (0, 0, 0), radius: 0.5), material: \"black\", emission: 1.0),
+            ])",
+            z - 1.0
+        ));
+        render(&scene, &settings("hit"), 2).0.mean
+    };
+    for z in [3.0, 1.0_f32.next_up(), 1.0, 1.0_f32.next_down()] {
+        assert!((mean(z) - (-0.5_f64).exp()).abs() < 1e-5, "z = {z}: {}", mean(z));
+    }
+}
+
+#[test]
+fn no_walk_is_lost_where_free_paths_are_as_short_as_roundings() {
+    let scene = scene(
+        "(version: 1, camera: Perspective(origin: (0, 0, 3), target: (0, 0, 0), fov_degrees: 40),
+        film: (width: 16, height: 16), media: {\"m\": Homogeneous(sigma_s: 5e5)}, materials: {\"null\": Null},
+        shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"m\")],
+        lights: [Constant(1)])",
+    );
+    let settings = Settings { max_length: 200, ..settings("hit") };
+    let mut renderer = scene.renderer(settings.validate().expect("valid settings")).expect("a scene");
+    for _ in 0..16 {
+        renderer.iterate();
+    }
+    let counters = renderer.report().counters;
+    assert_eq!(counters.lost_walks, 0);
+    // Nothing absorbs: whoever is not cut sees the light.
+    let [mean, ..] = renderer.film().image().mean();
+    let cut = counters.cut_walks as f64 / (16.0 * 256.0);
+    assert!((mean + cut - 1.0).abs() < 1e-5, "{mean} + {cut}");
+}
+
+#[test]
+fn kernels_wider_than_a_free_path_do_not_darken_a_boundary() {
+    let scene = scene(
+        "(version: 1, camera: Perspective(origin: (0, 0, 3), target: (0, 0, 0), fov_degrees: 30),
+        film: (width: 12, height: 12), media: {\"m\": Homogeneous(sigma_a: 5e4, sigma_s: 4.5e5)}, materials: {\"null\": Null},
+        shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"m\")],
+        lights: [Constant(1)])",
+    );
+    let (expected, _) = render(&scene, &settings("hit"), 64);
+    let (found, _) = render(&scene, &settings("all"), 16);
+    let slack = 5.0 * found.error.hypot(expected.error) + 0.005;
+    assert!((found.mean - expected.mean).abs() < slack, "{found:?} {expected:?}");
+}
+
+/// Balls in balls, of radius 1 and less, each of the next of `media` names.
+fn nested(count: u32, media: &str, name: impl Fn(u32) -> String, fov: f32) -> ReadyScene {
+    let shapes: Vec<String> = (0..count)
+        .map(|i| {
+            let radius = 1.0 - 0.9 * f64::from(i) / f64::from(count);
+            let name = name(i);
+            format!("(geometry: Sphere(centre: (0, 0, 0), radius: {radius:?}), material: \"null\", interior: \"{name}\"),")
+        })
+        .collect();
+    let shapes = shapes.concat();
+    scene(&format!(
+        "(version: 1, camera: Perspective(origin: (0, 0, 3), target: (0, 0, 0), fov_degrees: {fov:?}),
+        film: (width: 8, height: 8), media: {{{media}}}, materials: {{\"null\": Null}}, shapes: [{shapes}],
+        lights: [Constant(1), Point(position: (0.2, 0.3, 0.1), intensity: 1)])"
+    ))
+}
+
+#[test]
+fn light_crosses_any_number_of_nested_bodies() {
+    for count in [6_u32, 7, 8, 9, 40] {
+        let sigma = |i: u32| 0.02 * f64::from(i % 5 + 1);
+        let media: Vec<String> =
+            (0..count).map(|i| format!("\"{i}\": Homogeneous(sigma_a: {:?}),", sigma(i))).collect();
+        let balls = nested(count, &media.concat(), |i| i.to_string(), 0.001);
+        check_scene(&balls).expect("a scene that keeps its contract");
+        let (found, _) = render(&balls, &settings("hit"), 2);
+        // Each ball ends 0.9/count before the next, on both sides; the last has a radius of its own.
+        let shell = |i: u32| {
+            if i + 1 < count { 0.9 / f64::from(count) } else { 1.0 - 0.9 * f64::from(i) / f64::from(count) }
+        };
+        let depth: f64 = (0..count).map(|i| 2.0 * sigma(i) * shell(i)).sum();
+        assert!(
+            (found.mean - (-depth).exp()).abs() < 1e-5,
+            "{count}: {} instead of {}",
+            found.mean,
+            (-depth).exp()
+        );
+    }
+}
+
+#[test]
+fn nested_bodies_of_equal_media_are_as_one() {
+    let fog = "Homogeneous(sigma_a: (0.1, 0.2, 0.3), sigma_s: (2, 1, 0.5))";
+    let media = format!("\"even\": {fog}, \"odd\": {fog}");
+    let name = |i: u32| if i.is_multiple_of(2) { "even" } else { "odd" }.to_owned();
+    let expected = render_channels(&nested(1, &media, name, 40.0), &settings("bpt"), 300);
+    for count in [9, 40] {
+        let balls = nested(count, &media, name, 40.0);
+        let mut renderer =
+            balls.renderer(settings("bpt").validate().expect("valid settings")).expect("a scene");
+        renderer.iterate();
+        let counters = renderer.report().counters;
+        assert_eq!((counters.lost_walks, counters.boundary_conflicts), (0, 0));
+        assert_same(render_channels(&balls, &settings("bpt"), 200), expected, &format!("{count} balls"));
+    }
+}

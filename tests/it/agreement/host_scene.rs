@@ -1,0 +1,90 @@
+//! The foreign scene of `examples/host_renderer`: every way to compute its picture gives the same picture.
+
+#[path = "../../../examples/host_renderer/scene.rs"]
+mod scene;
+
+use std::ops::Range;
+
+use crate::support::{Estimate, render, render_by};
+use upbp_core::{Image, Radii, Radius, Renderer, Settings};
+
+fn settings(techniques: &str) -> Settings {
+    let radius = Radius::Absolute(0.01);
+    Settings {
+        techniques: techniques.parse().expect("technique names"),
+        radii: Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius },
+        progressive: false,
+        min_length: 2,
+        light_paths: upbp_core::LightPaths::Count(2000),
+        beams: Some(100),
+        ..Settings::default()
+    }
+}
+
+fn render_room(room: &scene::Room, settings: &Settings, iterations: u64) -> (Estimate, Image) {
+    let checked = settings.clone().validate().expect("valid settings");
+    render_by(Renderer::new(room, checked).expect("a renderer"), iterations)
+}
+
+#[test]
+fn all_subsets_agree() {
+    let room = scene::Room::new(24).expect("valid coefficients");
+    let (reference, _) = render_room(&room, &settings("pt"), 400);
+    let mut worst = 0.0_f64;
+    for techniques in [
+        "hit+nee",
+        "hit",
+        "hit+nee+lt",
+        "bpt",
+        "bpt+surf",
+        "bpt+pp3d",
+        "bpt+pb2d",
+        "bpt+bp2d",
+        "bpt+bb1d",
+        "all",
+    ] {
+        let (estimate, _) = render_room(&room, &settings(techniques), 100);
+        let sigmas = estimate.sigmas(&reference);
+        println!("{techniques:12} {:.5} ± {:.5}  {sigmas:+.2} sigma", estimate.mean, estimate.error);
+        worst = worst.max(sigmas.abs());
+    }
+    assert!(worst < 4.0, "worst: {worst:.2} sigma");
+}
+
+#[test]
+fn any_number_of_threads_and_any_split_give_the_same_bits() {
+    let room = scene::Room::new(12).expect("valid coefficients");
+    let part = |threads, range: Range<u64>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
+        pool.install(|| {
+            let checked = settings("all").validate().expect("valid settings");
+            let mut renderer = Renderer::new(&room, checked).expect("a renderer");
+            renderer.set_range(range);
+            while renderer.iterate() {}
+            renderer.state().clone()
+        })
+    };
+    let whole = part(1, 0..4);
+    assert!(part(4, 0..4).film() == whole.film());
+    let mut merged = part(2, 1..4);
+    merged.merge(part(3, 0..1)).expect("disjoint slices");
+    assert!(merged.film() == whole.film());
+}
+
+#[test]
+fn the_ready_made_scene_looks_the_same() {
+    let room = scene::Room::new(24).expect("valid coefficients");
+    let ready_made = crate::support::room(24);
+    for techniques in ["bpt", "bpt+surf+pp3d+pb2d+bb1d"] {
+        let (theirs, their_image) = render_room(&room, &settings(techniques), 150);
+        let (ours, our_image) = render(&ready_made, &settings(techniques), 150);
+        let sigmas = theirs.sigmas(&ours);
+        let difference = their_image.relative_mse(&our_image);
+        println!(
+            "{techniques}: {theirs:?} {ours:?} {sigmas:+.2} sigma, relMSE between them {difference:.2e}"
+        );
+        assert!(sigmas.abs() < 4.0, "{techniques}: {theirs:?} against {ours:?}");
+        // Two independent images with a relMSE of about 3e-3 each: a shifted or mirrored one is far beyond.
+        assert!(difference < 2e-2, "{techniques}: {difference}");
+    }
+}

@@ -1,0 +1,11 @@
+//! Different ways to compute a picture give the same picture.
+
+mod boundaries;
+mod channels;
+mod far_away;
+mod host_scene;
+mod rebuild;
+mod roulette;
+mod subsets;
+mod traced_weights;
+mod unbounded;

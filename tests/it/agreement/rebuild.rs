@@ -1,0 +1,316 @@
+//! A whole path from its vertices alone: every density of both walks, computed anew in double precision.
+
+use std::f64::consts::FRAC_1_PI;
+
+use glam::{DVec3, Vec3};
+use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
+use upbp_estimators::observer::LightEnd;
+use upbp_estimators::scene::Scene;
+use upbp_estimators::{Interior, MediumId, Roulette};
+
+use crate::support::closed_form::fog::Fog;
+use crate::support::closed_form::light::Source;
+use crate::support::closed_form::material::Material;
+use crate::support::closed_form::scene::ClosedForm;
+
+/// Closer to a boundary or an end than this, double precision does not say on which side single precision
+/// was.
+const TINY: f64 = 3e-6;
+
+/// An interior vertex as it was observed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vertex {
+    /// Where the light sub-path has it.
+    pub(crate) light: DVec3,
+    /// Where the camera sub-path has it; differs from `light` at a merge.
+    pub(crate) camera: DVec3,
+    pub(crate) in_medium: bool,
+    /// Whether it scattered by a Dirac lobe.
+    pub(crate) delta: bool,
+}
+
+impl Vertex {
+    /// Whether rounding decides on which side of a boundary without a surface the vertex is.
+    fn is_at_boundary(&self, scene: &ClosedForm) -> bool {
+        let boundaries = scene.objects.iter().filter(|object| object.material.is_none());
+        boundaries
+            .flat_map(|object| [self.light, self.camera].map(|p| object.shape.distance(p)))
+            .any(|d| d < TINY)
+    }
+}
+
+/// A path as it was observed, from the light to the camera.
+#[derive(Clone, Debug)]
+pub(crate) struct Trace {
+    pub(crate) light: LightEnd,
+    pub(crate) interior: Vec<Vertex>,
+    pub(crate) lens: Vec3,
+}
+
+/// Why a path cannot be rebuilt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Doubt {
+    /// A vertex is within rounding of a boundary of media.
+    Boundary,
+    /// Two vertices are within rounding of each other.
+    Coincident,
+}
+
+/// Density of a walk's distances: probability to pass, and to stop at either end.
+struct Passed {
+    reach: f64,
+    stop_at_end: f64,
+    stop_at_start: f64,
+    first: Option<MediumId>,
+    last: Option<MediumId>,
+}
+
+/// The mixture of the channels over a stretch: probability to pass and density to stop.
+fn stretch(medium: &Fog, length: f64) -> (f64, f64) {
+    if medium.sigma_s == [0.0; 3] {
+        return (1.0, 0.0);
+    }
+    let mean = |f: &dyn Fn(f64) -> f64| -> f64 {
+        medium.extinction().into_iter().zip(Fog::ALPHA).map(|(sigma, alpha)| alpha * f(sigma)).sum()
+    };
+    (mean(&|s| (-s * length).exp()), mean(&|s| s * (-s * length).exp()))
+}
+
+/// What lies between two points: the media by containment at the middle of each stretch.
+fn pass(scene: &ClosedForm, from: DVec3, to: DVec3) -> Result<Passed, Doubt> {
+    let length = (to - from).length();
+    if length < TINY {
+        return Err(Doubt::Coincident);
+    }
+    let direction = (to - from) / length;
+    let mut borders = vec![0.0, length];
+    for object in scene.objects.iter().filter(|object| object.interior.is_some()) {
+        let roots = object.shape.roots(from, direction).into_iter().flatten();
+        borders.extend(roots.filter(|&t| t > TINY && t < length - TINY));
+    }
+    borders.sort_by(f64::total_cmp);
+    // Adjoining stretches of one medium are one: a boundary that changes nothing is none.
+    let mut stretches: Vec<(Option<MediumId>, f64)> = Vec::new();
+    for pair in borders.windows(2) {
+        let middle = from + direction * (0.5 * (pair[0] + pair[1]));
+        let medium = scene.body_at(middle).and_then(|body| body.medium);
+        match stretches.last_mut() {
+            Some((last, length)) if *last == medium => *length += pair[1] - pair[0],
+            _ => stretches.push((medium, pair[1] - pair[0])),
+        }
+    }
+    let of = |(medium, length): &(Option<MediumId>, f64)| {
+        medium.map_or((1.0, 0.0), |id| stretch(&scene.media[id.0 as usize], *length))
+    };
+    let reach = |stretches: &[_]| stretches.iter().map(|s| of(s).0).product::<f64>();
+    let (first, last) = (stretches[0], stretches[stretches.len() - 1]);
+    Ok(Passed {
+        reach: reach(&stretches),
+        stop_at_end: reach(&stretches[..stretches.len() - 1]) * of(&last).1,
+        stop_at_start: of(&first).1 * reach(&stretches[1..]),
+        first: first.0,
+        last: last.0,
+    })
+}
+
+fn henyey_greenstein(g: f64, cos: f64) -> f64 {
+    0.25 * FRAC_1_PI * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos).powf(1.5)
+}
+
+/// Densities of scattering from one direction to another and back, as the oracle wants them, for a walk that
+/// comes from the light's side.
+struct Scattering {
+    kind: VertexKind,
+    rho_light: f64,
+    rho_camera: f64,
+    cos_light: f64,
+    cos_camera: f64,
+    sin_theta: f64,
+}
+
+/// Index of refraction next to a surface, on the side of a direction.
+fn index_beside(scene: &ClosedForm, point: DVec3, normal: DVec3, direction: DVec3) -> f64 {
+    let beside = point + normal * (1e-4 * direction.dot(normal).signum());
+    scene.body_at(beside).map_or(1.0, |body: Interior| f64::from(body.ior))
+}
+
+fn at_surface(
+    scene: &ClosedForm,
+    roulette: Roulette,
+    vertex: &Vertex,
+    to_light: DVec3,
+    to_camera: DVec3,
+) -> Scattering {
+    let (object, distance) = scene.surface_at(vertex.camera);
+    assert!(distance < 2e-6, "{vertex:?} is {distance} off its surface");
+    let material = object.material.expect("a surface");
+    let normal = object.shape.normal(vertex.camera);
+    let shading = object.shading_normal(vertex.camera);
+    let (light, camera) = (to_light.dot(shading), to_camera.dot(shading));
+    let survival = |cos| if roulette.is_on() { Material::continuation(material, cos) } else { 1.0 };
+    let (rho_light, rho_camera) = if vertex.delta {
+        let reflects = light * camera > 0.0;
+        let index = |direction| index_beside(scene, vertex.camera, normal, direction);
+        let (eta_light, eta_camera) = (index(to_light), index(to_camera));
+        let (beyond_light, beyond_camera) =
+            if reflects { (index(-to_light), index(-to_camera)) } else { (eta_camera, eta_light) };
+        let from_light = material.dirac(light, reflects, eta_light, beyond_light);
+        let from_camera = material.dirac(camera, reflects, eta_camera, beyond_camera);
+        // (4.6), with the light walk's own probability as it is.
+        let widening = eta_light.powi(2) * light.abs() / (eta_camera.powi(2) * camera.abs());
+        (from_light, from_camera * if reflects { 1.0 } else { widening })
+    } else {
+        (Material::pdf(material, light, camera), Material::pdf(material, camera, light))
+    };
+    // The light walk arrives at its own end of a merge.
+    let (light_object, _) = scene.surface_at(vertex.light);
+    let arrival = light_object.shape.normal(vertex.light);
+    Scattering {
+        kind: if vertex.delta { VertexKind::Delta } else { VertexKind::Surface },
+        rho_light: rho_light * survival(light),
+        rho_camera: rho_camera * survival(camera),
+        cos_light: to_light.dot(arrival).abs(),
+        cos_camera: to_camera.dot(normal).abs(),
+        sin_theta: 0.0,
+    }
+}
+
+fn in_medium(
+    scene: &ClosedForm,
+    roulette: Roulette,
+    medium: MediumId,
+    to_light: DVec3,
+    to_camera: DVec3,
+) -> Scattering {
+    let fog = &scene.media[medium.0 as usize];
+    let survival = if roulette.is_on() { Fog::CONTINUATION } else { 1.0 };
+    let rho = henyey_greenstein(f64::from(fog.g), -to_light.dot(to_camera)) * survival;
+    Scattering {
+        kind: VertexKind::Medium(medium),
+        rho_light: rho,
+        rho_camera: rho,
+        cos_light: 1.0,
+        cos_camera: 1.0,
+        sin_theta: to_light.cross(to_camera).length(),
+    }
+}
+
+/// What rays start off their surfaces by, 32 roundings of coordinates up to 2.
+const OFFSET: f64 = 8e-6;
+
+impl Trace {
+    /// Number of edges.
+    pub(crate) fn length(&self) -> usize {
+        self.interior.len() + 1
+    }
+
+    /// By how much rounding may change a weight, relative: tried out, with every vertex moved along every axis by what rays
+    /// start off their surfaces by. Steep are refraction and cosines at grazing angles, short edges, beams that are
+    /// almost parallel, chords through bodies that are only just touched.
+    pub(crate) fn sensitivity(
+        &self,
+        scene: &ClosedForm,
+        roulette: Roulette,
+        weight: impl Fn(&Path) -> f64,
+        expected: f64,
+    ) -> f64 {
+        // Vertices may be off their surfaces by no more than rounding, so the step is smaller and the result scaled.
+        const STEP: f64 = 1e-6;
+        let mut sum = 0.0;
+        for i in 0..self.interior.len() {
+            for axis in DVec3::AXES {
+                let mut moved = self.clone();
+                moved.interior[i].light += STEP * axis;
+                moved.interior[i].camera += STEP * axis;
+                if let Ok(path) = moved.rebuild(scene, roulette) {
+                    sum += (weight(&path) / expected - 1.0).abs();
+                }
+            }
+        }
+        sum * OFFSET / STEP
+    }
+
+    /// The ends of the edges: edge i runs from the camera's side of vertex i to the light's side of vertex i + 1.
+    fn ends(&self, scene: &ClosedForm) -> Vec<(DVec3, DVec3)> {
+        let lens = self.lens.as_dvec3();
+        let light = &scene.lights[self.light.emitter.0 as usize];
+        let infinite = matches!(light.source, Source::Directional(_) | Source::Environment);
+        let receiver = self.interior.first().map_or(lens, |vertex| vertex.light);
+        let outwards = self.light.direction.as_dvec3();
+        let start = if infinite { receiver - 20.0 * outwards } else { self.light.point.position.as_dvec3() };
+        let starts = [start].into_iter().chain(self.interior.iter().map(|v| v.camera));
+        starts.zip(self.interior.iter().map(|v| v.light).chain([lens])).collect()
+    }
+
+    /// All densities of the path.
+    pub(crate) fn rebuild(&self, scene: &ClosedForm, roulette: Roulette) -> Result<Path, Doubt> {
+        let k = self.length();
+        let lens = self.lens.as_dvec3();
+        if self.interior.iter().any(|vertex| vertex.is_at_boundary(scene)) {
+            return Err(Doubt::Boundary);
+        }
+        let light = &scene.lights[self.light.emitter.0 as usize];
+        let infinite = matches!(light.source, Source::Directional(_) | Source::Environment);
+        let receiver = self.interior.first().map_or(lens, |vertex| vertex.light);
+        let outwards = self.light.direction.as_dvec3();
+        let (starts, ends): (Vec<DVec3>, Vec<DVec3>) = self.ends(scene).into_iter().unzip();
+        let start = starts[0];
+        let mut passed = Vec::with_capacity(k);
+        for (a, b) in starts.iter().zip(&ends) {
+            passed.push(pass(scene, *a, *b)?);
+        }
+        let direction = |i: usize| (ends[i] - starts[i]).normalize();
+
+        let shares: f64 = scene.lights.iter().map(|light| f64::from(light.power)).sum();
+        let probability = f64::from(light.power) / shares;
+        let cos = match light.source {
+            Source::Area(shape) => direction(0).dot(shape.normal(start)),
+            _ => 1.0,
+        };
+        let [pdf_position, pdf_direction] = light.source.pdf_emission(&scene.bounds(), cos);
+        let end = PathVertex {
+            kind: VertexKind::End,
+            rho_light: pdf_direction,
+            rho_camera: 0.0,
+            cos_light: 1.0,
+            cos_camera: cos,
+            sin_theta: 0.0,
+        };
+        let mut vertices = vec![end];
+        for (i, vertex) in self.interior.iter().enumerate() {
+            let (to_light, to_camera) = (-direction(i), direction(i + 1));
+            let scattering = if vertex.in_medium {
+                let (here, there) = (passed[i].last, passed[i + 1].first);
+                let Some(medium) = here.filter(|_| here == there) else { return Err(Doubt::Boundary) };
+                in_medium(scene, roulette, medium, to_light, to_camera)
+            } else {
+                at_surface(scene, roulette, vertex, to_light, to_camera)
+            };
+            let Scattering { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta } = scattering;
+            vertices.push(PathVertex { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta });
+        }
+        let cos = -direction(k - 1).dot(DVec3::NEG_Z);
+        let film = f64::from(scene.camera.film_distance);
+        vertices.push(PathVertex {
+            rho_light: 0.0,
+            rho_camera: (film / cos).powi(2) / cos,
+            cos_camera: 1.0,
+            ..end
+        });
+        let stops = |i: usize| i >= 1 && i < k && self.interior[i - 1].in_medium;
+        let edges = passed.iter().enumerate().map(|(i, passed)| PathEdge {
+            distance: if infinite && i == 0 { f64::INFINITY } else { (ends[i] - starts[i]).length() },
+            t_light: if stops(i + 1) { passed.stop_at_end } else { passed.reach },
+            t_camera: if stops(i) { passed.stop_at_start } else { passed.reach },
+            reach: passed.reach,
+        });
+        let incident = light.source.pdf_incident(start, outwards, receiver);
+        Ok(Path {
+            edges: edges.collect(),
+            vertices,
+            pdf_position: probability * pdf_position,
+            pdf_incident: probability * incident,
+            hittable: matches!(light.source, Source::Area(_) | Source::Environment),
+        })
+    }
+}

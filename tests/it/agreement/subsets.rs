@@ -1,0 +1,262 @@
+//! Every set of techniques that covers a scene renders the same picture (`docs/theory.md`, section 9, items 7
+//! and 8), in the scene with everything that weights and factors can go wrong on.
+//!
+//! Compared are means over the whole film, path by path: sums of thousands of pixels show a missing factor of
+//! a per cent, which single pixels hide in their noise.
+
+use std::num::NonZeroU32;
+
+use glam::Vec3;
+use upbp_estimators::mis::{BeamExtent, Densities, Heuristic, MergesApart};
+use upbp_estimators::observer::{Nobody, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::scene::Bsdf;
+use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
+use upbp_estimators::{
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Spectrum,
+    StreamKind, Technique, World,
+};
+
+use crate::support::closed_form::scene::ClosedForm;
+
+const SIZE: u32 = 48;
+
+const ITERATIONS: u64 = 60;
+
+fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> PlanChoices {
+    let radius = 0.02;
+    PlanChoices {
+        seed,
+        iteration: 0,
+        techniques: techniques.parse().expect("names"),
+        light_paths: SIZE * SIZE,
+        beam_paths: SIZE * SIZE / 2,
+        connections: 1.0,
+        next_events: 1.0,
+        look_ups: LookUps::ALL,
+        vertices_per_light_path: 2.3,
+        lengths,
+        roulette: Roulette::Below(0.6),
+        kernels: Kernels {
+            surf: Kernel::disc(radius),
+            pp3d: Kernel::ball(2.0 * radius),
+            pb2d: Kernel::parabolic_disc(radius),
+            bp2d: Kernel::parabolic_disc(radius),
+            bb1d: Kernel::parabolic_line(radius),
+        },
+        heuristic: Heuristic::Balance,
+        photon_beams: BeamExtent::Short,
+        query_beams: BeamExtent::Long,
+        damping: false,
+        correlation: None,
+    }
+}
+
+/// Mean of the film in one iteration.
+fn iteration(scene: &ClosedForm, choices: &PlanChoices) -> f64 {
+    if choices.correlation.is_some() {
+        iteration_with::<MergesApart>(scene, choices)
+    } else {
+        iteration_with::<f64>(scene, choices)
+    }
+}
+
+fn iteration_with<D: Densities>(scene: &ClosedForm, choices: &PlanChoices) -> f64 {
+    let world = World::new(scene).expect("the scene is in order");
+    let plan = Plan::new(scene, choices);
+    let context = Context { world: &world, plan: &plan };
+    let mut scratch = Scratch::default();
+    let mut chunk = LightChunk::default();
+    let nobody = &mut Nobody::<D>::default();
+    if plan.needs_light_paths() {
+        for index in 0..plan.light_paths {
+            trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, nobody);
+        }
+    }
+    let mut sum: f64 = chunk.splats.iter().map(|splat| f64::from(splat.value.mean())).sum();
+    let map = LightMap::build(&plan, chunk.vertices, chunk.beams);
+    let mut counters = Counters::default();
+    for index in 0..SIZE * SIZE {
+        let pixel = [index % SIZE, index / SIZE];
+        let kind = StreamKind::Camera;
+        let index = u64::from(index);
+        let walk = trace_camera_path(&context, &map, kind, pixel, index, &mut scratch, &mut counters, nobody);
+        sum += walk.layers.iter().map(|layer| f64::from(layer.mean())).sum::<f64>();
+    }
+    assert_eq!(counters.dropped, 0);
+    sum / f64::from(SIZE * SIZE)
+}
+
+/// Mean and standard error over the iterations.
+fn mean(scene: &ClosedForm, choices: &PlanChoices) -> (f64, f64) {
+    mean_of_blocks(scene, choices, 1)
+}
+
+/// Mean and standard error over blocks of so many iterations.
+fn mean_of_blocks(scene: &ClosedForm, choices: &PlanChoices, block: u64) -> (f64, f64) {
+    let one = |i| iteration(scene, &PlanChoices { iteration: i, ..choices.clone() });
+    let mean_of = |first: u64| (first..first + block).map(one).sum::<f64>() / block as f64;
+    let values: Vec<f64> = (0..ITERATIONS / block).map(|i| mean_of(block * i)).collect();
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// Compares sets of techniques with the first of them: within four standard errors and half a per cent, which
+/// is more than kernels of this size blur.
+fn agree(camera: Vec3, powers: [f32; 5], lengths: PathLengths, sets: &[&str]) {
+    let mut scene = ClosedForm::new(camera, SIZE);
+    for (light, power) in scene.lights.iter_mut().zip(powers) {
+        light.power = power;
+    }
+    // A light that is never chosen must not be hit either.
+    for object in &mut scene.objects {
+        object.emitter = object.emitter.filter(|emitter| powers[emitter.0 as usize] > 0.0);
+    }
+    let mut reference = None;
+    for (seed, techniques) in sets.iter().enumerate() {
+        let (mean, error) = mean(&scene, &choices(techniques, lengths, 100 + seed as u64));
+        let (expected, expected_error) = *reference.get_or_insert((mean, error));
+        let sigma = error.hypot(expected_error);
+        println!("{techniques:30} {mean:.5} ± {error:.5}, {:+.2} %", 100.0 * (mean / expected - 1.0));
+        let tolerance = 4.0 * sigma + 0.005 * expected;
+        assert!((mean - expected).abs() < tolerance, "{techniques}: {mean}, expected {expected} ± {sigma}");
+        assert!(sigma < 0.04 * expected, "{techniques}: too noisy to tell, {sigma} of {expected}");
+    }
+}
+
+const OUTSIDE: Vec3 = Vec3::new(0.2, 0.3, 3.0);
+const IN_FOG: Vec3 = Vec3::new(0.1, 0.4, 1.0);
+
+/// Lights that can be hit: emission hits cover all paths.
+const HITTABLE: [f32; 5] = [3.0, 1.5, 0.0, 0.0, 2.0];
+
+/// Adds up the light that a camera sub-path meets before the first vertex that can be connected.
+#[derive(Default)]
+struct Seen {
+    light: Spectrum,
+    /// The most edges of a path that brought some of it.
+    depth: u32,
+    scattered: bool,
+}
+
+impl<B: Bsdf> Observer<B> for Seen {
+    type Densities = f64;
+
+    fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
+        self.scattered |= vertex.site.is_connectible();
+    }
+
+    fn sample(&mut self, sample: &ObservedSample<B, f64>) {
+        if sample.technique == Technique::Hit && !self.scattered {
+            self.light += sample.value * sample.weight.value() as f32;
+            self.depth = self.depth.max(sample.camera_depth);
+        }
+    }
+}
+
+#[test]
+fn light_is_seen_up_to_the_first_vertex_that_scatters() {
+    let scene = ClosedForm::new(OUTSIDE, SIZE);
+    let world = World::new(&scene).expect("the scene is in order");
+    let plan = Plan::new(&scene, &choices("hit+nee", PathLengths { min: 1, max: 6 }, 7));
+    let context = Context { world: &world, plan: &plan };
+    let map = LightMap::build(&plan, Vec::new(), Vec::new());
+    let (mut scratch, mut counters) = (Scratch::default(), Counters::default());
+    let (mut deepest, mut less_than_all) = (0, 0);
+    for index in 0..SIZE * SIZE {
+        let (pixel, mut seen) = ([index % SIZE, index / SIZE], Seen::default());
+        let (kind, index) = (StreamKind::Camera, u64::from(index));
+        let walk =
+            trace_camera_path(&context, &map, kind, pixel, index, &mut scratch, &mut counters, &mut seen);
+        let difference = (walk.seen.mean() - seen.light.mean()).abs();
+        assert!(difference <= 1e-5 * seen.light.mean(), "{pixel:?}: {:?}, {:?}", walk.seen, seen.light);
+        deepest = deepest.max(seen.depth);
+        less_than_all += u32::from(walk.layers[0].mean() > walk.seen.mean());
+    }
+    assert!(deepest > 1 && less_than_all > 100, "{deepest}, {less_than_all}");
+}
+
+#[test]
+fn each_technique_beside_hits() {
+    let lengths = PathLengths { min: 1, max: 6 };
+    let sets = [
+        "hit+nee",
+        "hit",
+        "hit+connect",
+        "hit+lt",
+        "hit+surf",
+        "hit+pp3d",
+        "hit+pb2d",
+        "hit+bp2d",
+        "hit+bb1d",
+        "bpt",
+        "all",
+    ];
+    agree(OUTSIDE, HITTABLE, lengths, &sets);
+}
+
+#[test]
+fn a_camera_in_a_medium() {
+    let lengths = PathLengths { min: 1, max: 6 };
+    agree(IN_FOG, HITTABLE, lengths, &["hit+nee", "hit", "bpt", "hit+surf", "all"]);
+}
+
+#[test]
+fn lights_that_are_never_hit() {
+    // Point and directional: single scattering, with nothing in between that bends.
+    let lengths = PathLengths { min: 2, max: 2 };
+    let sets = ["nee+lt", "lt", "nee+surf+pp3d+pb2d+bp2d+bb1d", "surf+pb2d", "surf+bb1d"];
+    agree(OUTSIDE, [0.0, 0.0, 2.0, 1.0, 0.0], lengths, &sets);
+}
+
+/// Weights that ask how wide kernels are, and how widely camera sub-paths are spread, render the same picture.
+#[test]
+fn damped_merges() {
+    let scene = ClosedForm::new(OUTSIDE, SIZE);
+    let usual = choices("all", PathLengths { min: 1, max: 6 }, 300);
+    let (expected, expected_error) = mean(&scene, &usual);
+    for (seed, damping, correlation) in [(301, true, None), (302, false, Some(0.1)), (303, true, Some(0.02))]
+    {
+        let (found, error) = mean(&scene, &PlanChoices { seed, damping, correlation, ..usual.clone() });
+        let sigma = error.hypot(expected_error);
+        println!(
+            "{damping}, {correlation:?}: {found:.5} ± {error:.5}, expected {expected:.5} ± {expected_error:.5}"
+        );
+        assert!((found - expected).abs() < 4.0 * sigma, "{found}, expected {expected} ± {sigma}");
+        assert!(sigma < 0.02 * expected, "too noisy to tell: {sigma} of {expected}");
+    }
+}
+
+#[test]
+fn seldom_look_ups_and_other_counts() {
+    let scene = ClosedForm::new(OUTSIDE, SIZE);
+    let usual = choices("all", PathLengths { min: 1, max: 6 }, 200);
+    let other = PlanChoices {
+        seed: 201,
+        next_events: 3.0,
+        connections: 0.4,
+        look_ups: LookUps::by(|technique| NonZeroU32::new(1 + technique as u32 % 3).unwrap()),
+        ..usual.clone()
+    };
+    let (expected, expected_error) = mean(&scene, &usual);
+    // Of periods of one, two and three, each of which has one turn.
+    let (found, error) = mean_of_blocks(&scene, &other, 6);
+    let sigma = error.hypot(expected_error);
+    println!("{found:.5} ± {error:.5}, expected {expected:.5} ± {expected_error:.5}");
+    assert!((found - expected).abs() < 4.0 * sigma, "{found}, expected {expected} ± {sigma}");
+    assert!(sigma < 0.02 * expected, "too noisy to tell: {sigma} of {expected}");
+}
+
+#[test]
+fn path_lengths_add_up() {
+    // The whole is the sum of its parts, for a set that reaches each length in several ways.
+    let scene = ClosedForm::new(OUTSIDE, SIZE);
+    let of = |min, max, seed| mean(&scene, &choices("bpt+surf+pb2d", PathLengths { min, max }, seed));
+    let (whole, error) = of(1, 5, 1);
+    let parts = [of(1, 2, 2), of(3, 3, 3), of(4, 5, 4)];
+    let sum: f64 = parts.iter().map(|part| part.0).sum();
+    let sigma = parts.iter().map(|part| part.1).fold(error, f64::hypot);
+    println!("{whole:.5} ± {error:.5}, sum of parts {sum:.5}");
+    assert!((sum - whole).abs() < 4.0 * sigma, "{sum}, expected {whole} ± {sigma}");
+}

@@ -1,0 +1,491 @@
+//! Weights of real paths: every accepted sample is rebuilt from its vertices and weighed by enumeration
+//! (`docs/theory.md`, section 9, item 2).
+//!
+//! The abstract test of the recursion takes densities as given. Here they are those of the walks: wrong
+//! distances, stacks of bodies, reverse densities and thresholds show.
+
+use std::marker::PhantomData;
+
+use glam::Vec3;
+use upbp_estimators::mis::oracle::{Path, Strategy};
+use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MergesApart, MisPlan, Weight};
+use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::scene::Scene;
+use upbp_estimators::walk::{
+    Context, Extent, LightChunk, Passage, Scratch, Site, trace_camera_path, trace_light_path,
+};
+use upbp_estimators::{
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Stream,
+    StreamKind, Technique, TechniqueSet, World,
+};
+
+use super::rebuild::{Trace, Vertex};
+use crate::support::closed_form::material::Material;
+use crate::support::closed_form::scene::ClosedForm;
+
+/// Weights below this are compared with nothing: they are rounding of others.
+const SMALLEST_WEIGHT: f64 = 1e-6;
+
+/// Relative agreement of a weight where rounding is not amplified.
+const TOLERANCE: f64 = 1e-4;
+
+/// The share of the weights that agree to [`TOLERANCE`] without further ado.
+const REGULAR: f64 = 0.98;
+
+/// No difference exceeds this many times the tolerance and what moving the vertices by rounding does to the weight.
+const LARGEST_EXCESS: f64 = 2.0;
+
+/// Differences of one technique.
+#[derive(Clone, Debug, Default)]
+struct Comparison {
+    seen: u64,
+    doubtful: u64,
+    differences: Vec<f64>,
+    /// The largest ratio to what rounding explains, and the path where.
+    worst: (f64, String),
+}
+
+/// Compares every sample with the enumeration, up to a number of each technique.
+struct Auditor<'a, D> {
+    densities: PhantomData<D>,
+    scene: &'a ClosedForm,
+    plan: &'a Plan,
+    light_ends: Vec<Option<LightEnd>>,
+    light_vertices: Vec<Vec<Vertex>>,
+    lens: Vec3,
+    camera_vertices: Vec<Vertex>,
+    comparisons: [Comparison; 9],
+}
+
+fn vertex(observed: &ObservedVertex<Material>) -> Vertex {
+    let position = observed.position.as_dvec3();
+    Vertex {
+        light: position,
+        camera: position,
+        in_medium: matches!(observed.site, Site::Medium(_)),
+        delta: observed.delta,
+    }
+}
+
+fn joint(light: Vec3, camera: Vec3, site: &Site<Material>) -> Vertex {
+    Vertex {
+        light: light.as_dvec3(),
+        camera: camera.as_dvec3(),
+        in_medium: matches!(site, Site::Medium(_)),
+        delta: false,
+    }
+}
+
+impl<'a, D: Densities> Auditor<'a, D> {
+    fn new(scene: &'a ClosedForm, plan: &'a Plan) -> Self {
+        let paths = plan.light_paths as usize;
+        Self {
+            densities: PhantomData,
+            scene,
+            plan,
+            light_ends: vec![None; paths],
+            light_vertices: vec![Vec::new(); paths],
+            lens: Vec3::ZERO,
+            camera_vertices: Vec::new(),
+            comparisons: Default::default(),
+        }
+    }
+
+    /// The path of a sample, and which strategy made it.
+    fn trace(&self, sample: &ObservedSample<Material, D>) -> (Trace, Strategy) {
+        let prefix = |path: u32, vertices: u32| {
+            let path = path as usize;
+            let light = self.light_ends[path].expect("a light sub-path has a start");
+            (light, self.light_vertices[path][..vertices as usize].to_vec())
+        };
+        let suffix = |vertices: u32| self.camera_vertices[..vertices as usize].iter().rev().copied();
+        let depth = sample.camera_depth;
+        let (light, interior, lens, strategy) = match sample.joint {
+            Joint::Emission => unreachable!("no medium of the scene emits"),
+            Joint::Hit(light) => (light, suffix(depth - 1).collect(), self.lens, Strategy::Hit),
+            Joint::Nee { light, camera: (position, site) } => {
+                let interior = [joint(position, position, &site)].into_iter().chain(suffix(depth - 1));
+                (light, interior.collect(), self.lens, Strategy::Nee)
+            }
+            Joint::Connect { path, light: (from, from_site, from_depth), camera: (to, to_site) } => {
+                let (light, mut interior) = prefix(path, from_depth - 1);
+                interior.extend([joint(from, from, &from_site), joint(to, to, &to_site)]);
+                interior.extend(suffix(depth - 1));
+                (light, interior, self.lens, Strategy::Connect(from_depth as usize + 1))
+            }
+            Joint::LightTracing { path, light: (from, site, from_depth), lens, .. } => {
+                let (light, mut interior) = prefix(path, from_depth - 1);
+                interior.push(joint(from, from, &site));
+                (light, interior, lens, Strategy::LightTracing)
+            }
+            Joint::Merge { path, light: (photon, photon_depth), camera: (query, site), .. } => {
+                let (light, mut interior) = prefix(path, photon_depth - 1);
+                interior.push(joint(photon, query, &site));
+                interior.extend(suffix(depth - 1));
+                let at = photon_depth as usize;
+                let strategy = match sample.technique {
+                    Technique::Surf => Strategy::Surf(at),
+                    Technique::Pp3d => Strategy::Pp3d(at),
+                    Technique::Pb2d => Strategy::Pb2d(at),
+                    Technique::Bp2d => Strategy::Bp2d(at),
+                    Technique::Bb1d => Strategy::Bb1d(at),
+                    other => panic!("{other:?} does not merge"),
+                };
+                (light, interior, self.lens, strategy)
+            }
+        };
+        (Trace { light, interior, lens }, strategy)
+    }
+
+    fn audit(&mut self, sample: &ObservedSample<Material, D>) {
+        let technique = sample.technique as usize;
+        self.comparisons[technique].seen += 1;
+        let found = sample.weight.value();
+        assert!((0.0..=1.0 + 1e-6).contains(&found), "{sample:?}");
+        let (trace, strategy) = self.trace(sample);
+        assert!(self.plan.lengths.contain(trace.length() as u32), "{sample:?}");
+        let Ok(path) = trace.rebuild(self.scene, self.plan.roulette) else {
+            self.comparisons[technique].doubtful += 1;
+            return;
+        };
+        let weight = |path: &Path| {
+            let weights = path.weights(&self.plan.mis);
+            let sum: f64 = weights.iter().map(|w| w.1).sum();
+            assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+            weights.iter().find(|(other, _)| *other == strategy).map_or(0.0, |w| w.1)
+        };
+        let expected = weight(&path);
+        if expected.max(found) < SMALLEST_WEIGHT {
+            return;
+        }
+        let difference = (found / expected - 1.0).abs();
+        let mut excess = difference / TOLERANCE;
+        if excess > 1.0 {
+            let rounding = trace.sensitivity(self.scene, self.plan.roulette, weight, expected);
+            excess = difference / (TOLERANCE + rounding);
+        }
+        let comparison = &mut self.comparisons[technique];
+        comparison.differences.push(difference);
+        if excess > comparison.worst.0 {
+            let text = format!("{strategy:?}: {found}, expected {expected}\n{trace:?}\n{path:?}");
+            comparison.worst = (excess, text);
+        }
+    }
+}
+
+impl<D: Densities> Observer<Material> for Auditor<'_, D> {
+    type Densities = D;
+
+    fn light_end(&mut self, path: u32, end: &LightEnd) {
+        self.light_ends[path as usize] = Some(*end);
+    }
+
+    fn light_vertex(&mut self, path: u32, observed: &ObservedVertex<Material>) {
+        let vertices = &mut self.light_vertices[path as usize];
+        vertices.push(vertex(observed));
+        assert_eq!(vertices.len(), observed.depth as usize);
+    }
+
+    fn camera_end(&mut self, lens: Vec3, _: Vec3, _: f32) {
+        self.lens = lens;
+        self.camera_vertices.clear();
+    }
+
+    fn camera_vertex(&mut self, observed: &ObservedVertex<Material>) {
+        self.camera_vertices.push(vertex(observed));
+        assert_eq!(self.camera_vertices.len(), observed.depth as usize);
+    }
+
+    fn sample(&mut self, sample: &ObservedSample<Material, D>) {
+        self.audit(sample);
+    }
+}
+
+/// Radii of about two per cent of the part of the scene where things are.
+fn kernels(scale: f32) -> Kernels {
+    Kernels {
+        surf: Kernel::disc(0.04 * scale),
+        pp3d: Kernel::ball(0.08 * scale),
+        pb2d: Kernel::parabolic_disc(0.04 * scale),
+        bp2d: Kernel::parabolic_disc(0.04 * scale),
+        bb1d: Kernel::parabolic_line(0.03 * scale),
+    }
+}
+
+fn choices() -> PlanChoices {
+    PlanChoices {
+        seed: 1,
+        iteration: 0,
+        techniques: TechniqueSet::ALL,
+        light_paths: 6000,
+        beam_paths: 500,
+        connections: 2.0,
+        next_events: 1.0,
+        look_ups: LookUps::ALL,
+        vertices_per_light_path: 2.3,
+        lengths: PathLengths { min: 1, max: 8 },
+        roulette: Roulette::Below(0.6),
+        kernels: kernels(1.0),
+        heuristic: Heuristic::Balance,
+        photon_beams: BeamExtent::Short,
+        query_beams: BeamExtent::Long,
+        damping: false,
+        correlation: None,
+    }
+}
+
+/// Outside of all bodies, and in the fog.
+const CAMERAS: [Vec3; 2] = [Vec3::new(0.2, 0.3, 3.0), Vec3::new(0.1, 0.4, 1.0)];
+
+/// Renders once and compares; every technique that runs has at least `at_least` weights to compare.
+fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: usize) {
+    if choices.correlation.is_some() {
+        audit_with::<MergesApart>(name, camera, size, choices, at_least);
+    } else {
+        audit_with::<f64>(name, camera, size, choices, at_least);
+    }
+}
+
+fn audit_with<D: Densities>(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: usize) {
+    let scene = ClosedForm::new(camera, size);
+    let world = World::new(&scene).expect("the scene is in order");
+    let plan = Plan::new(&scene, choices);
+    let context = Context { world: &world, plan: &plan };
+    let mut auditor = Auditor::<D>::new(&scene, &plan);
+    let mut scratch = Scratch::default();
+    let mut chunk = LightChunk::default();
+    for index in 0..plan.light_paths {
+        trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, &mut auditor);
+    }
+    let LightChunk { vertices, beams, counters: light_counters, .. } = chunk;
+    let map = LightMap::build(&plan, vertices, beams);
+    let mut counters = Counters::default();
+    for pixel in 0..size * size {
+        let _ = trace_camera_path(
+            &context,
+            &map,
+            StreamKind::Camera,
+            [pixel % size, pixel / size],
+            u64::from(pixel),
+            &mut scratch,
+            &mut counters,
+            &mut auditor,
+        );
+    }
+    counters.add(&light_counters);
+    assert_eq!(counters.dropped, 0, "{counters:?}");
+    let walks = u64::from(plan.light_paths + size * size);
+    assert!(counters.lost_walks * 10_000 < walks, "{counters:?}");
+
+    println!("{name}");
+    for (technique, comparison) in Technique::ALL.into_iter().zip(auditor.comparisons) {
+        let Comparison { seen, doubtful, mut differences, worst: (excess, path) } = comparison;
+        assert_eq!(seen, counters.contributions_of(technique), "{technique:?}");
+        if !plan.techniques.has(technique) {
+            assert_eq!(seen, 0, "{technique:?} is off");
+            continue;
+        }
+        differences.sort_by(f64::total_cmp);
+        let count = differences.len();
+        assert!(count >= at_least, "{technique:?}: only {count} weights");
+        if count == 0 {
+            continue;
+        }
+        let quantile = |q: f64| differences[((q * count as f64) as usize).min(count - 1)];
+        println!(
+            "  {:8} {count:6} weights, {doubtful} in doubt; median {:.1e}, 99 % {:.1e}, 99.9 % {:.1e}, \
+             largest {:.1e}, {excess:.1} times what rounding explains",
+            technique.name(),
+            quantile(0.5),
+            quantile(0.99),
+            quantile(0.999),
+            quantile(1.0),
+        );
+        // A vertex within rounding of a boundary cannot be rebuilt: about one sample in 10⁴, a Poisson count, in clusters
+        // since samples share vertices. This only guards that hardly any sample escapes the comparison.
+        let expected = 1e-4 * seen as f64;
+        let most = expected + 4.0 * expected.sqrt() + 4.0;
+        assert!(doubtful as f64 <= most, "{technique:?}: {doubtful} of {seen} in doubt");
+        // Squared densities have twice the relative error.
+        let tolerance = if plan.mis.heuristic == Heuristic::Power { 2.0 * TOLERANCE } else { TOLERANCE };
+        assert!(quantile(REGULAR) < tolerance, "{technique:?}: {:e}", quantile(REGULAR));
+        assert!(excess < LARGEST_EXCESS, "{technique:?}, {excess}: {path}");
+    }
+}
+
+#[test]
+fn all_techniques_with_the_balance_heuristic() {
+    for (i, camera) in CAMERAS.into_iter().enumerate() {
+        let choices = PlanChoices { light_paths: 24_000, beam_paths: 1000, ..choices() };
+        audit(&format!("all techniques, camera {i}"), camera, 96, &choices, 3000);
+    }
+}
+
+#[test]
+fn the_power_heuristic() {
+    let choices = PlanChoices { heuristic: Heuristic::Power, ..choices() };
+    audit("power heuristic", CAMERAS[1], 48, &choices, 1000);
+}
+
+#[test]
+fn merges_that_are_damped() {
+    // Radii are a few per cent of the scene, edges of all lengths.
+    let choices = PlanChoices { damping: true, light_paths: 24_000, beam_paths: 1000, ..choices() };
+    audit("damped", CAMERAS[1], 96, &choices, 3000);
+}
+
+#[test]
+fn merges_behind_scattered_camera_sub_paths() {
+    for (heuristic, radius) in [(Heuristic::Balance, 0.05), (Heuristic::Power, 0.2)] {
+        let choices = PlanChoices {
+            heuristic,
+            damping: true,
+            correlation: Some(radius),
+            light_paths: 24_000,
+            beam_paths: 1000,
+            ..choices()
+        };
+        audit(&format!("correlation within {radius}, {heuristic:?}"), CAMERAS[1], 96, &choices, 3000);
+    }
+}
+
+#[test]
+fn beams_of_all_extents() {
+    let (short, long) = (BeamExtent::Short, BeamExtent::Long);
+    for (photon_beams, query_beams) in [(short, short), (long, short), (long, long)] {
+        let name = format!("{photon_beams:?} photon beams, {query_beams:?} query beams");
+        let choices = PlanChoices { photon_beams, query_beams, ..choices() };
+        audit(&name, CAMERAS[1], 48, &choices, 1000);
+    }
+}
+
+#[test]
+fn some_path_lengths_only() {
+    for (min, max) in [(3, 4), (2, 2), (1, 20)] {
+        let choices = PlanChoices { lengths: PathLengths { min, max }, ..choices() };
+        // Two edges have no connection.
+        audit(&format!("lengths {min} to {max}"), CAMERAS[1], 48, &choices, if max > 2 { 400 } else { 0 });
+    }
+}
+
+#[test]
+fn subsets_of_techniques() {
+    for names in [
+        "hit+nee+surf",
+        "nee+connect+lt+pb2d",
+        "hit+lt+pp3d+bb1d",
+        "connect+bp2d+bb1d+surf",
+        "bpt",
+        "pb2d+pp3d+surf",
+        "hit+connect+pp3d",
+        "lt+bp2d",
+    ] {
+        let techniques = names.parse().expect("names");
+        audit(names, CAMERAS[1], 48, &PlanChoices { techniques, ..choices() }, 1000);
+    }
+}
+
+#[test]
+fn walks_without_roulette() {
+    audit("no roulette", CAMERAS[0], 48, &PlanChoices { roulette: Roulette::Off, ..choices() }, 500);
+}
+
+/// Samples with their weights.
+struct Weights<D>(Vec<(Technique, Weight<D>)>);
+
+impl<B, D: Densities> Observer<B> for Weights<D> {
+    type Densities = D;
+
+    fn sample(&mut self, sample: &ObservedSample<B, D>) {
+        self.0.push((sample.technique, sample.weight));
+    }
+}
+
+fn weights<D: Densities>(plan: &Plan) -> Vec<(Technique, Weight<D>)> {
+    let scene = ClosedForm::new(CAMERAS[1], 24);
+    let world = World::new(&scene).expect("the scene is in order");
+    let context = Context { world: &world, plan };
+    let mut weights = Weights(Vec::new());
+    let (mut scratch, mut chunk) = (Scratch::default(), LightChunk::default());
+    for index in 0..plan.light_paths {
+        trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, &mut weights);
+    }
+    let map = LightMap::build(plan, chunk.vertices, chunk.beams);
+    let mut counters = Counters::default();
+    for i in 0..24 * 24 {
+        let (kind, pixel) = (StreamKind::Camera, [i % 24, i / 24]);
+        let index = u64::from(i);
+        let _ =
+            trace_camera_path(&context, &map, kind, pixel, index, &mut scratch, &mut counters, &mut weights);
+    }
+    weights.0
+}
+
+#[test]
+fn parts_of_techniques_are_what_counting_one_twice_shows() {
+    for heuristic in [Heuristic::Balance, Heuristic::Power] {
+        let plan = Plan::new(&ClosedForm::new(CAMERAS[1], 24), &PlanChoices { heuristic, ..choices() });
+        let parts = weights::<ByTechnique>(&plan);
+        assert!(parts.len() > 10_000, "{}", parts.len());
+        let squared = if heuristic == Heuristic::Power { 2 } else { 1 };
+        for counted in Technique::ALL {
+            let mut twice = plan.clone();
+            let MisPlan { hit, nee, connect, light_tracing, surf, volume, .. } = &mut twice.mis;
+            match counted {
+                Technique::Hit => *hit *= 2.0,
+                Technique::Nee => *nee *= 2.0,
+                Technique::Connect => *connect *= 2.0,
+                Technique::LightTracing => *light_tracing *= 2.0,
+                Technique::Surf => *surf *= 2.0,
+                Technique::Pp3d => volume.iter_mut().for_each(|v| v.pp3d *= 2.0),
+                Technique::Pb2d => volume.iter_mut().for_each(|v| v.pb2d *= 2.0),
+                Technique::Bp2d => volume.iter_mut().for_each(|v| v.bp2d *= 2.0),
+                Technique::Bb1d => volume.iter_mut().for_each(|v| v.bb1d *= 2.0),
+            }
+            let found = weights::<f64>(&twice);
+            assert_eq!(found.len(), parts.len());
+            let mut seen = 0;
+            for ((technique, found), (_, weight)) in found.iter().zip(&parts) {
+                let part = weight.all.of[counted as usize] / weight.all.total();
+                // A light that is seen directly has no other technique.
+                if part == 1.0 && *technique == Technique::Hit && found.value() == 1.0 {
+                    continue;
+                }
+                let factor = 2.0_f64.powi(squared);
+                let own = if *technique == counted { factor } else { 1.0 };
+                let expected = own * weight.value() / (1.0 + (factor - 1.0) * part);
+                let found = found.value();
+                assert!(
+                    (found / expected - 1.0).abs() < 1e-9,
+                    "{technique:?}, {counted:?}: {found}, {expected}"
+                );
+                seen += usize::from(part > 1e-3);
+            }
+            assert!(seen > 100, "{counted:?}: {seen}");
+        }
+    }
+}
+
+#[test]
+fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
+    // The fog's boundary runs through the glass, where it is hidden: it changes no medium, but what is behind
+    // the glass.
+    let scene = ClosedForm::new(CAMERAS[0], 1);
+    let mut passage = Passage::new();
+    let mut random = Stream::new(1, 0, StreamKind::Camera, 0);
+    let mut hidden = 0;
+    for _ in 0..20_000 {
+        let mut point = || 3.0 * Vec3::new(random.uniform(), random.uniform(), random.uniform()) - 1.5;
+        let (from, towards) = (point(), point());
+        let direction = (towards - from).normalize();
+        let mut walk = Stream::new(2, 0, StreamKind::Camera, 0);
+        passage.trace(&scene, from, direction, &scene.stack_at(from), 0.0, Extent::ToSurface, &mut walk);
+        for span in &passage.spans {
+            let t = span.start + (span.end.min(10.0) - span.start) * random.uniform();
+            let found = passage.stack_in(span, t);
+            assert_eq!(found, scene.stack_at(from + direction * t), "{from}, {direction}, {t}");
+            hidden += usize::from(found.len() > 1 && found.priority() == 10);
+        }
+    }
+    assert!(hidden > 100, "only {hidden} points in fog and glass");
+}

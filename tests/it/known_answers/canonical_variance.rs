@@ -1,0 +1,524 @@
+//! Variance of points and beams where it has a closed form: two fixed rays that cross at right angles in a homogeneous
+//! medium (`docs/theory.md`, section 2.7).
+//!
+//! A light that shoots a single ray and a camera that sees along a single ray leave nothing random but the distances
+//! that the walks sample. Walks, stored photons and beams, trees, kernels and estimators are those of the renderer; a
+//! plan of one technique gives every sample the weight one.
+//!
+//! With the extinction as unit of length, the kernel occupies `[a, a + w]` on both rays and its centre is the crossing.
+//! Second moments over squared means:
+//!
+//! | technique | light's side | camera's side |
+//! |---|---|---|
+//! | PB2D, constant disc | point | 1 (long), short beam at the crossing (short) |
+//! | PB2D, parabolic disc | point, weighted by the kernel (quadrature) | 1 |
+//! | BP2D, constant disc | 1 (long) | point |
+//! | BB1D | 1 (long), short beam at the crossing (short) | the same |
+//! | PP3D, ball | a ball does not factor into intervals: quadrature over both rays ||
+//!
+//! The estimators blur beams only across, never along: the factor "short beam with overlap" belongs to none of them. It
+//! is checked with the stored beams' own ends.
+
+use std::ops::RangeInclusive;
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use upbp_core::media::{Homogeneous, PhaseFunction};
+use upbp_estimators::mis::{BeamExtent, Heuristic};
+use upbp_estimators::observer::{ObservedSample, Observer};
+use upbp_estimators::scene::{
+    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
+    EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
+};
+use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
+use upbp_estimators::{
+    Counters, Kernel, Kernels, LightMap, LookUps, MediumId, PathLengths, Plan, PlanChoices, Ray, Roulette,
+    Spectrum, StreamKind, TechniqueSet, World,
+};
+
+/// There are no surfaces.
+#[derive(Clone, Copy)]
+struct Nothing;
+
+impl Bsdf for Nothing {
+    fn eval(&self, _: Vec3, _: Vec3, _: Interface) -> Spectrum {
+        Spectrum::ZERO
+    }
+
+    fn pdf(&self, _: Vec3, _: Vec3, _: Interface) -> f32 {
+        0.0
+    }
+
+    fn sample(&self, _: Vec3, _: Walk, _: Interface, _: f32, _: [f32; 2]) -> Option<BsdfSample> {
+        None
+    }
+
+    fn is_connectible(&self) -> bool {
+        false
+    }
+
+    fn continuation(&self, _: Vec3) -> f32 {
+        0.0
+    }
+}
+
+/// Shoots one ray along +x, which starts at `-start`.
+struct Laser {
+    start: f32,
+}
+
+impl Emitter for Laser {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Point
+    }
+
+    fn power(&self, _: &BoundingSphere) -> f32 {
+        1.0
+    }
+
+    fn sample_emission(&self, _: &BoundingSphere, _: [f32; 2], _: [f32; 2]) -> Option<Emission> {
+        let point = EmitterPoint { position: Vec3::new(-self.start, 0.0, 0.0), normal: Vec3::X };
+        let radiance = Spectrum::splat(1.0);
+        Some(Emission { point, direction: Vec3::X, radiance, pdf_position: 1.0, pdf_direction: 1.0 })
+    }
+
+    fn sample_incident(&self, _: &BoundingSphere, _: Vec3, _: [f32; 2]) -> Option<Incident> {
+        None
+    }
+
+    fn hit(&self, _: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> {
+        None
+    }
+}
+
+/// Sees along one ray, towards +z, which starts at `-start`.
+struct Tube {
+    start: f32,
+}
+
+impl Camera for Tube {
+    fn resolution(&self) -> (u32, u32) {
+        (1, 1)
+    }
+
+    fn ray(&self, _: Vec2, _: [f32; 2]) -> Option<CameraRay> {
+        Some(CameraRay { origin: Vec3::new(0.0, 0.0, -self.start), direction: Vec3::Z, pdf: 1.0 })
+    }
+
+    fn connect(&self, _: Vec3, _: [f32; 2]) -> Option<CameraConnection> {
+        None
+    }
+
+    fn is_pinhole(&self) -> bool {
+        true
+    }
+}
+
+/// A medium without end.
+struct Space {
+    light: [Laser; 1],
+    medium: [Homogeneous; 1],
+    camera: Tube,
+}
+
+impl Scene for Space {
+    type Bsdf = Nothing;
+    type Emitter = Laser;
+    type Medium = Homogeneous;
+    type Camera = Tube;
+
+    fn intersect(&self, _: &Ray) -> Option<Hit<Nothing>> {
+        None
+    }
+
+    fn bounds(&self) -> BoundingSphere {
+        BoundingSphere { centre: Vec3::ZERO, radius: 10.0 }
+    }
+
+    fn emitters(&self) -> &[Laser] {
+        &self.light
+    }
+
+    fn media(&self) -> &[Homogeneous] {
+        &self.medium
+    }
+
+    fn camera(&self) -> &Tube {
+        &self.camera
+    }
+
+    fn outside(&self) -> Option<MediumId> {
+        Some(MediumId(0))
+    }
+}
+
+/// Sums over samples of one technique.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Sums {
+    fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.squares += value * value;
+    }
+}
+
+impl Observer<Nothing> for Sums {
+    type Densities = f64;
+
+    fn sample(&mut self, sample: &ObservedSample<Nothing>) {
+        let weight = sample.weight.value();
+        assert!((weight - 1.0).abs() < 1e-12, "one technique alone has weight {weight}");
+        self.add(f64::from(sample.value[0]));
+    }
+}
+
+/// A second moment over the squared mean, with its relative standard error.
+#[derive(Clone, Copy)]
+struct Moment {
+    value: f64,
+    error: f64,
+}
+
+impl Moment {
+    /// From batches of equal size.
+    fn of(batches: &[Sums]) -> Self {
+        let n = batches.len() as f64;
+        let total = |f: fn(&Sums) -> f64| batches.iter().map(f).sum::<f64>();
+        let count = total(|b| b.count);
+        let (mean, square) = (total(|b| b.sum) / count, total(|b| b.squares) / count);
+        let value = square / (mean * mean);
+        // What each batch adds to the logarithm, to first order.
+        let share = |b: &Sums| b.squares / b.count / square - 2.0 * b.sum / b.count / mean + 1.0;
+        let variance = batches.iter().map(|b| share(b).powi(2)).sum::<f64>() / (n - 1.0);
+        Self { value, error: (variance / n).sqrt() }
+    }
+}
+
+/// Which technique, on which rays.
+#[derive(Clone, Copy)]
+struct Setup {
+    technique: &'static str,
+    kernel: Kernel,
+    /// Distance from the start of both rays to the crossing, mean free paths.
+    crossing: f64,
+    photon_beams: BeamExtent,
+    query_beams: BeamExtent,
+}
+
+impl Setup {
+    fn new(technique: &'static str, kernel: fn(f32) -> Kernel, width: f64, before: f64) -> Self {
+        Self {
+            technique,
+            kernel: kernel(0.5 * width as f32),
+            crossing: before + 0.5 * width,
+            photon_beams: BeamExtent::Long,
+            query_beams: BeamExtent::Long,
+        }
+    }
+
+    fn short_photon(self) -> Self {
+        Self { photon_beams: BeamExtent::Short, ..self }
+    }
+
+    fn short_query(self) -> Self {
+        Self { query_beams: BeamExtent::Short, ..self }
+    }
+
+    fn space(&self) -> Space {
+        let medium = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, PhaseFunction::Isotropic)
+            .expect("valid coefficients");
+        let start = self.crossing as f32;
+        Space { light: [Laser { start }], medium: [medium], camera: Tube { start } }
+    }
+
+    fn plan(&self, space: &Space, batch: u64, paths: u32) -> Plan {
+        let kernel = self.kernel;
+        Plan::new(
+            space,
+            &PlanChoices {
+                seed: 7,
+                iteration: batch,
+                techniques: self.technique.parse::<TechniqueSet>().expect("a technique"),
+                light_paths: paths,
+                beam_paths: paths,
+                connections: 1.0,
+                next_events: 1.0,
+                look_ups: LookUps::ALL,
+                vertices_per_light_path: 1.0,
+                lengths: PathLengths { min: 2, max: 2 },
+                roulette: Roulette::Off,
+                kernels: Kernels {
+                    surf: Kernel::NONE,
+                    pp3d: kernel,
+                    pb2d: kernel,
+                    bp2d: kernel,
+                    bb1d: kernel,
+                },
+                heuristic: Heuristic::Balance,
+                photon_beams: self.photon_beams,
+                query_beams: self.query_beams,
+                damping: false,
+                correlation: None,
+            },
+        )
+    }
+
+    fn light(&self, batch: u64, paths: u32) -> LightChunk<Nothing> {
+        let space = self.space();
+        let world = World::new(&space).expect("a valid scene");
+        let plan = self.plan(&space, batch, paths);
+        let context = Context { world: &world, plan: &plan };
+        let (mut scratch, mut chunk) = (Scratch::default(), LightChunk::default());
+        for path in 0..paths {
+            trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut chunk, &mut ());
+        }
+        chunk
+    }
+
+    /// The moment of one light sub-path against one camera sub-path, from `batches` of `light` times `camera`.
+    fn measure(&self, batches: u64, light: u32, camera: u32) -> Moment {
+        let sums: Vec<Sums> = (0..batches)
+            .into_par_iter()
+            .map(|batch| {
+                let chunk = self.light(batch, light);
+                let space = self.space();
+                let world = World::new(&space).expect("a valid scene");
+                let plan = self.plan(&space, batch, light);
+                let context = Context { world: &world, plan: &plan };
+                let map = LightMap::build(&plan, chunk.vertices, chunk.beams);
+                let (mut scratch, mut counters) = (Scratch::default(), Counters::default());
+                let mut sums = Sums { count: f64::from(light) * f64::from(camera), ..Sums::default() };
+                for index in 0..u64::from(camera) {
+                    trace_camera_path(
+                        &context,
+                        &map,
+                        StreamKind::Camera,
+                        [0, 0],
+                        index,
+                        &mut scratch,
+                        &mut counters,
+                        &mut sums,
+                    );
+                }
+                sums
+            })
+            .collect();
+        Moment::of(&sums)
+    }
+
+    /// The moment of the length that stored beams share with the kernel.
+    fn overlap(&self, batches: u64, light: u32) -> Moment {
+        let half = f64::from(self.kernel.radius());
+        let sums: Vec<Sums> = (0..batches)
+            .into_par_iter()
+            .map(|batch| {
+                let mut sums = Sums { count: f64::from(light), ..Sums::default() };
+                for beam in self.light(batch, light).beams {
+                    let (start, end) = (f64::from(beam.segment.start), f64::from(beam.segment.end));
+                    let shared = end.min(self.crossing + half) - start.max(self.crossing - half);
+                    sums.add(shared.max(0.0));
+                }
+                sums
+            })
+            .collect();
+        Moment::of(&sums)
+    }
+}
+
+/// Second moments over squared means of one ray.
+mod closed {
+    pub(super) fn point(w: f64, a: f64) -> f64 {
+        a.exp() / (1.0 - (-w).exp())
+    }
+
+    pub(super) fn overlap(w: f64, a: f64) -> f64 {
+        let e = 1.0 - (-w).exp();
+        a.exp() * 2.0 * (e - w * (-w).exp()) / (e * e)
+    }
+
+    pub(super) fn crossing(w: f64, a: f64) -> f64 {
+        (a + 0.5 * w).exp()
+    }
+
+    fn integral(radius: f64, f: impl Fn(f64) -> f64) -> f64 {
+        let steps = 20_000;
+        let dx = 2.0 * radius / f64::from(steps);
+        (0..steps).map(|i| f((f64::from(i) + 0.5) * dx - radius) * dx).sum()
+    }
+
+    /// A point in a parabolic kernel.
+    pub(super) fn parabolic_point(w: f64, a: f64) -> f64 {
+        let (r, start) = (0.5 * w, a + 0.5 * w);
+        let kernel = |x: f64| 1.0 - (x / r).powi(2);
+        let density = |x: f64| (-(x + start)).exp();
+        let mean = integral(r, |x| kernel(x) * density(x));
+        integral(r, |x| kernel(x).powi(2) * density(x)) / (mean * mean)
+    }
+
+    /// Two points in a common ball: of points alone, since a ball is no product of intervals.
+    pub(super) fn points_in_ball(w: f64, a: f64) -> f64 {
+        let (r, start) = (0.5 * w, a + 0.5 * w);
+        1.0 / integral(r, |x| {
+            let half = (r * r - x * x).max(0.0).sqrt();
+            (-(x + start)).exp() * ((half - start).exp() - (-half - start).exp())
+        })
+    }
+}
+
+const WIDTHS: [f64; 4] = [0.1, 1.0, 3.0, 10.0];
+
+/// Keeps rows that are more than 1 % off.
+fn check(failures: &mut Vec<String>, name: &str, w: f64, a: f64, measured: Moment, expected: f64) {
+    let difference = measured.value / expected - 1.0;
+    let row = format!(
+        "{name:36} w = {w:4} a = {a}: {:10.4} (± {:.2} %), expected {expected:10.4}: {:+.2} %",
+        measured.value,
+        100.0 * measured.error,
+        100.0 * difference
+    );
+    println!("{row}");
+    if !(difference.abs() < 0.01) {
+        failures.push(row);
+    }
+}
+
+#[test]
+fn one_random_end() {
+    let mut failures = Vec::new();
+    for (w, a) in WIDTHS.into_iter().flat_map(|w| [(w, 0.0), (w, 1.0)]) {
+        // Beams that must reach a far crossing are rare: such widths only from where the kernel starts.
+        let far = w > 5.0;
+        let points = Setup::new("pb2d", Kernel::disc, w, a).measure(100, 20_000, 1);
+        check(&mut failures, "PB2D, constant disc, long query", w, a, points, closed::point(w, a));
+        let points = Setup::new("pb2d", Kernel::parabolic_disc, w, a).measure(100, 20_000, 1);
+        check(&mut failures, "PB2D, parabolic disc, long query", w, a, points, closed::parabolic_point(w, a));
+        let points = Setup::new("bp2d", Kernel::disc, w, a).measure(100, 1, 20_000);
+        check(&mut failures, "BP2D, constant disc, long beam", w, a, points, closed::point(w, a));
+        let beams = Setup::new("bb1d", Kernel::parabolic_line, w, a);
+        check(&mut failures, "BB1D, long, long", w, a, beams.measure(2, 10, 10), 1.0);
+        check(
+            &mut failures,
+            "short beam, overlap",
+            w,
+            a,
+            beams.short_photon().overlap(100, 20_000),
+            closed::overlap(w, a),
+        );
+        if !far || a == 0.0 {
+            let batches = if far { 1000 } else { 200 };
+            let short = beams.short_photon().measure(batches, 10_000, 1);
+            check(&mut failures, "BB1D, short beam, long query", w, a, short, closed::crossing(w, a));
+        }
+        if !far {
+            let short = beams.short_query().measure(100, 1, 20_000);
+            check(&mut failures, "BB1D, long beam, short query", w, a, short, closed::crossing(w, a));
+        }
+    }
+    assert!(failures.is_empty(), "more than 1 % off:\n{}", failures.join("\n"));
+}
+
+#[test]
+fn two_random_ends() {
+    let mut failures = Vec::new();
+    for w in [1.0, 3.0] {
+        let short = closed::crossing(w, 0.0);
+        let beams = Setup::new("bb1d", Kernel::parabolic_line, w, 0.0).short_photon().short_query();
+        check(&mut failures, "BB1D, short, short", w, 0.0, beams.measure(200, 500, 500), short * short);
+        let points = Setup::new("pb2d", Kernel::disc, w, 0.0).short_query();
+        let expected = closed::point(w, 0.0) * short;
+        check(
+            &mut failures,
+            "PB2D, constant disc, short query",
+            w,
+            0.0,
+            points.measure(200, 500, 500),
+            expected,
+        );
+        let balls = Setup::new("pp3d", Kernel::ball, w, 0.0);
+        check(
+            &mut failures,
+            "PP3D, ball",
+            w,
+            0.0,
+            balls.measure(200, 500, 500),
+            closed::points_in_ball(w, 0.0),
+        );
+    }
+    // The closed form of rare pairs is reached for wide kernels too.
+    let balls = Setup::new("pp3d", Kernel::ball, 10.0, 0.0);
+    check(
+        &mut failures,
+        "PP3D, ball",
+        10.0,
+        0.0,
+        balls.measure(400, 700, 700),
+        closed::points_in_ball(10.0, 0.0),
+    );
+    assert!(failures.is_empty(), "more than 1 % off:\n{}", failures.join("\n"));
+}
+
+/// Where the logarithm of a ratio of moments, as good as straight in so small a range, passes zero.
+fn crossover(range: RangeInclusive<f64>, ratio: impl Fn(f64) -> f64) -> f64 {
+    let (start, end) = range.into_inner();
+    let points: Vec<(f64, f64)> =
+        (0..=4).map(|i| start + (end - start) * f64::from(i) / 4.0).map(|w| (w, ratio(w).ln())).collect();
+    let n = points.len() as f64;
+    let (x, y) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>();
+    x - y / slope
+}
+
+#[test]
+fn points_and_beams_change_places_at_one_mean_free_path() {
+    let short = |w| Setup::new("bb1d", Kernel::parabolic_line, w, 0.0).short_photon();
+    // Points in a box against beams that are blurred across only: 2 asinh(1/2).
+    let found = crossover(0.86..=1.06, |w| {
+        let points = Setup::new("pb2d", Kernel::disc, w, 0.0).measure(40, 10_000, 1);
+        points.value / short(w).measure(40, 10_000, 1).value
+    });
+    println!("PB2D with a constant disc against BB1D: {found:.4}, expected 0.9624");
+    assert!((found - 0.9624).abs() < 0.05);
+    // The renderer's own kernel weighs the rim little: it needs a larger radius for the same.
+    let found = crossover(1.0..=1.3, |w| {
+        let points = Setup::new("pb2d", Kernel::parabolic_disc, w, 0.0).measure(40, 10_000, 1);
+        points.value / short(w).measure(40, 10_000, 1).value
+    });
+    let expected = crossover(1.0..=1.3, |w| closed::parabolic_point(w, 0.0) / closed::crossing(w, 0.0));
+    println!("PB2D with a parabolic disc against BB1D: {found:.4}, expected {expected:.4}");
+    assert!((found - expected).abs() < 0.05);
+    // Points and beams with the same kernel along the ray: e^w = 1 + 2w.
+    let found = crossover(1.15..=1.35, |w| {
+        let points = Setup::new("pb2d", Kernel::disc, w, 0.0).measure(40, 10_000, 1);
+        points.value / short(w).overlap(40, 10_000).value
+    });
+    println!("PB2D with a constant disc against overlapping beams: {found:.4}, expected 1.2564");
+    assert!((found - 1.2564).abs() < 0.05);
+}
+
+/// The closed forms used above against the tabulated ones, which start `a` before the kernel alike.
+#[test]
+fn closed_forms_agree_with_the_table() {
+    let cases: Vec<serde_json::Value> =
+        serde_json::from_str(include_str!("../../data/analytic.json")).expect("a list of cases");
+    let mut checked = 0;
+    for case in cases.iter().filter(|case| case["kind"] == "canonical_variance") {
+        let number = |part: &str, name: &str| case[part][name].as_f64().expect("a number");
+        let (w, a) = (number("inputs", "sigma_t_h"), number("inputs", "sigma_t_start"));
+        for (name, value) in [
+            ("point", closed::point(w, a)),
+            ("short_beam", closed::overlap(w, a)),
+            ("short_beam_1d", closed::crossing(w, a)),
+        ] {
+            let expected = number("expected", name) + 1.0;
+            assert!((value / expected - 1.0).abs() < 1e-9, "{name} at w = {w}, a = {a}");
+            checked += 1;
+        }
+    }
+    assert!(checked >= 50);
+}

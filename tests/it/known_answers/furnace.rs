@@ -1,0 +1,79 @@
+//! Nothing absorbs, or what is absorbed is emitted again: every ray has radiance 1.
+
+use crate::support::cases::{Case, Table, cases, scene, settings, vector};
+use crate::support::render;
+
+/// What merges may lose at boundaries, where a kernel sticks out of its medium; falls with the radius.
+const BOUNDARY_LOSS: f64 = 0.005;
+
+fn describe(case: &Case) -> String {
+    let albedo = case.optional("albedo").unwrap_or(1.0);
+    let sigma_t = case.optional("sigma_t").unwrap_or(0.0);
+    let g = case.optional("g").unwrap_or(0.0);
+    let emission = case.optional("Le").unwrap_or(0.0);
+    let medium = format!(
+        "media: {{\"m\": Homogeneous(sigma_a: {:?}, sigma_s: {:?}, phase: HenyeyGreenstein({g:?}), emission: {emission:?})}},",
+        (1.0 - albedo) * sigma_t,
+        albedo * sigma_t
+    );
+    let ball = |material: &str, interior: &str| {
+        format!(
+            "(geometry: Sphere(centre: (0.0, 0.0, 0.0), radius: 1.0), material: \"{material}\"{interior}),"
+        )
+    };
+    let inside = ", interior: \"m\"";
+    let (camera, shapes) = match case.id.as_str() {
+        "furnace_closed_emitter" => ("(0.1, 0.2, 0.7)", closed_box()),
+        "furnace_env_dielectric_clear" => ("(0.0, 0.0, 3.0)", ball("glass", "")),
+        "furnace_env_mirror_and_fog" => {
+            let mirror = "(geometry: Sphere(centre: (0.0, 0.0, 0.0), radius: 0.4), material: \"mirror\"),";
+            ("(0.0, 0.0, 3.0)", ball("null", inside) + mirror)
+        }
+        id if id.contains("dielectric") => ("(0.0, 0.0, 3.0)", ball("glass", inside)),
+        _ => ("(0.0, 0.0, 3.0)", ball("null", inside)),
+    };
+    let (lights, outside) = if case.id == "furnace_closed_emitter" {
+        ("", "outside: \"m\",")
+    } else {
+        ("lights: [Constant(1.0)],", "")
+    };
+    format!(
+        "camera: Perspective(origin: {camera}, target: (0.0, 0.0, 0.0), fov_degrees: 26.0),
+        film: (width: 24, height: 24), {outside} {medium}
+        materials: {{\"null\": Null, \"mirror\": Mirror(1.0), \"glass\": Dielectric(ior: 1.5), \"grey\": Lambert(0.5)}},
+        shapes: [{shapes}], {lights}"
+    )
+}
+
+/// A room of side 2 whose walls shine inwards and reflect one half.
+fn closed_box() -> String {
+    let wall = |axis: usize, side: f64| {
+        // The normal, u × v, points inwards.
+        let (u, v) = if side < 0.0 { (axis + 1, axis + 2) } else { (axis + 2, axis + 1) };
+        let edge = |along: usize| std::array::from_fn(|i| if i == along % 3 { 2.0 } else { 0.0 });
+        let origin = std::array::from_fn(|i| if i == axis { side } else { -1.0 });
+        format!(
+            "(geometry: Quad(origin: {}, edge_u: {}, edge_v: {}), material: \"grey\", emission: 0.5),",
+            vector(origin),
+            vector(edge(u)),
+            vector(edge(v))
+        )
+    };
+    (0..3).flat_map(|axis| [wall(axis, -1.0), wall(axis, 1.0)]).collect()
+}
+
+#[test]
+fn white_furnace() {
+    let mut table = Table::default();
+    for case in cases("white_furnace") {
+        let scene = scene(&describe(&case));
+        for techniques in ["hit", "pt", "bpt", "bpt+surf+pp3d+pb2d+bb1d", "hit+surf+pb2d"] {
+            let settings = settings(techniques, None);
+            let merges = techniques.contains("surf");
+            let (result, _) = render(&scene, &settings, 40);
+            let slack = if merges { BOUNDARY_LOSS } else { 0.0 };
+            table.check(&format!("{} {techniques}", case.id), result, 1.0, slack);
+        }
+    }
+    table.finish();
+}

@@ -1,0 +1,265 @@
+//! The choice of techniques: it leaves out what a scene does not need, changes no expectation, and can be repeated and frozen.
+
+use std::path::Path;
+
+use crate::support::{Estimate, assert_same, channels, renderer};
+use upbp_core::{LightPaths, Radii, Radius, RenderPlan, Settings, Start, TechniqueSet, Techniques, read_exr};
+use upbp_scene::ReadyScene;
+use upbp_scene::description::{Count, Film};
+
+fn settings() -> Settings {
+    Settings { deterministic: true, ..Settings::default() }
+}
+
+/// By a plan that is given.
+fn by(plan: RenderPlan) -> Start<'static> {
+    Start { plan: Some(plan), ..Start::default() }
+}
+
+fn shipped(name: &str) -> ReadyScene {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    ReadyScene::load(root.join(format!("examples/scenes/{name}.ron"))).expect("a valid scene")
+}
+
+/// Matt things under an overcast sky.
+const MATT: &str = r#"(
+  version: 1,
+  camera: Perspective(origin: (0, 1, 3.4), target: (0, 0.6, 0), fov_degrees: 40),
+  film: (width: 48, height: 48),
+  materials: { "white": Lambert(0.7), "red": Lambert((0.6, 0.1, 0.1)) },
+  shapes: [
+    (material: "white", geometry: Quad(origin: (-2, 0, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0))),
+    (material: "red", geometry: Quad(origin: (-1, 0, -1), edge_u: (2, 0, 0), edge_v: (0, 2, 0))),
+    (material: "white", geometry: Sphere(centre: (0, 0.5, 0), radius: 0.5)),
+  ],
+  lights: [ Constant(1) ],
+)"#;
+
+#[test]
+fn camera_sub_paths_alone_where_they_suffice() {
+    let scene = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
+    let mut auto = renderer(&scene, settings());
+    let roulette = Some(auto.report().plan.stages()[0].roulette);
+    let techniques = Techniques::Set(TechniqueSet::PT);
+    let mut paths = renderer(&scene, Settings { techniques, roulette, ..settings() });
+    for _ in 0..8 {
+        assert!(auto.iterate() && paths.iterate());
+    }
+    let report = auto.report();
+    assert_eq!(report.plan.stages()[0].techniques, TechniqueSet::PT, "{report}");
+    let counters = report.counters;
+    assert_eq!(
+        [counters.light_edges, counters.light_vertices, counters.photon_beams, report.map_bytes],
+        [0; 4],
+        "no light sub-paths, nothing built"
+    );
+    // The same samples, at the same cost.
+    assert_eq!(auto.film().image(), paths.film().image());
+    assert_eq!(counters, paths.report().counters);
+}
+
+#[test]
+fn light_that_only_merges_find_is_not_lost() {
+    let scene = shipped("suite/surface_caustic");
+    for seed in 0..4 {
+        let stage = renderer(&scene, Settings { seed, ..settings() }).report().plan.stages()[0].clone();
+        assert!(stage.techniques.has(upbp_core::Technique::Surf) && stage.light_paths > 0, "{stage}");
+    }
+}
+
+/// Kernels of surface photons may be as wide as a pixel, where that is more than usual and nobody asked for a radius.
+#[test]
+fn surface_photons_blur_what_a_pixel_blurs() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/suite/surface_caustic.ron");
+    let first = |settings: Settings, side| {
+        let side = Count::new(side).expect("a positive number");
+        let film = Film { width: side, height: side, crop: None };
+        let scene = ReadyScene::load_with(&path, |description| description.film = film);
+        renderer(&scene.expect("a valid scene"), settings).report().plan.stages()[0].radii.surf
+    };
+    let fixed = || Settings { techniques: "bpt+surf".parse().expect("names"), ..settings() };
+    let usual = first(fixed(), 96);
+    let wide = first(settings(), 96);
+    assert!((1.5..=4.0).contains(&(wide / usual)), "{wide}, usually {usual}");
+    assert_eq!(first(settings(), 960), first(fixed(), 960), "pixels are small");
+    let radii = Radii { surf: Radius::Absolute(0.01), ..Radii::default() };
+    assert_eq!(first(Settings { radii, ..settings() }, 96), 0.01);
+}
+
+/// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.
+///
+/// Kernels have a fifth of their usual width: at first they blur 0.2 % of the light out of the medium of one of the scenes, whoever chose
+/// them, and this is about what choosing does.
+fn unbiased(name: &str, folder: &str) {
+    const SEEDS: u64 = 20;
+    const ITERATIONS: u64 = 16;
+    let scene = shipped(&format!("{folder}/{name}"));
+    let data = if folder == "suite" { "suite" } else { "references" };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/data/{data}/{name}.exr"));
+    let expected = read_exr(&path).expect("a reference").mean().map(Estimate::exactly);
+    let narrow = Radius::Scene(6e-4);
+    let radii = Radii { surf: narrow, pp3d: narrow, pb2d: narrow, bp2d: narrow, bb1d: narrow };
+    let mut plans = std::collections::BTreeSet::new();
+    let means: Vec<[f64; 3]> = (0..SEEDS)
+        .map(|seed| {
+            let mut renderer = renderer(&scene, Settings { seed, radii, ..settings() });
+            for _ in 0..ITERATIONS {
+                assert!(renderer.iterate());
+            }
+            plans.insert(renderer.report().plan.stages()[0].to_string());
+            renderer.film().image().mean()
+        })
+        .collect();
+    println!("{} plans: {plans:#?}", plans.len());
+    assert_same(channels(&means), expected, name);
+}
+
+#[test]
+fn no_bias_in_fog() {
+    unbiased("fog_cornell", "reference");
+}
+
+#[test]
+fn no_bias_in_a_forward_scattering_box() {
+    unbiased("forward_hg_box", "reference");
+}
+
+/// A render by the plan that its own seed has chosen against one by the plan of the next seed, with kernels of the usual width: plans of all
+/// seeds blur alike on average, so that what is left is what a plan and the samples that it serves have to do with each other.
+#[test]
+fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
+    const SEEDS: u64 = 16;
+    let scene = shipped("reference/forward_hg_box");
+    let plans: Vec<RenderPlan> = (0..=SEEDS)
+        .map(|seed| renderer(&scene, Settings { seed, ..settings() }).report().plan.clone())
+        .collect();
+    let render = |seed, plan: &RenderPlan| {
+        let settings = Settings { seed, ..settings() }.validate().expect("valid settings");
+        let mut renderer = scene.start_renderer(settings, by(plan.clone())).expect("a plan of this scene");
+        for _ in 0..8 {
+            assert!(renderer.iterate());
+        }
+        renderer.film().image().mean()
+    };
+    let pairs = plans.windows(2).zip(0..);
+    let differences: Vec<[f64; 3]> = pairs
+        .map(|(plans, seed)| {
+            let (own, other) = (render(seed, &plans[0]), render(seed, &plans[1]));
+            std::array::from_fn(|c| own[c] - other[c])
+        })
+        .collect();
+    assert!(differences.iter().any(|difference| *difference != [0.0; 3]), "all seeds choose the same");
+    assert_same(channels(&differences), [Estimate::exactly(0.0); 3], "own plan less another's");
+}
+
+/// Weights that ask how camera sub-paths correlate and how wide kernels are change no mean, and ask only where photons are merged.
+#[test]
+fn correlation_and_damping_change_no_mean() {
+    const SEEDS: u64 = 12;
+    let scene = shipped("reference/mirror_fog");
+    let narrow = Radius::Scene(6e-4);
+    let radii = Radii { surf: narrow, pp3d: narrow, pb2d: narrow, bp2d: narrow, bb1d: narrow };
+    let with = |seed, names: &str, on| {
+        let techniques = names.parse::<TechniqueSet>().expect("names").into();
+        renderer(&scene, Settings { seed, techniques, radii, correlation: on, damping: on, ..settings() })
+    };
+    assert_eq!(with(0, "bpt", true).report().plan.stages()[0].correlation, None);
+    let radius = with(0, "bpt+surf", true).report().plan.stages()[0].correlation;
+    // Four degrees at a distance of a few units.
+    assert!(radius.is_some_and(|radius| (0.01..1.0).contains(&radius)), "{radius:?}");
+    // Chosen with it, too.
+    let laser = shipped("suite/laser_in_fog");
+    let mut auto = renderer(&laser, Settings { correlation: true, ..settings() });
+    assert!(auto.iterate());
+    let report = auto.report();
+    assert!(report.plan.stages()[0].correlation.is_some() && report.counters.dropped == 0, "{report}");
+    let render = |seed, on| {
+        let mut renderer = with(seed, "bpt+surf+pp3d+pb2d+bb1d", on);
+        (0..8).for_each(|_| assert!(renderer.iterate()));
+        assert_eq!(renderer.report().counters.dropped, 0);
+        renderer.film().image().mean()
+    };
+    let differences: Vec<[f64; 3]> = (0..SEEDS)
+        .map(|seed| {
+            let (on, off) = (render(seed, true), render(seed, false));
+            std::array::from_fn(|c| on[c] - off[c])
+        })
+        .collect();
+    assert!(differences.iter().all(|difference| *difference != [0.0; 3]), "nothing asks for it");
+    assert_same(channels(&differences), [Estimate::exactly(0.0); 3], "with less without");
+}
+
+#[test]
+fn a_frozen_plan_makes_the_same_iterations() {
+    let scene = shipped("reference/mirror_fog");
+    // With measured time: what was chosen may not be chosen again.
+    let measured = Settings { light_paths: LightPaths::Count(2000), ..Settings::default() };
+    let mut first = renderer(&scene, measured.clone());
+    for _ in 0..4 {
+        assert!(first.iterate());
+    }
+    let plan = RenderPlan::from_ron(&first.state().identity().plan.to_string()).expect("a plan");
+    let checked = || measured.clone().validate().expect("valid settings");
+    let part = |range: std::ops::Range<u64>| {
+        let mut renderer = scene.start_renderer(checked(), by(plan.clone())).expect("the plan fits");
+        renderer.set_range(range);
+        while renderer.iterate() {}
+        renderer.state().clone()
+    };
+    let mut whole = part(2..4);
+    whole.merge(part(0..2)).expect("parts of one render");
+    assert_eq!(whole.report().film_fingerprint, first.report().film_fingerprint);
+
+    // A state takes its plan along.
+    let mut resumed = renderer(&scene, measured.clone());
+    resumed.resume(part(0..2)).expect("the same render");
+    assert!(resumed.iterate() && resumed.iterate());
+    assert_eq!(resumed.report().film_fingerprint, first.report().film_fingerprint);
+    assert_eq!(resumed.report().plan, plan);
+}
+
+/// Time that was measured may choose otherwise when a render is taken up again: what its state says counts, whatever that is. The
+/// scene has two lights, whose shares depend on whether there are light sub-paths.
+#[test]
+fn a_state_is_taken_up_whatever_was_chosen_since() {
+    let scene = shipped("reference/chromatic_sphere");
+    let auto = || Settings::default().validate().expect("valid settings");
+    for names in ["hit+nee", "bpt", "bpt+surf+pb2d"] {
+        let techniques = names.parse::<TechniqueSet>().expect("names").into();
+        let mut plan = renderer(&scene, Settings { techniques, ..settings() }).report().plan;
+        if names == "hit+nee" {
+            // A later stage has light sub-paths.
+            let bpt = Settings { techniques: TechniqueSet::BPT.into(), ..settings() };
+            let later = renderer(&scene, bpt).report().plan.to_string().replace("from: 0", "from: 3");
+            let both = format!("{}{}", plan.to_string().trim_end_matches(']'), later.trim_start_matches('['));
+            plan = RenderPlan::from_ron(&both).expect("two stages");
+        }
+        let run = |iterations| {
+            let mut renderer = scene.start_renderer(auto(), by(plan.clone())).expect("a plan for it");
+            (0..iterations).for_each(|_| assert!(renderer.iterate()));
+            renderer
+        };
+        let mut resumed = scene.renderer(auto()).expect("a valid render");
+        resumed.resume(run(2).state().clone()).expect("the same render");
+        (0..3).for_each(|_| assert!(resumed.iterate()));
+        assert_eq!(resumed.film().fingerprint(), run(5).film().fingerprint(), "{names}");
+    }
+}
+
+#[test]
+fn a_plan_that_does_not_fit_is_refused() {
+    let fog = shipped("reference/mirror_fog");
+    let everything = Settings { techniques: TechniqueSet::default().into(), ..settings() };
+    let plan = renderer(&fog, everything).report().plan;
+    let checked = || {
+        let settings = Settings { memory: Some(2048), ..settings() };
+        settings.validate().expect("valid settings")
+    };
+    let greedy = plan.to_string().replace("light_paths: 4096,", "light_paths: 4000000000,");
+    let greedy = RenderPlan::from_ron(&greedy).expect("a plan");
+    let error = fog.start_renderer(checked(), by(greedy)).map(|_| ()).expect_err("too much").to_string();
+    assert!(error.starts_with("plan, stage from iteration 0: needs") && error.contains("2048"), "{error}");
+    let matt = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
+    let error = matt.start_renderer(checked(), by(plan)).map(|_| ()).expect_err("no media here").to_string();
+    assert!(error.contains("pb2d") && error.contains("cannot be used"), "{error}");
+}

@@ -1,0 +1,4 @@
+//! The choice of techniques.
+
+mod adaptation;
+mod census;

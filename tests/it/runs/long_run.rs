@@ -1,0 +1,110 @@
+//! Renders of very many iterations: nothing grows, nothing overflows, nothing underflows.
+//!
+//! `UPBP_ITERATIONS=100000` sets how many; a few thousand by default.
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::time::Instant;
+
+use upbp_core::{ErrorPoint, LightPaths, MAX_ITERATIONS, Radius, Renderer, Settings};
+use upbp_scene::ReadyScene;
+
+use super::own_process;
+
+/// Resident memory, KiB.
+fn resident() -> i64 {
+    let text = fs::read_to_string("/proc/self/status").expect("Linux");
+    let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("a known name");
+    line.trim().trim_end_matches(" kB").parse().expect("a number")
+}
+
+fn renderer(room: &ReadyScene, change: impl Fn(&mut Settings)) -> Renderer<'_> {
+    let mut settings = Settings {
+        techniques: "all".parse().expect("technique names"),
+        light_paths: LightPaths::Count(16),
+        beams: Some(4),
+        ..Settings::default()
+    };
+    change(&mut settings);
+    crate::support::renderer(room, settings)
+}
+
+#[test]
+fn nothing_grows_with_the_number_of_iterations() {
+    if own_process::case().is_none() {
+        // Memory of other tests would count.
+        print!(
+            "{}",
+            own_process::run("runs::long_run::nothing_grows_with_the_number_of_iterations", "", &[])
+        );
+        return;
+    }
+    let wanted: u64 = std::env::var("UPBP_ITERATIONS").map_or(4000, |text| text.parse().expect("a number"));
+    let room = crate::support::room(4);
+    let mut renderer = renderer(&room, |_| ());
+    let start = Instant::now();
+    let mut early = 0;
+    let mut early_size = 0;
+    let size = |renderer: &Renderer<'_>| {
+        let mut bytes = Vec::new();
+        renderer.state().write(&mut bytes).expect("a vector takes all");
+        bytes.len()
+    };
+    for i in 0..wanted {
+        assert!(renderer.iterate());
+        let rmse = 1.0 / (i + 1) as f64;
+        renderer.record_error(ErrorPoint {
+            seconds: i as f64,
+            iterations: i + 1,
+            relative_mse: rmse * rmse,
+            rmse,
+        });
+        if i + 1 == (wanted / 4).min(1000) {
+            early_size = size(&renderer);
+            early = resident();
+        }
+    }
+    let (late, late_size) = (resident(), size(&renderer));
+    let report = renderer.report();
+    println!(
+        "{wanted} iterations in {:.1} s: resident {early} KiB early, {late} KiB at the end; state {early_size} and \
+         {late_size} bytes; {} points of error; {} dropped; mean {:?}; last radii {:?}",
+        start.elapsed().as_secs_f64(),
+        report.series.points().len(),
+        report.counters.dropped,
+        renderer.film().image().mean(),
+        report.last_radii,
+    );
+    assert!(late < early + 1024, "{early} KiB became {late} KiB");
+    assert!(report.series.points().len() < 1700);
+    assert_eq!(report.series.points().last().map(|point| point.iterations), Some(wanted));
+    assert_eq!(report.iterations, wanted);
+    assert_eq!(report.counters.dropped, 0);
+    assert!(renderer.film().image().pixels.iter().flatten().all(|v| v.is_finite() && *v > 0.0));
+    assert!(renderer.film().variance().pixels.iter().flatten().all(|v| v.is_finite() && *v > 0.0));
+}
+
+#[test]
+fn the_last_iterations_are_as_good_as_the_first() {
+    let room = crate::support::room(4);
+    for (what, radius) in
+        [("auto", Radius::Auto), ("tiny", Radius::Absolute(1e-30)), ("scene", Radius::Scene(1e-12))]
+    {
+        let mut renderer = renderer(&room, |settings| {
+            settings.radii =
+                upbp_core::Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius };
+        });
+        renderer.set_range(MAX_ITERATIONS - 20..u64::MAX);
+        while renderer.iterate() {}
+        assert_eq!(renderer.film().iterations(), 20, "{what}: the range ends at the last iteration");
+        let plan = renderer.plan(MAX_ITERATIONS - 1);
+        let kernels =
+            [plan.kernels.surf, plan.kernels.pp3d, plan.kernels.pb2d, plan.kernels.bp2d, plan.kernels.bb1d];
+        for kernel in kernels {
+            assert!(kernel.radius() > 1e-7 && kernel.radius().is_normal(), "{what}: {kernel:?}");
+            assert!(kernel.value(0.0).is_finite() && kernel.effective_volume() > 0.0, "{what}: {kernel:?}");
+        }
+        assert_eq!(renderer.report().counters.dropped, 0, "{what}");
+        assert!(renderer.film().image().pixels.iter().flatten().all(|v| v.is_finite()), "{what}");
+    }
+}
