@@ -1,4 +1,4 @@
-//! Renders the whole stress matrix (`docs/stress.md`) and prints a table of what was run and what failed.
+//! Renders the whole stress matrix (`docs/validation.md`) and prints a table of what was run and what failed.
 //!
 //! `cargo run --release --example stress` takes minutes on two cores; `-- --filter transform` runs the
 //! cases whose line contains the words. Ends with exit code 1 if any case failed.
