@@ -13,7 +13,9 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use upbp_core::{MediumId, Settings, TechniqueSet};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy, VertexKind};
-use upbp_estimators::mis::{BeamExtent, Edge, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges};
+use upbp_estimators::mis::{
+    BeamExtent, Edge, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges, Weight,
+};
 use upbp_estimators::scene::Walk;
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
@@ -97,8 +99,6 @@ fn plan() -> MisPlan {
         }],
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
-        damping: None,
-        correlation: None,
     }
 }
 
@@ -154,8 +154,7 @@ impl<'a> Ends<'a> {
             rho,
             cos_out,
             site: site(vertex),
-            leg: tip.leg,
-            reuse: tip.reuse,
+            distance_factor: tip.distance_factor,
             connectible: true,
             in_medium: in_medium(vertex),
         }
@@ -178,7 +177,6 @@ impl<'a> Ends<'a> {
         };
         let edge = Edge {
             distance_squared: edge.distance * edge.distance,
-            nearness: (edge.distance * edge.distance).recip(),
             cos_in,
             forward,
             backward,
@@ -194,10 +192,11 @@ impl<'a> Ends<'a> {
         let vertex = &path.vertices[middle];
         let light = Self::arrive(plan, path, Walk::Light, &self.light[0], middle);
         let camera = Self::arrive(plan, path, Walk::Camera, &self.camera, middle);
-        let factors = plan.volume_factors(MediumId(0), light.leg, camera.leg, vertex.sin_theta);
+        let (c_light, c_camera) = (light.distance_factor, camera.distance_factor);
+        let factors = plan.volume_factors(MediumId(0), c_light, c_camera, vertex.sin_theta);
         let (before_light, before_camera) =
             (light.before(plan, vertex.rho_camera), camera.before(plan, vertex.rho_light));
-        plan.merge_weight(factors.bb1d, factors.sum(), before_light, before_camera, camera.reuse).value()
+        Weight::of_merge(factors.bb1d, factors.sum::<f64>(), before_light, before_camera).value()
     }
 
     /// The connection of the vertex in fog to the wall before it.
@@ -208,15 +207,14 @@ impl<'a> Ends<'a> {
         let light = Self::arrive(plan, path, Walk::Light, &self.light[1], middle - 1);
         let camera = Self::arrive(plan, path, Walk::Camera, &self.camera, middle);
         let square = edge.distance * edge.distance;
-        let leg = |walk, vertex, t| plan.leg(walk, in_medium(vertex), square.recip(), edge.reach, t);
+        let opposite = |walk, vertex, t| plan.distance_factor(walk, in_medium(vertex), edge.reach, t);
         let light_end =
-            light.end(plan, Walk::Light, site(a), leg(Walk::Camera, a, edge.t_camera), a.rho_camera);
+            light.end(plan, Walk::Light, site(a), opposite(Walk::Camera, a, edge.t_camera), a.rho_camera);
         let camera_end =
-            camera.end(plan, Walk::Camera, site(b), leg(Walk::Light, b, edge.t_light), b.rho_light);
+            camera.end(plan, Walk::Camera, site(b), opposite(Walk::Light, b, edge.t_light), b.rho_light);
         let light_density = b.rho_camera * a.cos_camera / square * edge.t_camera;
         let camera_density = a.rho_light * b.cos_light / square * edge.t_light;
-        let reuse = plan.reuse(camera.reuse, b.rho_camera * a.cos_camera / square);
-        plan.connect_weight(light_end, light_density, camera_end, camera_density, reuse).value()
+        plan.connect_weight(light_end, light_density, camera_end, camera_density).value()
     }
 }
 

@@ -31,8 +31,6 @@ pub struct Stage {
     pub roulette: Roulette,
     /// In which iterations photons are looked up.
     pub look_ups: LookUps,
-    /// Merges count less behind camera vertices that are spread more widely than this radius, scene units; `None`: they do not.
-    pub correlation: Option<f32>,
     /// Connectible vertices per light sub-path, as the pilot found.
     pub vertices_per_light_path: f64,
     /// First radii and how they shrink.
@@ -64,8 +62,6 @@ impl Stage {
             Err(format!("vertices_per_light_path: expected a number, found {}", self.vertices_per_light_path))
         } else if !(lengths.iter().all(finite) && finite(&radii.floor) && radii.floor > 0.0) {
             Err(format!("radii: expected lengths and a positive floor, found {radii:?}"))
-        } else if self.correlation.is_some_and(|radius| !(radius > 0.0 && finite(&radius))) {
-            Err(format!("correlation: expected None or a radius, found {:?}", self.correlation))
         } else {
             Ok(())
         }
@@ -90,9 +86,6 @@ impl fmt::Display for Stage {
         match self.roulette {
             Roulette::Off => write!(f, ", no roulette")?,
             Roulette::Below(least) => write!(f, ", roulette below {least}")?,
-        }
-        if let Some(radius) = self.correlation {
-            write!(f, ", correlation within {radius}")?;
         }
         for technique in self.techniques.iter().filter(|technique| self.look_ups.period(*technique) > 1) {
             write!(f, ", {} in one of {} iterations", technique.name(), self.look_ups.period(technique))?;
@@ -194,7 +187,6 @@ mod tests {
             next_events: 2.0,
             roulette: Roulette::Below(0.5),
             look_ups: LookUps { surf: NonZeroU32::new(4).unwrap(), ..LookUps::ALL },
-            correlation: Some(0.02),
             vertices_per_light_path: 3.1,
             radii: RadiusSchedule {
                 surf: 1e-3,
@@ -216,7 +208,7 @@ mod tests {
         assert_eq!([0, 511, 512, 9999].map(|i| plan.stage(i).from), [0, 0, 512, 512]);
         assert_eq!(
             plan.stages()[1].to_string(),
-            "from iteration 512: hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, correlation within 0.02, surf in one of 4 iterations"
+            "from iteration 512: hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, surf in one of 4 iterations"
         );
     }
 
@@ -235,7 +227,6 @@ mod tests {
         assert!(wrong(|s| s.light_paths = 0).contains("light_paths"));
         assert!(wrong(|s| s.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|s| s.radii.pb2d = f32::NAN).contains("radii"));
-        assert!(wrong(|s| s.correlation = Some(f32::NAN)).contains("correlation"));
         assert!(wrong(|s| s.techniques = TechniqueSet::EMPTY).contains("techniques"));
         assert!(wrong(|s| s.next_events = 5000.0).contains("next_events"));
         assert!(wrong(|s| s.vertices_per_light_path = f64::INFINITY).contains("vertices"));

@@ -1,7 +1,5 @@
 //! A view into the walks: every vertex, every accepted sample with its weight, and what the time goes to.
 
-use std::marker::PhantomData;
-
 use glam::Vec3;
 use upbp_media::Spectrum;
 
@@ -78,8 +76,6 @@ pub enum Joint<B> {
         light: (Vec3, u32),
         /// The query point (a point of the beam).
         camera: (Vec3, Site<B>),
-        /// What its density is [damped](Densities::damped) by in its weight.
-        reuse: f64,
     },
 }
 
@@ -100,8 +96,7 @@ pub struct ObservedSample<B, D = f64> {
 
 /// Receives what the walks do. All methods do nothing by default and then cost nothing, if the type is known.
 pub trait Observer<B> {
-    /// What weights are to tell: `f64`, [`MergesApart`](crate::mis::MergesApart), which plans with correlation need, or
-    /// [`ByTechnique`](crate::mis::ByTechnique).
+    /// What weights are to tell: `f64` or [`ByTechnique`](crate::mis::ByTechnique).
     type Densities: Densities;
 
     /// A light sub-path starts.
@@ -139,21 +134,7 @@ pub trait Observer<B> {
 /// them.
 pub type DynObserver<'a, B, D = f64> = dyn Observer<B, Densities = D> + 'a;
 
-/// Nobody looks: [`Nobody<f64>`], shorter.
+/// Nobody looks.
 impl<B> Observer<B> for () {
     type Densities = f64;
-}
-
-/// Nobody looks, and weights are made of densities of a type of choice.
-#[derive(Clone, Copy, Debug)]
-pub struct Nobody<D>(PhantomData<D>);
-
-impl<D> Default for Nobody<D> {
-    fn default() -> Self {
-        Self(PhantomData)
-    }
-}
-
-impl<B, D: Densities> Observer<B> for Nobody<D> {
-    type Densities = D;
 }

@@ -4,7 +4,7 @@ use upbp_media::Medium;
 
 use crate::kernel::Kernel;
 use crate::look_ups::LookUps;
-use crate::mis::{BeamExtent, Damping, Heuristic, MisPlan, VolumeMerges};
+use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
 use crate::roulette::Roulette;
 use crate::scene::Scene;
 use crate::technique::{Technique, TechniqueSet};
@@ -33,17 +33,6 @@ impl Kernels {
         bp2d: Kernel::NONE,
         bb1d: Kernel::NONE,
     };
-
-    fn damping(&self) -> Damping {
-        let fourth_power = |kernel: &Kernel| f64::from(kernel.radius()).powi(4);
-        Damping {
-            surf: fourth_power(&self.surf),
-            pp3d: fourth_power(&self.pp3d),
-            pb2d: fourth_power(&self.pb2d),
-            bp2d: fourth_power(&self.bp2d),
-            bb1d: fourth_power(&self.bb1d),
-        }
-    }
 }
 
 /// Path lengths that are rendered: the number of edges between the light and the camera, both ends included.
@@ -129,11 +118,6 @@ pub struct PlanChoices {
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,
-    /// Whether merges count less where their kernels are wide beside the edges that meet there.
-    pub damping: bool,
-    /// The radius within which camera sub-paths are taken to find the same photons, scene units; `None` if all that counts is how many
-    /// photons there are. Walks must then have an observer whose densities know [merges apart](crate::mis::MergesApart).
-    pub correlation: Option<f32>,
 }
 
 /// How much the merges of a kernel count in a medium, in `[0, 1]` (`docs/theory.md`, section 6(c)): the light changes within a
@@ -196,8 +180,6 @@ impl Plan {
             volume,
             photon_beams: choices.photon_beams,
             query_beams: choices.query_beams,
-            damping: choices.damping.then(|| kernels.damping()),
-            correlation: choices.correlation.map(f64::from),
         };
         Self {
             seed: choices.seed,

@@ -7,8 +7,8 @@
 use std::num::NonZeroU32;
 
 use glam::Vec3;
-use upbp_estimators::mis::{BeamExtent, Densities, Heuristic, MergesApart};
-use upbp_estimators::observer::{Nobody, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::mis::{BeamExtent, Heuristic};
+use upbp_estimators::observer::{ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::scene::Bsdf;
 use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
 use upbp_estimators::{
@@ -46,27 +46,17 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> PlanChoices {
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
-        damping: false,
-        correlation: None,
     }
 }
 
 /// Mean of the film in one iteration.
 fn iteration(scene: &ClosedForm, choices: &PlanChoices) -> f64 {
-    if choices.correlation.is_some() {
-        iteration_with::<MergesApart>(scene, choices)
-    } else {
-        iteration_with::<f64>(scene, choices)
-    }
-}
-
-fn iteration_with<D: Densities>(scene: &ClosedForm, choices: &PlanChoices) -> f64 {
     let world = World::new(scene).expect("the scene is in order");
     let plan = Plan::new(scene, choices);
     let context = Context { world: &world, plan: &plan };
     let mut scratch = Scratch::default();
     let mut chunk = LightChunk::default();
-    let nobody = &mut Nobody::<D>::default();
+    let nobody = &mut ();
     if plan.needs_light_paths() {
         for index in 0..plan.light_paths {
             trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, nobody);
@@ -208,24 +198,6 @@ fn lights_that_are_never_hit() {
     let lengths = PathLengths { min: 2, max: 2 };
     let sets = ["nee+lt", "lt", "nee+surf+pp3d+pb2d+bp2d+bb1d", "surf+pb2d", "surf+bb1d"];
     agree(OUTSIDE, [0.0, 0.0, 2.0, 1.0, 0.0], lengths, &sets);
-}
-
-/// Weights that ask how wide kernels are, and how widely camera sub-paths are spread, render the same picture.
-#[test]
-fn damped_merges() {
-    let scene = ClosedForm::new(OUTSIDE, SIZE);
-    let usual = choices("all", PathLengths { min: 1, max: 6 }, 300);
-    let (expected, expected_error) = mean(&scene, &usual);
-    for (seed, damping, correlation) in [(301, true, None), (302, false, Some(0.1)), (303, true, Some(0.02))]
-    {
-        let (found, error) = mean(&scene, &PlanChoices { seed, damping, correlation, ..usual.clone() });
-        let sigma = error.hypot(expected_error);
-        println!(
-            "{damping}, {correlation:?}: {found:.5} ± {error:.5}, expected {expected:.5} ± {expected_error:.5}"
-        );
-        assert!((found - expected).abs() < 4.0 * sigma, "{found}, expected {expected} ± {sigma}");
-        assert!(sigma < 0.02 * expected, "too noisy to tell: {sigma} of {expected}");
-    }
 }
 
 #[test]

@@ -4,11 +4,9 @@
 //! The abstract test of the recursion takes densities as given. Here they are those of the walks: wrong
 //! distances, stacks of bodies, reverse densities and thresholds show.
 
-use std::marker::PhantomData;
-
 use glam::Vec3;
 use upbp_estimators::mis::oracle::{Path, Strategy};
-use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MergesApart, MisPlan, Weight};
+use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::scene::Scene;
 use upbp_estimators::walk::{
@@ -46,8 +44,7 @@ struct Comparison {
 }
 
 /// Compares every sample with the enumeration, up to a number of each technique.
-struct Auditor<'a, D> {
-    densities: PhantomData<D>,
+struct Auditor<'a> {
     scene: &'a ClosedForm,
     plan: &'a Plan,
     light_ends: Vec<Option<LightEnd>>,
@@ -76,11 +73,10 @@ fn joint(light: Vec3, camera: Vec3, site: &Site<Material>) -> Vertex {
     }
 }
 
-impl<'a, D: Densities> Auditor<'a, D> {
+impl<'a> Auditor<'a> {
     fn new(scene: &'a ClosedForm, plan: &'a Plan) -> Self {
         let paths = plan.light_paths as usize;
         Self {
-            densities: PhantomData,
             scene,
             plan,
             light_ends: vec![None; paths],
@@ -92,7 +88,7 @@ impl<'a, D: Densities> Auditor<'a, D> {
     }
 
     /// The path of a sample, and which strategy made it.
-    fn trace(&self, sample: &ObservedSample<Material, D>) -> (Trace, Strategy) {
+    fn trace(&self, sample: &ObservedSample<Material>) -> (Trace, Strategy) {
         let prefix = |path: u32, vertices: u32| {
             let path = path as usize;
             let light = self.light_ends[path].expect("a light sub-path has a start");
@@ -137,7 +133,7 @@ impl<'a, D: Densities> Auditor<'a, D> {
         (Trace { light, interior, lens }, strategy)
     }
 
-    fn audit(&mut self, sample: &ObservedSample<Material, D>) {
+    fn audit(&mut self, sample: &ObservedSample<Material>) {
         let technique = sample.technique as usize;
         self.comparisons[technique].seen += 1;
         let found = sample.weight.value();
@@ -173,8 +169,8 @@ impl<'a, D: Densities> Auditor<'a, D> {
     }
 }
 
-impl<D: Densities> Observer<Material> for Auditor<'_, D> {
-    type Densities = D;
+impl Observer<Material> for Auditor<'_> {
+    type Densities = f64;
 
     fn light_end(&mut self, path: u32, end: &LightEnd) {
         self.light_ends[path as usize] = Some(*end);
@@ -196,7 +192,7 @@ impl<D: Densities> Observer<Material> for Auditor<'_, D> {
         assert_eq!(self.camera_vertices.len(), observed.depth as usize);
     }
 
-    fn sample(&mut self, sample: &ObservedSample<Material, D>) {
+    fn sample(&mut self, sample: &ObservedSample<Material>) {
         self.audit(sample);
     }
 }
@@ -229,8 +225,6 @@ fn choices() -> PlanChoices {
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
-        damping: false,
-        correlation: None,
     }
 }
 
@@ -239,19 +233,11 @@ const CAMERAS: [Vec3; 2] = [Vec3::new(0.2, 0.3, 3.0), Vec3::new(0.1, 0.4, 1.0)];
 
 /// Renders once and compares; every technique that runs has at least `at_least` weights to compare.
 fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: usize) {
-    if choices.correlation.is_some() {
-        audit_with::<MergesApart>(name, camera, size, choices, at_least);
-    } else {
-        audit_with::<f64>(name, camera, size, choices, at_least);
-    }
-}
-
-fn audit_with<D: Densities>(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: usize) {
     let scene = ClosedForm::new(camera, size);
     let world = World::new(&scene).expect("the scene is in order");
     let plan = Plan::new(&scene, choices);
     let context = Context { world: &world, plan: &plan };
-    let mut auditor = Auditor::<D>::new(&scene, &plan);
+    let mut auditor = Auditor::new(&scene, &plan);
     let mut scratch = Scratch::default();
     let mut chunk = LightChunk::default();
     for index in 0..plan.light_paths {
@@ -325,28 +311,6 @@ fn all_techniques_with_the_balance_heuristic() {
 fn the_power_heuristic() {
     let choices = PlanChoices { heuristic: Heuristic::Power, ..choices() };
     audit("power heuristic", CAMERAS[1], 48, &choices, 1000);
-}
-
-#[test]
-fn merges_that_are_damped() {
-    // Radii are a few per cent of the scene, edges of all lengths.
-    let choices = PlanChoices { damping: true, light_paths: 24_000, beam_paths: 1000, ..choices() };
-    audit("damped", CAMERAS[1], 96, &choices, 3000);
-}
-
-#[test]
-fn merges_behind_scattered_camera_sub_paths() {
-    for (heuristic, radius) in [(Heuristic::Balance, 0.05), (Heuristic::Power, 0.2)] {
-        let choices = PlanChoices {
-            heuristic,
-            damping: true,
-            correlation: Some(radius),
-            light_paths: 24_000,
-            beam_paths: 1000,
-            ..choices()
-        };
-        audit(&format!("correlation within {radius}, {heuristic:?}"), CAMERAS[1], 96, &choices, 3000);
-    }
 }
 
 #[test]

@@ -262,8 +262,6 @@ impl Setup {
                 heuristic: Heuristic::Balance,
                 photon_beams: self.photon_beams,
                 query_beams: self.query_beams,
-                damping: false,
-                correlation: None,
             },
         )
     }

@@ -41,8 +41,6 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
-            damping: false,
-            correlation: None,
         },
     );
     let context = Context { world: &world, plan: &plan };

@@ -152,43 +152,6 @@ fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
     assert_same(channels(&differences), [Estimate::exactly(0.0); 3], "own plan less another's");
 }
 
-/// Weights that ask how camera sub-paths correlate and how wide kernels are change no mean, and ask only where photons are merged.
-#[test]
-fn correlation_and_damping_change_no_mean() {
-    const SEEDS: u64 = 12;
-    let scene = shipped("reference/mirror_fog");
-    let narrow = Radius::Scene(6e-4);
-    let radii = Radii { surf: narrow, pp3d: narrow, pb2d: narrow, bp2d: narrow, bb1d: narrow };
-    let with = |seed, names: &str, on| {
-        let techniques = names.parse::<TechniqueSet>().expect("names").into();
-        renderer(&scene, Settings { seed, techniques, radii, correlation: on, damping: on, ..settings() })
-    };
-    assert_eq!(with(0, "bpt", true).report().plan.stages()[0].correlation, None);
-    let radius = with(0, "bpt+surf", true).report().plan.stages()[0].correlation;
-    // Four degrees at a distance of a few units.
-    assert!(radius.is_some_and(|radius| (0.01..1.0).contains(&radius)), "{radius:?}");
-    // Chosen with it, too.
-    let laser = shipped("suite/laser_in_fog");
-    let mut auto = renderer(&laser, Settings { correlation: true, ..settings() });
-    assert!(auto.iterate());
-    let report = auto.report();
-    assert!(report.plan.stages()[0].correlation.is_some() && report.counters.dropped == 0, "{report}");
-    let render = |seed, on| {
-        let mut renderer = with(seed, "bpt+surf+pp3d+pb2d+bb1d", on);
-        (0..8).for_each(|_| assert!(renderer.iterate()));
-        assert_eq!(renderer.report().counters.dropped, 0);
-        renderer.film().image().mean()
-    };
-    let differences: Vec<[f64; 3]> = (0..SEEDS)
-        .map(|seed| {
-            let (on, off) = (render(seed, true), render(seed, false));
-            std::array::from_fn(|c| on[c] - off[c])
-        })
-        .collect();
-    assert!(differences.iter().all(|difference| *difference != [0.0; 3]), "nothing asks for it");
-    assert_same(channels(&differences), [Estimate::exactly(0.0); 3], "with less without");
-}
-
 #[test]
 fn a_frozen_plan_makes_the_same_iterations() {
     let scene = shipped("reference/mirror_fog");

@@ -23,19 +23,18 @@ fn status(name: &str) -> f64 {
     kib * 1024.0
 }
 
-fn settings(light_paths: u32, beams: f64, correlation: bool, memory: u32) -> Settings {
+fn settings(light_paths: u32, beams: f64, memory: u32) -> Settings {
     Settings {
         beams: (beams > 0.0).then_some((beams * f64::from(light_paths)) as u32),
         techniques: "all".parse().expect("technique names"),
         light_paths: LightPaths::Count(light_paths),
-        correlation,
         memory: Some(memory),
         ..Settings::default()
     }
 }
 
 /// Renders two iterations; prints what was expected and what it took, bytes, and the number of light vertices.
-fn measure(memory: u32, vertices: f64, beams: f64, correlation: bool) {
+fn measure(memory: u32, vertices: f64, beams: f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cornell_media.ron");
     let side = Count::new(64).expect("a positive count");
     let scene = ReadyScene::load_with(path, |description| {
@@ -46,7 +45,7 @@ fn measure(memory: u32, vertices: f64, beams: f64, correlation: bool) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a thread pool");
     pool.install(|| {
         let renderer = |paths, memory| {
-            let checked = settings(paths, beams, correlation, memory).validate().expect("valid settings");
+            let checked = settings(paths, beams, memory).validate().expect("valid settings");
             scene.renderer(checked).expect("a renderer")
         };
         // A pilot first: what it leaves with the allocator and the threads does not grow with what is rendered.
@@ -66,11 +65,11 @@ fn measure(memory: u32, vertices: f64, beams: f64, correlation: bool) {
 }
 
 /// Runs a case in a process of its own: expected and measured bytes, vertices.
-fn run(memory: u32, vertices: f64, beams: f64, correlation: bool) -> [f64; 2] {
+fn run(memory: u32, vertices: f64, beams: f64) -> [f64; 2] {
     // What is measured is what the render holds: by itself the GNU allocator keeps some MiB of what was freed, now more,
     // now less.
     let allocator = [("MALLOC_MMAP_THRESHOLD_", "131072"), ("MALLOC_TRIM_THRESHOLD_", "131072")];
-    let case = format!("{memory} {vertices} {beams} {}", u32::from(correlation));
+    let case = format!("{memory} {vertices} {beams}");
     let text = own_process::run("runs::memory::memory_is_what_was_expected", &case, &allocator);
     let line = text.lines().find_map(|line| line.split_once("case ").map(|(_, rest)| rest));
     let Some(line) = line else { panic!("{text}") };
@@ -88,26 +87,24 @@ fn run(memory: u32, vertices: f64, beams: f64, correlation: bool) -> [f64; 2] {
 
 #[test]
 fn memory_is_what_was_expected() {
-    // What is allowed in MiB, how many light vertices are wanted, which part of the light sub-paths leaves beams, and
-    // whether weights know of correlation.
+    // What is allowed in MiB, how many light vertices are wanted, which part of the light sub-paths leaves beams.
     if let Some(case) = own_process::case() {
         let numbers: Vec<f64> = case.split(' ').map(|word| word.parse().expect("a number")).collect();
-        return measure(numbers[0] as u32, numbers[1], numbers[2], numbers[3] > 0.0);
+        return measure(numbers[0] as u32, numbers[1], numbers[2]);
     }
     let close = |[expected, measured]: [f64; 2]| {
         assert!((measured / expected - 1.0).abs() < 0.1, "expected {expected} bytes, measured {measured}");
     };
     if let Ok(vertices) = std::env::var("UPBP_VERTICES") {
-        close(run(1 << 20, vertices.parse().expect("a number"), 0.0, false));
+        close(run(1 << 20, vertices.parse().expect("a number"), 0.0));
         return;
     }
     // As many beams as the pilot finds useful, and one for every second sub-path.
-    close(run(1 << 20, 1e5, 0.0, false));
-    close(run(1 << 20, 1e6, 0.0, false));
-    close(run(1 << 20, 1e5, 0.5, false));
-    close(run(1 << 20, 1e5, 0.5, true));
+    close(run(1 << 20, 1e5, 0.0));
+    close(run(1 << 20, 1e6, 0.0));
+    close(run(1 << 20, 1e5, 0.5));
     // As much as is allowed, no more and not much less.
-    let [expected, measured] = run(150, 1e7, 0.0, false);
+    let [expected, measured] = run(150, 1e7, 0.0);
     close([expected, measured]);
     close([150.0 * MIB, measured]);
 }

@@ -35,8 +35,7 @@ pub(crate) fn everything<S: Scene>(
         .unwrap_or_else(|| enough_beams(world, settings, pilot).min(wanted / 10).max(1))
         .min(wanted);
     // Need grows in proportion: a part of the sub-paths takes this part of the memory.
-    let need = LightCounts::expected(pilot, wanted, wanted_beams)
-        .peak_bytes::<S::Bsdf>(correlation(settings, techniques, pilot).is_some());
+    let need = LightCounts::expected(pilot, wanted, wanted_beams).peak_bytes::<S::Bsdf>();
     let part = (bytes as f64 / need.max(1.0)).min(1.0);
     let afford = |count: u32| ((f64::from(count) * part) as u32).max(1);
     let (light_paths, beam_paths) = (afford(wanted), afford(wanted_beams));
@@ -61,15 +60,9 @@ pub(crate) fn stage<S: Scene>(
         next_events: settings.next_events.unwrap_or(1.0),
         roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
         look_ups: LookUps::ALL,
-        correlation: correlation(settings, techniques, pilot),
         vertices_per_light_path: pilot.vertices_per_path,
         radii: first_radii(world, settings, techniques, pilot, [light_paths, beam_paths]),
     }
-}
-
-/// The radius of correlation that weights ask for; none without merges, where nothing depends on it.
-pub(crate) fn correlation(settings: &Settings, techniques: TechniqueSet, pilot: &Pilot) -> Option<f32> {
-    pilot.correlation_radius.filter(|_| settings.correlation && techniques.iter().any(Technique::merges))
 }
 
 /// The roulette that did best, in geometric mean over many scenes. Where light sub-paths come to meet them, long camera sub-paths tell
@@ -152,8 +145,6 @@ pub(crate) fn plan<S: Scene>(
             heuristic: settings.heuristic,
             photon_beams: settings.photon_beams,
             query_beams: settings.query_beams,
-            damping: settings.damping,
-            correlation: stage.correlation,
         },
     )
 }

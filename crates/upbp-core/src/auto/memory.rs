@@ -4,7 +4,6 @@
 //! their look-up structures, and what building those takes for a moment, from light sub-paths. The pilot tells how many of
 //! each a sub-path leaves. What does not grow is not counted: the program, the scene, the threads.
 
-use upbp_estimators::mis::MergesApart;
 use upbp_estimators::walk::{LightVertex, PhotonBeam};
 
 use crate::auto::statistics::Pilot;
@@ -61,9 +60,8 @@ impl LightCounts {
         }
     }
 
-    /// The most bytes that they take at one time, from the first vertex to the end of the iteration; `apart` says whether weights
-    /// know merges apart.
-    pub(crate) fn peak_bytes<B>(&self, apart: bool) -> f64 {
+    /// The most bytes that they take at one time, from the first vertex to the end of the iteration.
+    pub(crate) fn peak_bytes<B>(&self) -> f64 {
         /// The boxes of a tree, per item: those of leaves, rounded for points, and the nodes above them.
         const NODES: f64 = 256.0 / 512.0 * 8.0 / 7.0;
         const POINT_BOXES: f64 = 1.0 + NODES;
@@ -77,11 +75,7 @@ impl LightCounts {
         const PIECE: f64 = 12.0;
         const CENTRE: f64 = 16.0;
         const PLACED: f64 = 40.0;
-        let [vertex, beam] = if apart {
-            [size_of::<LightVertex<B, MergesApart>>(), size_of::<PhotonBeam<MergesApart>>()]
-        } else {
-            [size_of::<LightVertex<B>>(), size_of::<PhotonBeam>()]
-        };
+        let [vertex, beam] = [size_of::<LightVertex<B>>(), size_of::<PhotonBeam>()];
         let held = self.vertices * vertex as f64 + self.beams * beam as f64;
         // Buckets are kept until the tree is there.
         let (building, tree) = (2.0 * POINT + POINT_BOXES, POINT + POINT_BOXES);

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Technique, TechniqueSet, World};
 
-use crate::auto::choices::{BEAMS, correlation, plan};
+use crate::auto::choices::{BEAMS, plan};
 use crate::auto::emitters;
 use crate::auto::memory::LightCounts;
 use crate::auto::statistics::Pilot;
@@ -69,7 +69,6 @@ impl Planner {
             connections: everything.connections * candidate.connections as f32,
             roulette: roulette::numbered(candidate.roulette, of_trial),
             look_ups: candidate.look_ups(),
-            correlation: correlation(settings, candidate.techniques, pilot),
             radii: radii(candidate.surf_radius),
             ..everything.clone()
         }
@@ -93,8 +92,7 @@ impl Planner {
         let fits = |factor: &f64| {
             let beams = f64::from(everything.beam_paths) * factor;
             let counts = LightCounts::expected(pilot, everything.light_paths, beams as u32);
-            *factor <= 1.0
-                || counts.peak_bytes::<S::Bsdf>(everything.correlation.is_some()) < self.bytes as f64
+            *factor <= 1.0 || counts.peak_bytes::<S::Bsdf>() < self.bytes as f64
         };
         auto::Bounds {
             techniques,

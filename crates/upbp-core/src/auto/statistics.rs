@@ -38,8 +38,6 @@ const CHUNK: u64 = 64;
 const QUERIES: usize = 96;
 /// Light vertices that distances are measured to: those of the first light sub-paths.
 const NEIGHBOURS: usize = 16384;
-/// The tangent of the angle, four degrees, within which camera sub-paths are taken to find the same photons.
-const CORRELATION_ANGLE: f32 = 0.07;
 
 /// What the pilot found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,9 +56,6 @@ pub(crate) struct Pilot {
     pub(crate) pieces_per_path: f64,
     /// Width of a pixel where camera sub-paths first meet what scatters in more than one direction, median; 0 where nothing does.
     pub(crate) footprint: f32,
-    /// The radius within which camera sub-paths are taken to find the same photons: [some degrees](CORRELATION_ANGLE) as seen from the camera,
-    /// there.
-    pub(crate) correlation_radius: Option<f32>,
     /// Typical distances to the nearest neighbours; `None` where there is nothing.
     pub(crate) surf: Option<Neighbours>,
     /// PP3D.
@@ -108,8 +103,6 @@ pub(crate) fn run<S: Scene>(
             heuristic: Heuristic::Balance,
             photon_beams: settings.photon_beams,
             query_beams: BeamExtent::Short,
-            damping: false,
-            correlation: None,
         };
         Plan::new(world.scene, &choices)
     };
@@ -150,9 +143,6 @@ pub(crate) fn run<S: Scene>(
         light_path_seconds: light_time.as_secs_f64() / paths,
         vertices_per_path: light.vertices.len() as f64 / paths,
         footprint: median(&mut queries.footprints).unwrap_or(0.0),
-        correlation_radius: median(&mut queries.distances)
-            .map(|distance| CORRELATION_ANGLE * distance)
-            .filter(|radius| *radius > 0.0),
         surface_per_path: looked_up(plan.looks_up(Technique::Surf), on_surfaces),
         medium_per_path: looked_up(plan.stores_medium_photons(), in_media),
         pieces_per_path: beams.pieces() as f64 / beam_paths,
@@ -212,9 +202,8 @@ struct Queries {
     surfaces: Vec<Vec3>,
     media: Vec<Vec3>,
     edges: Vec<Ray>,
-    /// Widths of pixels, and distances from the camera, where sub-paths first scatter in more than one direction.
+    /// Widths of pixels where sub-paths first scatter in more than one direction.
     footprints: Vec<f32>,
-    distances: Vec<f32>,
     last: Vec3,
     /// Length of the sub-path so far.
     travelled: f32,
@@ -254,7 +243,6 @@ impl<B> Observer<B> for Queries {
             && width.is_finite()
         {
             self.footprints.push(width);
-            self.distances.push(self.travelled);
         }
     }
 }
@@ -291,7 +279,6 @@ fn camera_queries<S: Scene>(
         queries.media.extend(piece.media);
         queries.edges.extend(piece.edges);
         queries.footprints.extend(piece.footprints);
-        queries.distances.extend(piece.distances);
     }
     thin(&mut queries.surfaces);
     thin(&mut queries.media);

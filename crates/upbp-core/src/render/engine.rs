@@ -7,7 +7,6 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
-use upbp_estimators::mis::{Densities, MergesApart};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::walk::Context;
 use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
@@ -82,15 +81,8 @@ pub(crate) struct SceneEngine<'a, S: Scene> {
     /// None if there is no choice.
     pub(crate) emitters: Option<EmitterChoices>,
     pub(crate) pilot: Pilot,
-    pub(crate) map: Map<S::Bsdf>,
-}
-
-/// What the light sub-paths of an iteration left.
-pub(crate) enum Map<B> {
-    /// For weights that add all techniques up.
-    Plain(LightMap<B>),
-    /// For weights that know correlation.
-    Apart(LightMap<B, MergesApart>),
+    /// What the light sub-paths of an iteration left.
+    pub(crate) map: LightMap<S::Bsdf>,
 }
 
 impl<S: Scene> SceneEngine<'_, S> {
@@ -127,19 +119,11 @@ impl<S: Scene> Engine for SceneEngine<'_, S> {
     ) -> Option<LightDone> {
         self.choose_emitters(plan.light_paths > 0);
         let context = Context { world: &self.world, plan };
-        // The lists of the iteration before are used again, unless a stage of the other kind has left them.
-        let map = std::mem::replace(&mut self.map, Map::Plain(LightMap::empty()));
-        if plan.mis.correlation.is_some() {
-            let lists = if let Map::Apart(map) = map { Lists::of(map) } else { Lists::default() };
-            let (map, done) = trace_light(&context, &self.pilot, lists, rect, pixels, halt)?;
-            self.map = Map::Apart(map);
-            Some(done)
-        } else {
-            let lists = if let Map::Plain(map) = map { Lists::of(map) } else { Lists::default() };
-            let (map, done) = trace_light(&context, &self.pilot, lists, rect, pixels, halt)?;
-            self.map = Map::Plain(map);
-            Some(done)
-        }
+        // The lists of the iteration before are used again.
+        let lists = Lists::of(std::mem::replace(&mut self.map, LightMap::empty()));
+        let (map, done) = trace_light(&context, &self.pilot, lists, rect, pixels, halt)?;
+        self.map = map;
+        Some(done)
     }
 
     fn trace_camera(
@@ -151,25 +135,22 @@ impl<S: Scene> Engine for SceneEngine<'_, S> {
         halt: &Halt<'_>,
     ) -> Option<Counters> {
         let context = Context { world: &self.world, plan };
-        match &self.map {
-            Map::Plain(map) => camera_pass(&context, map, rect, sets, pixels, halt),
-            Map::Apart(map) => camera_pass(&context, map, rect, sets, pixels, halt),
-        }
+        camera_pass(&context, &self.map, rect, sets, pixels, halt)
     }
 
     fn shrink(&mut self) {
-        self.map = Map::Plain(LightMap::empty());
+        self.map = LightMap::empty();
     }
 }
 
-fn trace_light<S: Scene, D: Densities>(
+fn trace_light<S: Scene>(
     context: &Context<'_, S>,
     pilot: &Pilot,
-    mut lists: Lists<S::Bsdf, D>,
+    mut lists: Lists<S::Bsdf>,
     rect: PixelRect,
     pixels: &mut [Pixel],
     halt: &Halt<'_>,
-) -> Option<(LightMap<S::Bsdf, D>, LightDone)> {
+) -> Option<(LightMap<S::Bsdf>, LightDone)> {
     let plan = context.plan;
     let mut times = PassTimes::default();
     let mut clock = Clock::start();

@@ -6,8 +6,6 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use upbp_estimators::mis::Densities;
-use upbp_estimators::observer::Nobody;
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::walk::{trace_camera_path, trace_light_path};
@@ -24,20 +22,20 @@ const LIGHT_CHUNK: u32 = 64;
 const CAMERA_CHUNK: usize = 64;
 
 /// Lists that are used again in the next iteration: the allocator need not find a use for what was given back to it.
-pub(crate) struct Lists<B, D = f64> {
-    pub(crate) vertices: Vec<LightVertex<B, D>>,
-    pub(crate) beams: Vec<PhotonBeam<D>>,
+pub(crate) struct Lists<B> {
+    pub(crate) vertices: Vec<LightVertex<B>>,
+    pub(crate) beams: Vec<PhotonBeam>,
 }
 
-impl<B, D> Default for Lists<B, D> {
+impl<B> Default for Lists<B> {
     fn default() -> Self {
         Self { vertices: Vec::new(), beams: Vec::new() }
     }
 }
 
-impl<B, D> Lists<B, D> {
+impl<B> Lists<B> {
     /// Those of a map that is no longer needed.
-    pub(crate) fn of(map: LightMap<B, D>) -> Self {
+    pub(crate) fn of(map: LightMap<B>) -> Self {
         Self { vertices: map.vertices, beams: map.beams }
     }
 }
@@ -47,11 +45,11 @@ impl<B, D> Lists<B, D> {
 ///
 /// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never more than a
 /// fraction of all in two places.
-pub(crate) fn light_pass<S: Scene, D: Densities>(
+pub(crate) fn light_pass<S: Scene>(
     context: &Context<'_, S>,
     kind: StreamKind,
     expected: &LightCounts,
-    lists: &mut Lists<S::Bsdf, D>,
+    lists: &mut Lists<S::Bsdf>,
     halt: &Halt<'_>,
     mut take_splats: impl FnMut(&[Splat]),
 ) -> Option<Counters> {
@@ -60,7 +58,7 @@ pub(crate) fn light_pass<S: Scene, D: Densities>(
     // Enough for each thread that none waits long for the last one.
     let threads = rayon::current_num_threads() as u32;
     let wave = (chunks / 32).clamp(16 * threads, 256 * threads);
-    let mut buffers: Vec<LightChunk<S::Bsdf, D>> = Vec::new();
+    let mut buffers: Vec<LightChunk<S::Bsdf>> = Vec::new();
     buffers.resize_with(wave.min(chunks) as usize, LightChunk::default);
     let mut counters = Counters::default();
     lists.vertices.clear();
@@ -70,14 +68,13 @@ pub(crate) fn light_pass<S: Scene, D: Densities>(
     let _ = lists.beams.try_reserve_exact((1.05 * expected.beams) as usize);
     for start in (0..chunks).step_by(wave as usize) {
         let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
-        let trace = |scratch: &mut Scratch<S::Bsdf>, (i, out): (usize, &mut LightChunk<S::Bsdf, D>)| {
+        let trace = |scratch: &mut Scratch<S::Bsdf>, (i, out): (usize, &mut LightChunk<S::Bsdf>)| {
             let first = (start + i as u32) * LIGHT_CHUNK;
-            let nobody = &mut Nobody::default();
             for index in first..first.saturating_add(LIGHT_CHUNK).min(paths) {
                 if halt.now() {
                     return None;
                 }
-                trace_light_path(context, kind, index, scratch, out, nobody);
+                trace_light_path(context, kind, index, scratch, out, &mut ());
             }
             Some(())
         };
@@ -95,9 +92,9 @@ pub(crate) fn light_pass<S: Scene, D: Densities>(
 
 /// Traces one camera sub-path for each pixel of `rect` that belongs to one of `sets`, and adds it to `pixels`. `None` if it was halted: then
 /// the pixels of these sets mean nothing.
-pub(crate) fn camera_pass<S: Scene, D: Densities>(
+pub(crate) fn camera_pass<S: Scene>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf, D>,
+    map: &LightMap<S::Bsdf>,
     rect: PixelRect,
     sets: &Range<u32>,
     pixels: &mut [Pixel],
@@ -118,8 +115,8 @@ pub(crate) fn camera_pass<S: Scene, D: Densities>(
             let place = [rect.x + column as u32, rect.y + row as u32];
             // Addressed by the place on the whole film: a crop shows the same samples as the whole picture.
             let index = u64::from(place[1]) << 32 | u64::from(place[0]);
-            let (kind, nobody) = (StreamKind::Camera, &mut Nobody::default());
-            let walk = trace_camera_path(context, map, kind, place, index, scratch, &mut counters, nobody);
+            let (kind, counters) = (StreamKind::Camera, &mut counters);
+            let walk = trace_camera_path(context, map, kind, place, index, scratch, counters, &mut ());
             for (sum, value) in pixel.layers.iter_mut().zip(walk.layers) {
                 *sum += value;
             }

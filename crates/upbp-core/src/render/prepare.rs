@@ -15,8 +15,8 @@ use crate::budget::Budget;
 use crate::budget::{Canceller, Halt};
 use crate::error::RenderError;
 use crate::film::Film;
-use crate::plan::{RenderPlan, Stage};
-use crate::render::engine::{Engine, Map, SceneEngine};
+use crate::plan::RenderPlan;
+use crate::render::engine::{Engine, SceneEngine};
 use crate::report::PassTimes;
 use crate::settings::CheckedSettings;
 use crate::settings::Techniques;
@@ -127,8 +127,7 @@ pub(crate) fn prepare<'a, S: Scene>(
         let light_paths = emitters::light_paths_for(scene.emitters().len(), pilot.vertices_per_path);
         let plan = |techniques| {
             let stage = stage(&world, &settings, techniques, &pilot, [light_paths, light_paths / 8]);
-            // Measured with sums as weights, which do not know merges apart.
-            choices::plan(&world, &settings, &Stage { correlation: None, ..stage }, 0)
+            choices::plan(&world, &settings, &stage, 0)
         };
         let camera = techniques.intersection(TechniqueSet::PT);
         let may_be_alone = matches!(settings.techniques, Techniques::Auto) && camera != techniques;
@@ -154,7 +153,7 @@ pub(crate) fn prepare<'a, S: Scene>(
     let pixels = rect.width.saturating_mul(rect.height);
     for stage in frozen.iter().flat_map(RenderPlan::stages) {
         let counts = LightCounts::expected(&pilot, stage.light_paths, stage.beam_paths);
-        let needed = film_bytes + counts.peak_bytes::<S::Bsdf>(stage.correlation.is_some()) as u64;
+        let needed = film_bytes + counts.peak_bytes::<S::Bsdf>() as u64;
         if needed > memory {
             return Err(RenderError::PlanMemory {
                 from: stage.from,
@@ -200,10 +199,9 @@ pub(crate) fn prepare<'a, S: Scene>(
         Record { times: PassTimes { pilot: start.elapsed(), ..PassTimes::default() }, ..Record::default() };
     let first = identity.plan.stage(0);
     let counts = LightCounts::expected(&pilot, first.light_paths, first.beam_paths);
-    record.expected_bytes =
-        film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>(first.correlation.is_some()) as u64);
+    record.expected_bytes = film_bytes + output_bytes.max(counts.peak_bytes::<S::Bsdf>() as u64);
     Ok(Prepared {
-        engine: Box::new(SceneEngine { world, emitters, pilot, map: Map::Plain(LightMap::empty()) }),
+        engine: Box::new(SceneEngine { world, emitters, pilot, map: LightMap::empty() }),
         planner,
         canceller,
         state: State { identity, record, film },

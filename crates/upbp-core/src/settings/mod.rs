@@ -25,7 +25,6 @@ pub enum LightPaths {
 /// Settings of a render. All have defaults; a settings file names those that differ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a choice by itself, with a name in files")]
 pub struct Settings {
     /// `"auto"`, or a set as in `"bpt+surf+pp3d+pb2d+bb1d"`, of which what the scene cannot use is left out.
     pub techniques: Techniques,
@@ -56,12 +55,6 @@ pub struct Settings {
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,
-    /// Whether merges count less where a kernel is wide beside the edges that meet there (`docs/theory.md`, section 6(c)). The choice of
-    /// techniques does not know of it.
-    pub damping: bool,
-    /// Whether merges count less where a camera sub-path gets only by chance, so that many photons there are no more reliable than one
-    /// (`docs/theory.md`, section 6(b)). A plan that is given has its own.
-    pub correlation: bool,
     /// First kernel radii.
     pub radii: Radii,
     /// Whether radii shrink, so that the result converges.
@@ -87,8 +80,6 @@ impl Default for Settings {
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
-            damping: false,
-            correlation: false,
             radii: Radii::default(),
             progressive: true,
             memory: None,

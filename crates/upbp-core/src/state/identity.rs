@@ -62,7 +62,7 @@ impl Identity {
     }
 
     /// All that counts beside the plan, as text: the shortest decimals of two different numbers differ.
-    fn fields(&self) -> [(&'static str, String); 12] {
+    fn fields(&self) -> [(&'static str, String); 11] {
         let s = &self.settings;
         let (width, height) = self.film;
         let (x, y, columns, rows) = self.part;
@@ -77,13 +77,12 @@ impl Identity {
             ("heuristic", format!("{:?}", s.heuristic)),
             ("photon_beams", format!("{:?}", s.photon_beams)),
             ("query_beams", format!("{:?}", s.query_beams)),
-            ("damping", s.damping.to_string()),
             ("choice of emitters", self.emitters.clone()),
         ]
     }
 }
 
-fn stage_fields(stage: &Stage) -> [(&'static str, String); 17] {
+fn stage_fields(stage: &Stage) -> [(&'static str, String); 16] {
     let r = &stage.radii;
     [
         ("first iteration of a stage", stage.from.to_string()),
@@ -94,7 +93,6 @@ fn stage_fields(stage: &Stage) -> [(&'static str, String); 17] {
         ("next_events", stage.next_events.to_string()),
         ("roulette", format!("{:?}", stage.roulette)),
         ("look_ups", format!("{:?}", stage.look_ups)),
-        ("correlation", format!("{:?}", stage.correlation)),
         ("vertices per light sub-path", stage.vertices_per_light_path.to_string()),
         ("radii.surf", r.surf.to_string()),
         ("radii.pp3d", r.pp3d.to_string()),

@@ -8,7 +8,7 @@ use upbp_accel::Ray;
 use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
 use crate::light_map::LightMap;
-use crate::mis::{BeamExtent, Densities, Edge, Tip};
+use crate::mis::{BeamExtent, Densities, Edge, Tip, Weight};
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::scene::{Scene, Walk};
 use crate::technique::Technique;
@@ -204,13 +204,14 @@ impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
         let survival = if plan.roulette.is_on() { medium.continuation(foot.position) } else { 1.0 };
         let rho = f64::from(phase) * f64::from(survival);
         let sin = f64::from(light.towards_light.cross(towards_camera).length()).min(1.0);
-        let factors = mis.volume_factors(self.medium, light.tip.leg, foot.tip.leg, sin);
+        let factors =
+            mis.volume_factors(self.medium, light.tip.distance_factor, foot.tip.distance_factor, sin);
         let factor = match light.technique {
             Technique::Bb1d => factors.bb1d,
             _ => factors.pb2d,
         };
         let (before_light, before_camera) = (light.tip.before(mis, rho), foot.tip.before(mis, rho));
-        let weight = mis.merge_weight(factor, factors.sum(), before_light, before_camera, foot.tip.reuse);
+        let weight = Weight::of_merge(factor, factors.sum(), before_light, before_camera);
         let value = foot.throughput * light.throughput * medium.sigma_s(foot.position) * (phase * kernel);
         if out.add(light.technique, value, &weight) {
             out.observer.sample(&ObservedSample {
@@ -220,7 +221,6 @@ impl<S: Scene, D: Densities> Query<'_, '_, S, D> {
                     path: light.path,
                     light: (light.position, light.depth),
                     camera: (foot.position, Site::Medium(self.medium)),
-                    reuse: foot.tip.reuse,
                 },
                 weight,
                 value,

@@ -90,23 +90,22 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     // C_{s-1} and L_s: what each walk would have sampled instead of this connection.
     let light_density = camera_side.rho_own * light_side.cos / distance2 * density.forward(far);
     let camera_density = light_side.rho_own * camera_side.cos / distance2 * density.backward(near);
-    let leg = |walk, in_medium, t| mis.leg(walk, in_medium, distance2.recip(), density.reach, t);
+    let factor_of = |walk, in_medium, t| mis.distance_factor(walk, in_medium, density.reach, t);
     let camera_end = vertex.tip.end(
         mis,
         Walk::Camera,
         vertex.site.merge_site(camera_side.sin_theta),
-        leg(Walk::Light, near, density.backward(near)),
+        factor_of(Walk::Light, near, density.backward(near)),
         camera_side.rho_opposite,
     );
     let light_end = light.tip.end(
         mis,
         Walk::Light,
         light.site.merge_site(light_side.sin_theta),
-        leg(Walk::Camera, far, density.forward(far)),
+        factor_of(Walk::Camera, far, density.forward(far)),
         light_side.rho_opposite,
     );
-    let reuse = mis.reuse(vertex.tip.reuse, camera_side.rho_own * light_side.cos / distance2);
-    let weight = mis.connect_weight(light_end, light_density, camera_end, camera_density, reuse);
+    let weight = mis.connect_weight(light_end, light_density, camera_end, camera_density);
     let geometry = camera_side.cos * light_side.cos / distance2;
     let value = vertex.throughput
         * light.throughput

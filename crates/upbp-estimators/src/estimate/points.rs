@@ -4,7 +4,7 @@ use upbp_media::{Medium, MediumId};
 
 use super::beams::beam_tip;
 use crate::light_map::LightMap;
-use crate::mis::Densities;
+use crate::mis::{Densities, Weight};
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::scene::{Scene, Walk};
 use crate::technique::Technique;
@@ -98,20 +98,24 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     };
     let (kernel, factor, merges) = match &vertex.site {
         Site::Surface(_) => {
-            let factor = mis.surface_factor(photon.tip.leg, vertex.tip.leg);
+            let factor = mis.surface_factor();
             (&plan.kernels.surf, factor, O::Densities::of(technique, factor))
         }
         Site::Medium(medium) => {
-            let factors = mis.volume_factors(*medium, photon.tip.leg, vertex.tip.leg, scattering.sin_theta);
+            let factors = mis.volume_factors(
+                *medium,
+                photon.tip.distance_factor,
+                vertex.tip.distance_factor,
+                scattering.sin_theta,
+            );
             (&plan.kernels.pp3d, factors.pp3d, factors.sum())
         }
     };
-    let weight = mis.merge_weight(
+    let weight = Weight::of_merge(
         factor,
         merges,
         photon.tip.before(mis, scattering.rho_own),
         vertex.tip.before(mis, scattering.rho_opposite),
-        vertex.tip.reuse,
     );
     let value = vertex.throughput
         * photon.throughput
@@ -125,7 +129,6 @@ fn merge_point<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
                 path: photon.path,
                 light: (photon.position, photon.depth),
                 camera: (vertex.position, vertex.site),
-                reuse: vertex.tip.reuse,
             },
             weight,
             value,
@@ -156,14 +159,9 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         let rho = f64::from(phase) * f64::from(survival);
         let sin = f64::from(towards_light.cross(vertex.towards_camera).length()).min(1.0);
         let Some((tip, light)) = beam_tip(context, beam, t) else { return };
-        let factors = mis.volume_factors(medium_id, tip.leg, vertex.tip.leg, sin);
-        let weight = mis.merge_weight(
-            factors.bp2d,
-            factors.sum(),
-            tip.before(mis, rho),
-            vertex.tip.before(mis, rho),
-            vertex.tip.reuse,
-        );
+        let factors = mis.volume_factors(medium_id, tip.distance_factor, vertex.tip.distance_factor, sin);
+        let weight =
+            Weight::of_merge(factors.bp2d, factors.sum(), tip.before(mis, rho), vertex.tip.before(mis, rho));
         let value = vertex.throughput
             * light
             * medium.sigma_s(vertex.position)
@@ -176,7 +174,6 @@ fn beams_around<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
                     path: beam.path,
                     light: (beam.segment.origin + beam.segment.direction * t, beam.depth),
                     camera: (vertex.position, vertex.site),
-                    reuse: vertex.tip.reuse,
                 },
                 weight,
                 value,

@@ -2,10 +2,9 @@
 //!
 //! The balance heuristic over all techniques that can produce a path, where a merge counts with
 //! `n · V_K · (distance factors) · (densities of both sub-paths)`: `docs/theory.md`, sections 3 and 4. A sub-path vertex
-//! carries two numbers ([`Tip`]) from which the weight of any technique that ends there follows in constant time; with
-//! correlation, two each for merges and the rest ([`MergesApart`]); or two per technique ([`ByTechnique`]), from which the
-//! weights of any other sample counts follow;
-//! [`oracle`] enumerates the same weights the slow, obvious way, and the tests hold one to the other.
+//! carries two numbers ([`Tip`]) from which the weight of any technique that ends there follows in constant time; or two
+//! per technique ([`ByTechnique`]), from which the weights of any other sample counts follow. [`oracle`] enumerates the
+//! same weights the slow, obvious way, and the tests hold one to the other.
 
 mod densities;
 pub mod oracle;
@@ -13,8 +12,8 @@ mod plan;
 mod recursion;
 mod weights;
 
-pub use densities::{ByTechnique, Densities, MergesApart, Weight};
-pub use plan::{BeamExtent, Damping, Heuristic, Leg, MisPlan, VolumeMerges};
+pub use densities::{ByTechnique, Densities, Weight};
+pub use plan::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
 pub use recursion::{Edge, MergeSite, Pending, Tip};
 pub use weights::End;
 

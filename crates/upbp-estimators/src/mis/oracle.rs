@@ -4,12 +4,10 @@
 //! technique is a product over the path, taken in logarithms. Nothing is shared with the recursion but the
 //! constants of the [`MisPlan`].
 
-use std::f64::consts::PI;
-
 use upbp_media::MediumId;
 
 use super::PARALLEL_SIN2;
-use super::plan::{BeamExtent, Damping, Heuristic, MisPlan};
+use super::plan::{BeamExtent, Heuristic, MisPlan};
 
 /// What a vertex is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,27 +111,6 @@ impl Path {
         self.vertices[i + 1].rho_camera * self.vertices[i].cos_camera / d2 * edge.t_camera
     }
 
-    /// How much merges at vertex `i` count for camera sub-paths being spread (`docs/theory.md`, section 6(b)): a product over all vertices
-    /// from there on to the second one of the camera's.
-    #[must_use]
-    pub fn reuse(&self, plan: &MisPlan, i: usize) -> f64 {
-        let Some(radius) = plan.correlation else { return 1.0 };
-        let spread_by = |j: &usize| !matches!(self.vertices[j + 1].kind, VertexKind::Delta | VertexKind::End);
-        let per_area = |j: usize| {
-            self.vertices[j + 1].rho_camera * self.vertices[j].cos_camera / self.edges[j].distance.powi(2)
-        };
-        (i..self.length() - 1)
-            .filter(spread_by)
-            .map(|j| f64::min(1.0, per_area(j) * PI * radius * radius))
-            .product()
-    }
-
-    /// How much a merge at vertex `i` counts for its kernel being wide there (`docs/theory.md`, section 6(c)).
-    fn damping(&self, plan: &MisPlan, i: usize, fourth_power: fn(&Damping) -> f64) -> f64 {
-        let shorter = self.edges[i - 1].distance.min(self.edges[i].distance);
-        plan.damping.map_or(1.0, |damping| 1.0 / (1.0 + fourth_power(&damping) / shorter.powi(4)))
-    }
-
     /// The weights of all strategies that the plan runs and that can make this path; they sum to one.
     #[must_use]
     pub fn weights(&self, plan: &MisPlan) -> Vec<(Strategy, f64)> {
@@ -175,10 +152,10 @@ impl Path {
             }
         }
         for i in 1..k {
-            let both = light[i] + log(self.light_density(i)) + camera[i] + log(self.reuse(plan, i));
+            let both = light[i] + log(self.light_density(i)) + camera[i];
             match self.vertices[i].kind {
                 VertexKind::Surface => {
-                    push(Strategy::Surf(i), plan.surf * self.damping(plan, i, |d| d.surf), both);
+                    push(Strategy::Surf(i), plan.surf, both);
                 }
                 VertexKind::Medium(medium) => {
                     let v = plan.merges_in(medium);
@@ -191,14 +168,10 @@ impl Path {
                     let c_camera = factor(plan.query_beams, self.edges[i].reach, self.edges[i].t_camera);
                     let sin = self.vertices[i].sin_theta;
                     let sin = if sin * sin < PARALLEL_SIN2 { 0.0 } else { sin };
-                    push(Strategy::Pp3d(i), v.pp3d * self.damping(plan, i, |d| d.pp3d), both);
-                    push(Strategy::Pb2d(i), v.pb2d * self.damping(plan, i, |d| d.pb2d), both + log(c_camera));
-                    push(Strategy::Bp2d(i), v.bp2d * self.damping(plan, i, |d| d.bp2d), both + log(c_light));
-                    push(
-                        Strategy::Bb1d(i),
-                        v.bb1d * self.damping(plan, i, |d| d.bb1d),
-                        both + log(c_light) + log(c_camera) + log(sin),
-                    );
+                    push(Strategy::Pp3d(i), v.pp3d, both);
+                    push(Strategy::Pb2d(i), v.pb2d, both + log(c_camera));
+                    push(Strategy::Bp2d(i), v.bp2d, both + log(c_light));
+                    push(Strategy::Bb1d(i), v.bb1d, both + log(c_light) + log(c_camera) + log(sin));
                 }
                 VertexKind::End | VertexKind::Delta => {}
             }

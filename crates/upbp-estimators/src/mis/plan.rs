@@ -1,7 +1,5 @@
 //! The constants of one iteration that enter weights.
 
-use std::f64::consts::PI;
-
 use serde::{Deserialize, Serialize};
 use upbp_media::MediumId;
 
@@ -43,32 +41,6 @@ pub struct VolumeMerges {
     pub bb1d: f64,
 }
 
-/// Fourth powers of the radii of merges, by which they are damped next to other vertices; scene units.
-///
-/// A kernel as wide as an edge is long averages over all that changes along it: contact shadows, `1/d²` beside lights.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Damping {
-    /// Surface merging.
-    pub surf: f64,
-    /// PP3D.
-    pub pp3d: f64,
-    /// PB2D.
-    pub pb2d: f64,
-    /// BP2D.
-    pub bp2d: f64,
-    /// BB1D.
-    pub bb1d: f64,
-}
-
-/// The last edge of one of two sub-paths that meet in a vertex, as far as merges there depend on it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Leg {
-    /// The distance factor in a medium; 0 on surfaces.
-    pub c: f64,
-    /// One over the squared length; 0 from infinity.
-    pub nearness: f64,
-}
-
 /// Sample counts and kernel volumes of one iteration.
 ///
 /// Counts are relative to one camera sub-path. A technique that does not run has count zero. The same predicate that
@@ -93,11 +65,6 @@ pub struct MisPlan {
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,
-    /// How merges are damped where their kernels are wide beside the edges that meet there (`docs/theory.md`, section 6(c)).
-    pub damping: Option<Damping>,
-    /// The radius within which camera sub-paths find the same photons, scene units: merges behind vertices that are spread more widely
-    /// count less (section 6(b)). Needs densities that [know merges apart](Densities::KNOWS_MERGES).
-    pub correlation: Option<f64>,
 }
 
 impl MisPlan {
@@ -135,83 +102,58 @@ impl MisPlan {
         }
     }
 
-    /// The leg by which a walk arrives at a vertex, over an edge that it passes with probability `reach` and stops at the end of
-    /// with density `t`. The distance factor is `R/t` for short beams, `1/t` for long ones (section 1.3).
+    /// The distance factor of a vertex, from the edge by which `walk` arrives there: `R/t` for short beams, `1/t` for
+    /// long ones, where the walk passes the edge with probability `reach` and stops at its end with density `t`
+    /// (section 1.3). 0 on surfaces.
     #[inline]
     #[must_use]
-    pub fn leg(&self, walk: Walk, in_medium: bool, nearness: f64, reach: f64, t: f64) -> Leg {
-        let c = match self.extent(walk) {
+    pub fn distance_factor(&self, walk: Walk, in_medium: bool, reach: f64, t: f64) -> f64 {
+        match self.extent(walk) {
             _ if !in_medium => 0.0,
             BeamExtent::Short => reach / t,
             BeamExtent::Long => 1.0 / t,
-        };
-        Leg { c, nearness }
-    }
-
-    /// How much of a merge counts between two such legs, given the fourth power of its radius (section 6(c)).
-    #[inline]
-    fn damped(&self, legs: [Leg; 2], fourth_power: fn(&Damping) -> f64) -> f64 {
-        match &self.damping {
-            Some(damping) => {
-                // Its square is a number, so that a radius of zero takes nothing away.
-                let nearness = legs[0].nearness.max(legs[1].nearness).min(1e150);
-                1.0 / (1.0 + fourth_power(damping) * (nearness * nearness))
-            }
-            None => 1.0,
         }
     }
 
     /// `f` of surface merging, as the heuristic takes it (section 2.1).
     #[inline]
     #[must_use]
-    pub fn surface_factor(&self, light: Leg, camera: Leg) -> f64 {
-        self.pow(self.surf * self.damped([light, camera], |damping| damping.surf))
+    pub fn surface_factor(&self) -> f64 {
+        self.pow(self.surf)
     }
 
-    /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1).
+    /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1), from the distance factors of the
+    /// light and the camera sub-path.
     #[inline]
     #[must_use]
-    pub fn volume_factors(&self, medium: MediumId, light: Leg, camera: Leg, sin_theta: f64) -> VolumeMerges {
+    pub fn volume_factors(
+        &self,
+        medium: MediumId,
+        c_light: f64,
+        c_camera: f64,
+        sin_theta: f64,
+    ) -> VolumeMerges {
         let v = self.merges_in(medium);
         let sin_theta = if sin_theta * sin_theta < PARALLEL_SIN2 { 0.0 } else { sin_theta };
-        let damped = |fourth_power| self.damped([light, camera], fourth_power);
         VolumeMerges {
-            pp3d: self.pow(v.pp3d * damped(|damping| damping.pp3d)),
-            pb2d: self.pow(v.pb2d * camera.c * damped(|damping| damping.pb2d)),
-            bp2d: self.pow(v.bp2d * light.c * damped(|damping| damping.bp2d)),
-            bb1d: self.pow(v.bb1d * light.c * camera.c * sin_theta * damped(|damping| damping.bb1d)),
+            pp3d: self.pow(v.pp3d),
+            pb2d: self.pow(v.pb2d * c_camera),
+            bp2d: self.pow(v.bp2d * c_light),
+            bb1d: self.pow(v.bb1d * c_light * c_camera * sin_theta),
         }
     }
 
-    /// `F_i`: the sum of the merge factors at a vertex between two legs (section 4.1).
+    /// `F_i`: the sum of the merge factors at a vertex, from the distance factors of the two sub-paths (section 4.1).
     #[inline]
     #[must_use]
-    pub fn merge_sum<D: Densities>(&self, site: MergeSite, light: Leg, camera: Leg) -> D {
+    pub fn merge_sum<D: Densities>(&self, site: MergeSite, c_light: f64, c_camera: f64) -> D {
         match site {
             MergeSite::None => D::ZERO,
-            MergeSite::Surface => D::of(Technique::Surf, self.surface_factor(light, camera)),
+            MergeSite::Surface => D::of(Technique::Surf, self.surface_factor()),
             MergeSite::Medium { medium, sin_theta } => {
-                self.volume_factors(medium, light, camera, sin_theta).sum()
+                self.volume_factors(medium, c_light, c_camera, sin_theta).sum()
             }
         }
-    }
-
-    /// What merges count behind one more vertex of a camera sub-path (section 6(b)): `reuse` is what they count behind those before, `density`
-    /// that with which the last of them scatters, per area across the new edge at its other end.
-    #[inline]
-    #[must_use]
-    pub fn reuse(&self, reuse: f64, density: f64) -> f64 {
-        match self.correlation {
-            Some(radius) => reuse * (density * (PI * radius * radius)).min(1.0),
-            None => reuse,
-        }
-    }
-
-    /// The same factor of one vertex per unknown density of the one before, `per_density` being the area's solid angle over the area; infinite if there
-    /// is none.
-    #[inline]
-    pub(super) fn spread(&self, per_density: f64) -> f64 {
-        self.correlation.map_or(f64::INFINITY, |radius| per_density * (PI * radius * radius))
     }
 }
 

@@ -8,7 +8,7 @@
 use upbp_media::{EdgeDensity, MediumId};
 
 use super::densities::Densities;
-use super::plan::{BeamExtent, Leg, MisPlan};
+use super::plan::{BeamExtent, MisPlan};
 use super::weights::End;
 use crate::scene::Walk;
 use crate::technique::Technique;
@@ -20,14 +20,8 @@ pub struct Tip<D = f64> {
     pub connect: D,
     /// `E_i`: everything below the vertex before, per opposite scattering density.
     pub below: D,
-    /// The arriving edge, as far as merges depend on it.
-    pub leg: Leg,
-    /// What the densities of merges in `below` are yet to be multiplied by (`docs/theory.md`, section 6(b)): on a light sub-path, per opposite
-    /// scattering density and at most 1. Infinite where nothing is: on camera sub-paths, behind Dirac lobes.
-    pub spread: f64,
-    /// What merges at the vertex are multiplied by: how much all vertices of a camera sub-path up to it are spread. 1 on light
-    /// sub-paths.
-    pub reuse: f64,
+    /// The distance factor of the arriving edge; 0 on surfaces.
+    pub distance_factor: f64,
 }
 
 impl<D: Densities> Tip<D> {
@@ -36,16 +30,11 @@ impl<D: Densities> Tip<D> {
     #[must_use]
     pub fn before(&self, plan: &MisPlan, rho_opposite: f64) -> D {
         // A branch instead of 0 · ∞ where the other walk cannot scatter this way.
-        if rho_opposite > 0.0 {
-            let merges = plan.pow((rho_opposite * self.spread).min(1.0));
-            self.connect + self.below.damped(merges) * plan.pow(rho_opposite)
-        } else {
-            self.connect
-        }
+        if rho_opposite > 0.0 { self.connect + self.below * plan.pow(rho_opposite) } else { self.connect }
     }
 
-    /// What a connection to the vertex knows of the sub-path: `site` is the vertex with the direction of the connection, `opposite` the leg by
-    /// which the other walk would arrive, `rho_opposite` the density with which it would then scatter along this sub-path.
+    /// What a connection to the vertex knows of the sub-path: `site` is the vertex with the direction of the connection, `opposite` the
+    /// distance factor of the other walk that would arrive there, `rho_opposite` the density with which it would then scatter along this sub-path.
     #[inline]
     #[must_use]
     pub fn end(
@@ -53,31 +42,23 @@ impl<D: Densities> Tip<D> {
         plan: &MisPlan,
         walk: Walk,
         site: MergeSite,
-        opposite: Leg,
+        opposite: f64,
         rho_opposite: f64,
     ) -> End<D> {
         End {
-            merges: merges(plan, walk, site, self.leg, opposite, self.reuse),
+            merges: merges(plan, walk, site, self.distance_factor, opposite),
             before: self.before(plan, rho_opposite),
         }
     }
 }
 
-/// The merges at a vertex that `walk` came to by the leg `own`.
+/// The merges at a vertex, from the distance factors of `walk` and of the opposite one.
 #[inline]
-fn merges<D: Densities>(
-    plan: &MisPlan,
-    walk: Walk,
-    site: MergeSite,
-    own: Leg,
-    opposite: Leg,
-    reuse: f64,
-) -> D {
-    let sum: D = match walk {
+fn merges<D: Densities>(plan: &MisPlan, walk: Walk, site: MergeSite, own: f64, opposite: f64) -> D {
+    match walk {
         Walk::Light => plan.merge_sum(site, own, opposite),
         Walk::Camera => plan.merge_sum(site, opposite, own),
-    };
-    sum.damped(plan.pow(reuse))
+    }
 }
 
 /// Which merges are possible at a vertex.
@@ -109,10 +90,8 @@ pub struct Pending<D = f64> {
     pub cos_out: f64,
     /// Which merges the vertex takes part in.
     pub site: MergeSite,
-    /// The edge that arrived at it.
-    pub leg: Leg,
-    /// As [`Tip::reuse`].
-    pub reuse: f64,
+    /// The distance factor of the edge that arrived at it.
+    pub distance_factor: f64,
     /// Whether the vertex can be connected to the next one.
     pub connectible: bool,
     /// Whether it lies in a medium, so that a walk of the other side stops there by a sampled distance.
@@ -136,8 +115,7 @@ impl<D: Densities> Pending<D> {
             rho: pdf_direction,
             cos_out,
             site: MergeSite::None,
-            leg: Leg::default(),
-            reuse: 1.0,
+            distance_factor: 0.0,
             connectible: true,
             in_medium: false,
         }
@@ -151,8 +129,7 @@ impl<D: Densities> Pending<D> {
             rho: pdf,
             cos_out: 1.0,
             site: MergeSite::None,
-            leg: Leg::default(),
-            reuse: 1.0,
+            distance_factor: 0.0,
             connectible: true,
             in_medium: false,
         }
@@ -167,8 +144,8 @@ impl<D: Densities> Pending<D> {
     pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: D) -> Tip<D> {
         let inverse = 1.0 / (self.rho * edge.cos_in * edge.forward);
         let below = if edge.backward > 0.0 {
-            let opposite = plan.leg(walk.other(), self.in_medium, edge.nearness, edge.reach, edge.backward);
-            let merges: D = merges(plan, walk, self.site, self.leg, opposite, self.reuse);
+            let opposite = plan.distance_factor(walk.other(), self.in_medium, edge.reach, edge.backward);
+            let merges: D = merges(plan, walk, self.site, self.distance_factor, opposite);
             (merges + self.before) * plan.pow(inverse * self.cos_out * edge.backward)
         } else {
             D::ZERO
@@ -178,14 +155,8 @@ impl<D: Densities> Pending<D> {
         } else {
             D::ZERO
         };
-        let leg = plan.leg(walk, edge.ends_in_medium, edge.nearness, edge.reach, edge.forward);
-        let (spread, reuse) = match walk {
-            Walk::Light => (plan.spread(self.cos_out * edge.nearness), 1.0),
-            // All camera sub-paths of a pixel begin as one, and go on as one from a Dirac lobe.
-            Walk::Camera if self.site == MergeSite::None => (f64::INFINITY, self.reuse),
-            Walk::Camera => (f64::INFINITY, plan.reuse(self.reuse, self.rho * edge.cos_in * edge.nearness)),
-        };
-        Tip { connect, below, leg, spread, reuse }
+        let distance_factor = plan.distance_factor(walk, edge.ends_in_medium, edge.reach, edge.forward);
+        Tip { connect, below, distance_factor }
     }
 }
 
@@ -194,8 +165,6 @@ impl<D: Densities> Pending<D> {
 pub struct Edge {
     /// Squared distance in scene units; 1 from or to an infinite emitter, whose densities are per solid angle.
     pub distance_squared: f64,
-    /// One over the squared distance; 0 from or to an infinite emitter.
-    pub nearness: f64,
     /// The cosine factor at the second vertex; 1 in media and towards infinity.
     pub cos_in: f64,
     /// Distance density `t` of the walk that stops at the second vertex.
@@ -221,7 +190,6 @@ impl Edge {
     ) -> Self {
         Self {
             distance_squared: if distance.is_finite() { distance * distance } else { 1.0 },
-            nearness: (distance * distance).recip(),
             cos_in,
             forward: density.forward(ends_in_medium),
             backward: density.backward(starts_in_medium),

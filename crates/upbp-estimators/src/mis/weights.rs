@@ -20,25 +20,18 @@ impl<D: Densities> End<D> {
     }
 }
 
-impl MisPlan {
-    /// A merge with factor `factor` (of the sum `merges`) between two sub-paths that end at the same vertex; `reuse` is how much
-    /// merges there count, by the [camera's tip](super::Tip::reuse). (4.4)
+impl<D: Densities> Weight<D> {
+    /// A merge with factor `factor` (of the sum `merges`) between two sub-paths that end at the same vertex. (4.4)
     #[inline]
     #[must_use]
-    pub fn merge_weight<D: Densities>(
-        &self,
-        factor: f64,
-        merges: D,
-        before_light: D,
-        before_camera: D,
-        reuse: f64,
-    ) -> Weight<D> {
-        let damping = self.pow(reuse);
-        Weight { own: factor * damping, all: (merges + before_light).damped(damping) + before_camera }
+    pub fn of_merge(factor: f64, merges: D, before_light: D, before_camera: D) -> Self {
+        Self { own: factor, all: merges + before_light + before_camera }
     }
+}
 
+impl MisPlan {
     /// A connection; `light_density` is the density `C` of the light vertex as the camera sub-path would sample it,
-    /// `camera_density` that of the camera vertex, `L`; `reuse` is how much merges at the light vertex [count](Self::reuse). (4.5)
+    /// `camera_density` that of the camera vertex, `L`. (4.5)
     #[inline]
     #[must_use]
     pub fn connect_weight<D: Densities>(
@@ -47,11 +40,10 @@ impl MisPlan {
         light_density: f64,
         camera: End<D>,
         camera_density: f64,
-        reuse: f64,
     ) -> Weight<D> {
         let own = self.pow(self.connect);
         let connect = D::of(Technique::Connect, own);
-        let light = light.sum(self, light_density).damped(self.pow(reuse));
+        let light = light.sum(self, light_density);
         Weight { own, all: connect + light + camera.sum(self, camera_density) }
     }
 

@@ -77,14 +77,13 @@ pub(super) fn pend<S: Scene, D: Densities>(
     site: &Site<S::Bsdf>,
     scattered: &Scattered,
 ) -> Pending<D> {
-    let smooth = if scattered.delta { Tip { connect: D::ZERO, spread: f64::INFINITY, ..*tip } } else { *tip };
+    let smooth = if scattered.delta { Tip { connect: D::ZERO, ..*tip } } else { *tip };
     Pending {
         before: smooth.before(&context.plan.mis, scattered.rho_opposite),
         rho: scattered.rho_own,
         cos_out: scattered.cos,
         site: if scattered.delta { MergeSite::None } else { site.merge_site(scattered.sin_theta) },
-        leg: tip.leg,
-        reuse: tip.reuse,
+        distance_factor: tip.distance_factor,
         connectible: !scattered.delta,
         in_medium: site.in_medium(),
     }

@@ -90,10 +90,6 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     counters: &mut Counters,
     observer: &mut O,
 ) -> CameraWalk {
-    debug_assert!(
-        context.plan.mis.correlation.is_none() || O::Densities::KNOWS_MERGES,
-        "correlation needs densities that know merges apart"
-    );
     let mut walk = CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
     let mut scattered_before = false;
     let Context { world, plan } = *context;

@@ -39,10 +39,6 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut LightChunk<S::Bsdf, O::Densities>,
     observer: &mut O,
 ) {
-    debug_assert!(
-        context.plan.mis.correlation.is_none() || O::Densities::KNOWS_MERGES,
-        "correlation needs densities that know merges apart"
-    );
     let Context { world, plan } = *context;
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
     let Some(mut flight) = emit(context, index, &mut stream, &mut out.counters, observer) else { return };

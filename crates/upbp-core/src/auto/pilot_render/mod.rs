@@ -131,9 +131,8 @@ pub(crate) fn run<S: Scene>(
         }
     }
     if timed {
-        // The first pass again, with weights as the render has them without correlation.
+        // The first pass again, with weights as the render has them.
         plan.iteration = u64::from(first_pass) + 1;
-        plan.mis.correlation = None;
         let passes = (0..TIMINGS)
             .map(|_| Pass::<Watch>::trace(world, &plan, grid, first_pass, &room))
             .collect::<Option<Vec<_>>>()?;

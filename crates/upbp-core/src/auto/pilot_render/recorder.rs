@@ -13,9 +13,6 @@ pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
 /// Samples that a trial may have, of 72 bytes each.
 pub(super) const MOST_SAMPLES: usize = 1 << 20;
 
-/// Squares of samples are divided by what they are damped by, and stay numbers.
-const LEAST_DAMPED: f64 = 1e-20;
-
 /// A sample, weighted as when everything runs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
@@ -27,9 +24,6 @@ pub(crate) struct Sample {
     pub(crate) albedos: f32,
     /// Parts of all techniques in the weights of its path; they sum to one.
     pub(crate) shares: [f32; TECHNIQUES],
-    /// What its own density is damped by in the weights, and what those of the merges of its path are on average. As the balance heuristic has
-    /// it, which all predictions are about.
-    pub(crate) damped: [f32; 2],
 }
 
 /// What camera sub-paths do, by the number of a roulette.
@@ -82,20 +76,13 @@ impl<B> Observer<B> for Recorder {
             return;
         }
         let total = weight.all.total();
-        let (merged, own) = match joint {
-            Joint::Merge { path, reuse, .. } => (Some(*path), *reuse),
-            _ => (None, 1.0),
-        };
-        let merges: f64 =
-            Technique::ALL.into_iter().filter(|t| t.merges()).map(|t| weight.all.of[t as usize]).sum();
-        let on_average = if merges > 0.0 { weight.all.merges_damped_again / merges } else { 1.0 };
+        let merged = if let Joint::Merge { path, .. } = joint { Some(*path) } else { None };
         self.samples.push(Sample {
             technique,
             merged,
             albedos: self.albedos,
             value: Vec3::from((value * weight.value() as f32).to_array()),
             shares: weight.all.of.map(|density| (density / total) as f32),
-            damped: [own, on_average].map(|factor| factor.max(LEAST_DAMPED) as f32),
         });
     }
 }

@@ -91,8 +91,8 @@ impl Prediction {
         }
         let mut variance = groups.map(|moments| moments.variance(light_paths) / trial.cells as f64);
         for (cell, splat) in &trial.splats {
-            let square = trial.undamped_second_moment(splat) as f32;
-            let second_moment = f64::from(view.share(&splat.shares).single(square, splat.damped[1]));
+            let square = trial.second_moment(splat) as f32;
+            let second_moment = f64::from(view.share(&splat.shares).single(square));
             variance[group(*cell as usize)] += trial.per_splat() * second_moment;
         }
         // Not a number where no technique of the plan finds a path.
@@ -195,11 +195,6 @@ impl Trial {
     /// The square of a sample, as much of it as all samples of the plan would have.
     fn second_moment(&self, sample: &Sample) -> f64 {
         f64::from(sample.value.length_squared()) * self.thinning(sample.technique)
-    }
-
-    /// The same as if its density was not damped: samples of different techniques on the same path then tell the same.
-    fn undamped_second_moment(&self, sample: &Sample) -> f64 {
-        self.second_moment(sample) / f64::from(sample.damped[0])
     }
 
     /// The part of a splat in a mean over pixels.

@@ -27,11 +27,9 @@ struct Seen {
     /// How much more it weighs than in the trial, by the number of a roulette: walks get to it less often.
     rarity: [f32; COUNT],
     value: Vec3,
-    /// Its square, of as many samples as the plan has and as if its density was not damped.
+    /// Its square, of as many samples as the plan has.
     square: f32,
     shares: [f32; TECHNIQUES],
-    /// How much merges of its path are damped on average.
-    damped: f32,
 }
 
 impl Looks {
@@ -51,9 +49,8 @@ impl Looks {
                     albedos: sample.albedos,
                     rarity: std::array::from_fn(|number| relative_reach(number, sample.albedos).recip()),
                     value: sample.value,
-                    square: trial.undamped_second_moment(sample) as f32,
+                    square: trial.second_moment(sample) as f32,
                     shares: sample.shares,
-                    damped: sample.damped[1],
                 }));
             }
             looks.seen[start..].sort_by(|a, b| a.albedos.total_cmp(&b.albedos));
@@ -134,8 +131,8 @@ impl<'a> View<'a> {
             let i = seen.technique as usize;
             let share = self.share(&seen.shares);
             let rarity = seen.rarity[self.roulette];
-            result.single += f64::from(rarity * share.single(seen.square, seen.damped));
-            result.light += f64::from(rarity * share.light(seen.square, seen.damped));
+            result.single += f64::from(rarity * share.single(seen.square));
+            result.light += f64::from(rarity * share.light(seen.square));
             let weight = self.relative[i] * share.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
@@ -175,13 +172,12 @@ impl<'a> View<'a> {
             std::array::from_fn(|i| shares[i] * self.relative[i]);
         // Not one after the other, and one division: the search has nothing else to wait for.
         let (camera, merges) = ((a + b) + c, ((e + f) + (g + h)) + i);
-        Share { camera, splats: d, merges, inverse: 1.0 / ((camera + d) + merges) }
+        Share { splats: d, merges, inverse: 1.0 / ((camera + d) + merges) }
     }
 }
 
-/// Densities relative to those of the trial: of camera sub-paths' own samples, of light tracing, and of merges.
+/// Densities relative to those of the trial: of light tracing, and of merges.
 pub(super) struct Share {
-    camera: f32,
     splats: f32,
     merges: f32,
     /// One over the sum of all.
@@ -189,17 +185,16 @@ pub(super) struct Share {
 }
 
 impl Share {
-    /// What the second moment of single samples is by one whose square is `square` and whose merges are damped so much on average: by them once
-    /// in the weights, twice in their squares.
+    /// The part in the second moment of single samples of one whose square is `square`.
     #[inline]
-    pub(super) fn single(&self, square: f32, damped: f32) -> f32 {
-        square * self.inverse * ((self.camera + self.splats + damped * self.merges) * self.inverse)
+    pub(super) fn single(&self, square: f32) -> f32 {
+        square * self.inverse
     }
 
     /// What of it is due to splats and merges.
     #[inline]
-    fn light(&self, square: f32, damped: f32) -> f32 {
-        square * self.inverse * ((self.splats + damped * self.merges) * self.inverse)
+    fn light(&self, square: f32) -> f32 {
+        square * self.inverse * ((self.splats + self.merges) * self.inverse)
     }
 }
 

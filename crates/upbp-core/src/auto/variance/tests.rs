@@ -22,24 +22,20 @@ fn uniform(i: usize, sequence: u32) -> f64 {
     (x >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// `∫ 3x² dx = 1` over the unit interval, by one sample of density 1, as if it was an emission hit, and one of density `2x` by another technique,
-/// which is damped in the weights.
-fn trial_of(other: Technique, damping: fn(f64) -> f64) -> Trial {
+/// `∫ 3x² dx = 1` over the unit interval, by one sample of density 1, as if it was an emission hit, and one of density `2x` by another technique.
+fn trial_of(other: Technique) -> Trial {
     let cells = (SIDE * SIDE) as usize;
     let passes = PASSES as usize;
     let mut samples = Vec::new();
     let mut ends = Vec::new();
     for i in 0..cells * passes {
         for (technique, x) in [(Technique::Hit, uniform(i, 0)), (other, uniform(i, 1).sqrt())] {
-            let damped = damping(x);
-            let sum = 1.0 + 2.0 * x * damped;
+            let sum = 1.0 + 2.0 * x;
             let mut shares = [0.0; TECHNIQUES];
             shares[Technique::Hit as usize] = (1.0 / sum) as f32;
-            shares[other as usize] = (2.0 * x * damped / sum) as f32;
-            let own = if technique == other { damped } else { 1.0 };
-            let value = Vec3::splat((3.0 * x * x * own / sum) as f32);
-            let damped = [own, damped].map(|factor| factor as f32);
-            samples.push(Sample { technique, merged: None, albedos: 1.0, value, shares, damped });
+            shares[other as usize] = (2.0 * x / sum) as f32;
+            let value = Vec3::splat((3.0 * x * x / sum) as f32);
+            samples.push(Sample { technique, merged: None, albedos: 1.0, value, shares });
         }
         ends.push(samples.len() as u32);
     }
@@ -71,7 +67,7 @@ fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts
 }
 
 fn trial() -> Trial {
-    trial_of(Technique::Connect, |_| 1.0)
+    trial_of(Technique::Connect)
 }
 
 fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
@@ -82,41 +78,31 @@ fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
 /// A number for each place of the unit interval.
 type Function<'a> = &'a dyn Fn(f64) -> f64;
 
-/// A technique, and what it is damped by.
-type Damped = (Technique, fn(f64) -> f64);
-
 #[test]
 fn variances_are_those_of_the_estimators() {
     let f = |x: f64| 3.0 * x * x;
     // The picture is 1 everywhere.
     let relative = 1.0 / (1.0 + DARKNESS);
-    let dampings: [Damped; 4] = [
-        (Technique::Connect, |_| 1.0),
-        (Technique::Surf, |_| 1.0),
-        (Technique::Surf, |x| 0.2 + 0.5 * x),
-        (Technique::Surf, |x| 1e-9 * x),
-    ];
-    for (case, (other, damping)) in dampings.into_iter().enumerate() {
+    for other in [Technique::Connect, Technique::Surf] {
         let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
-        let prediction = Prediction::new(trial_of(other, damping), &grid);
+        let prediction = Prediction::new(trial_of(other), &grid);
         for [hits, others] in [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
             let counts = counts([(Technique::Hit, hits), (other, others)], 1.0);
-            // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n, where w is the part of n p, damped, in a sum.
-            let part = |n: f64, p: Function<'_>, damping: Function<'_>, sum: Function<'_>| {
+            // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n, where w is the part of n p in a sum.
+            let part = |n: f64, p: Function<'_>, sum: Function<'_>| {
                 if n == 0.0 {
                     return 0.0;
                 }
-                let contribution = |x: f64| damping(x) * f(x) / sum(x);
+                let contribution = |x: f64| f(x) / sum(x);
                 let mean = quadrature(|x| n * p(x) * contribution(x));
                 quadrature(|x| n * p(x) * contribution(x).powi(2)) - mean * mean / n
             };
-            let sum = |x: f64| hits + others * 2.0 * x * damping(x);
-            let expected = relative
-                * (part(hits, &|_| 1.0, &|_| 1.0, &sum) + part(others, &|x| 2.0 * x, &damping, &sum));
+            let sum = |x: f64| hits + others * 2.0 * x;
+            let expected = relative * (part(hits, &|_| 1.0, &sum) + part(others, &|x| 2.0 * x, &sum));
             let found: f64 = prediction.relative_variance(&counts).iter().sum();
             assert!(
                 (found / expected - 1.0).abs() < 0.1,
-                "{case}, {hits}, {others}: {found}, expected {expected}"
+                "{other:?}, {hits}, {others}: {found}, expected {expected}"
             );
         }
     }
@@ -145,8 +131,7 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
             }
             let merged = Some(path as u32);
             samples.extend(
-                [Sample { technique: Technique::Pb2d, merged, albedos: 1.0, value, shares, damped: [1.0; 2] };
-                    PHOTONS],
+                [Sample { technique: Technique::Pb2d, merged, albedos: 1.0, value, shares }; PHOTONS],
             );
         }
         ends.push(samples.len() as u32);
@@ -171,14 +156,8 @@ fn photons_vary_at_least_as_independent_ones_do() {
     const TRACED: f64 = 10.0;
     let mut shares = [0.0; TECHNIQUES];
     shares[Technique::Bb1d as usize] = 1.0;
-    let photon = Sample {
-        technique: Technique::Bb1d,
-        merged: Some(0),
-        albedos: 1.0,
-        value: Vec3::ONE,
-        shares,
-        damped: [1.0; 2],
-    };
+    let photon =
+        Sample { technique: Technique::Bb1d, merged: Some(0), albedos: 1.0, value: Vec3::ONE, shares };
     let looks = (SIDE * SIDE * PASSES) as usize;
     let trial = Trial {
         samples: vec![photon; looks],
@@ -209,14 +188,7 @@ fn variances_know_where_walks_end() {
     for i in 0..(SIDE * SIDE * PASSES) as usize {
         let mut find = |albedos, value| {
             let value = Vec3::splat(value);
-            samples.push(Sample {
-                technique: Technique::Hit,
-                merged: None,
-                albedos,
-                value,
-                shares,
-                damped: [1.0; 2],
-            });
+            samples.push(Sample { technique: Technique::Hit, merged: None, albedos, value, shares });
         };
         find(1.0, 1.0);
         if uniform(i, 4) < f64::from(reached) {
@@ -301,7 +273,6 @@ fn sample() -> impl Strategy<Value = Sample> {
                 albedos,
                 value: value.into(),
                 shares: densities.map(|density| density / sum),
-                damped: [1.0; 2],
             }
         })
 }

@@ -4,7 +4,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use upbp_estimators::MediumId;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
-use upbp_estimators::mis::{BeamExtent, Damping, Heuristic, MisPlan, PARALLEL_SIN2, VolumeMerges};
+use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2, VolumeMerges};
 
 /// The number of techniques, in the order hit, nee, connect, light tracing, surf, pp3d, pb2d, bp2d, bb1d.
 pub(crate) const TECHNIQUES: u32 = 9;
@@ -137,22 +137,8 @@ pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
             volume,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
-            damping: None,
-            correlation: None,
         },
     )
-}
-
-/// The plan with merges damped and correlation accounted for.
-pub(crate) fn damped(plan: &MisPlan, [surf, pp3d, pb2d, bp2d, bb1d]: [f64; 5], correlation: f64) -> MisPlan {
-    let damping = Some(Damping { surf, pp3d, pb2d, bp2d, bb1d });
-    MisPlan { damping, correlation: Some(correlation), ..plan.clone() }
-}
-
-/// Fourth powers of radii between `e^{-spread}` and `e^{spread}`, and a radius of correlation.
-pub(crate) fn dampings(spread: f64) -> impl Strategy<Value = ([f64; 5], f64)> {
-    let fourth = || around_one(spread).prop_map(|r: f64| r.powi(4));
-    ([fourth(), fourth(), fourth(), fourth(), fourth()], around_one(spread))
 }
 
 /// The plan with only the techniques whose bits are set.

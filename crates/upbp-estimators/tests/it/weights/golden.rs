@@ -76,8 +76,6 @@ fn golden_plan(query_beams: BeamExtent) -> MisPlan {
         }],
         photon_beams: BeamExtent::Short,
         query_beams,
-        damping: None,
-        correlation: None,
     }
 }
 

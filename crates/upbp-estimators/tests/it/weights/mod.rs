@@ -4,13 +4,13 @@ mod abstract_paths;
 mod golden;
 mod recursion;
 
-use abstract_paths::{TECHNIQUES, damped, dampings, masked, modes, path, plan};
+use abstract_paths::{TECHNIQUES, masked, modes, path, plan};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use recursion::{Recursion, is_ok};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
-use upbp_estimators::mis::{ByTechnique, Densities, Heuristic, MergesApart, MisPlan, VolumeMerges};
+use upbp_estimators::mis::{ByTechnique, Densities, Heuristic, MisPlan, VolumeMerges};
 
 /// Every strategy that the kinds of the vertices allow, and the bit of its technique.
 fn strategies(path: &Path) -> Vec<(Way, u32)> {
@@ -91,13 +91,9 @@ impl Reached {
         let recursion = Recursion::<ByTechnique>::new(plan, path);
         let bits = strategies(path);
         let mut parts = [0.0; TECHNIQUES as usize];
-        let mut damped_again = 0.0;
         for (way, weight) in &expected {
             let (_, bit) = bits.iter().find(|(other, _)| other == way).expect("a strategy");
             parts[*bit as usize] += weight;
-            if let Way::Surf(i) | Way::Pp3d(i) | Way::Pb2d(i) | Way::Bp2d(i) | Way::Bb1d(i) = *way {
-                damped_again += weight * plan.pow(path.reuse(plan, i));
-            }
         }
         for &(way, weight) in expected.iter().filter(|(_, weight)| *weight > 1e-200) {
             let found = recursion.weight(way);
@@ -110,11 +106,6 @@ impl Reached {
                     "{way:?}, {bit}: {found}, {part}"
                 );
             }
-            let again = found.all.merges_damped_again / found.all.total();
-            prop_assert!(
-                (again - damped_again).abs() <= 1e-10 * damped_again + 1e-200,
-                "{way:?}: {again}, {damped_again}"
-            );
             self.weights += 1;
             self.difference = self.difference.max(difference);
         }
@@ -166,28 +157,10 @@ fn recursion_equals_the_enumeration_for_all_masks() {
 }
 
 #[test]
-fn damped_and_correlated_merges_equal_the_enumeration() {
-    let mut runner = TestRunner::deterministic();
-    let mut masks = masks();
-    let strategy = dampings(2.0);
-    for_all_ranges("damped", |reached, plan, path| {
-        let (damping, correlation) = strategy.new_tree(&mut runner).unwrap().current();
-        let plan = damped(plan, damping, correlation);
-        for mask in masks.by_ref().take(2).chain([(1 << TECHNIQUES) - 1]) {
-            let plan = masked(&plan, mask);
-            reached.compare::<MergesApart>(&plan, path, mask).unwrap();
-            reached.compare_by_technique(&plan, path).unwrap();
-            // A sum of all knows of lengths, but not of what camera sub-paths have in common.
-            reached.compare::<f64>(&MisPlan { correlation: None, ..plan }, path, mask).unwrap();
-        }
-    });
-}
-
-#[test]
 fn the_recursion_by_technique_tells_the_part_of_each() {
     let mut masks = masks();
     for_all_ranges("by technique", |reached, plan, path| {
-        for mask in masks.by_ref().take(1).chain([(1 << TECHNIQUES) - 1]) {
+        for mask in masks.by_ref().take(2).chain([(1 << TECHNIQUES) - 1]) {
             reached.compare_by_technique(&masked(plan, mask), path).unwrap();
         }
     });

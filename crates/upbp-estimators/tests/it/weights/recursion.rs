@@ -2,9 +2,7 @@
 
 use upbp_estimators::Technique;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
-use upbp_estimators::mis::{
-    Densities, Edge, End, Leg, MergeSite, MisPlan, Pending, Tip, VolumeMerges, Weight,
-};
+use upbp_estimators::mis::{Densities, Edge, End, MergeSite, MisPlan, Pending, Tip, VolumeMerges, Weight};
 use upbp_estimators::scene::Walk;
 
 /// Weights by the recursion, with exactly the calls that the walks make.
@@ -38,10 +36,6 @@ fn distance_squared(edge: &PathEdge) -> f64 {
     if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 }
 }
 
-fn nearness(edge: &PathEdge) -> f64 {
-    (edge.distance * edge.distance).recip()
-}
-
 /// What a vertex passes on after it has scattered.
 fn pend<D: Densities>(
     plan: &MisPlan,
@@ -51,14 +45,13 @@ fn pend<D: Densities>(
     rho_opposite: f64,
     cos_out: f64,
 ) -> Pending<D> {
-    let tip = if is_ok(vertex) { *tip } else { Tip { connect: D::ZERO, spread: f64::INFINITY, ..*tip } };
+    let tip = if is_ok(vertex) { *tip } else { Tip { connect: D::ZERO, ..*tip } };
     Pending {
         before: tip.before(plan, rho_opposite),
         rho,
         cos_out,
         site: site(vertex),
-        leg: tip.leg,
-        reuse: tip.reuse,
+        distance_factor: tip.distance_factor,
         connectible: is_ok(vertex),
         in_medium: in_medium(vertex),
     }
@@ -67,8 +60,7 @@ fn pend<D: Densities>(
 impl<'a, D: Densities> Recursion<'a, D> {
     pub(crate) fn new(plan: &'a MisPlan, path: &'a Path) -> Self {
         let (k, v) = (path.length(), &path.vertices);
-        let nowhere =
-            Tip { connect: D::ZERO, below: D::ZERO, leg: Leg::default(), spread: f64::INFINITY, reuse: 1.0 };
+        let nowhere = Tip { connect: D::ZERO, below: D::ZERO, distance_factor: 0.0 };
         let mut light = vec![nowhere; k + 1];
         let mut pending =
             Pending::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
@@ -76,7 +68,6 @@ impl<'a, D: Densities> Recursion<'a, D> {
             let e = &path.edges[i - 1];
             let edge = Edge {
                 distance_squared: distance_squared(e),
-                nearness: nearness(e),
                 cos_in: v[i].cos_light,
                 forward: e.t_light,
                 backward: e.t_camera,
@@ -100,7 +91,6 @@ impl<'a, D: Densities> Recursion<'a, D> {
             let e = &path.edges[i];
             let edge = Edge {
                 distance_squared: distance_squared(e),
-                nearness: nearness(e),
                 cos_in: v[i].cos_camera,
                 forward: e.t_camera,
                 backward: e.t_light,
@@ -128,15 +118,15 @@ impl<'a, D: Densities> Recursion<'a, D> {
     /// The end of the light sub-path at vertex `i`, with the edge that the camera's side would arrive by.
     fn light_end(&self, i: usize) -> End<D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i]);
-        let leg = self.plan.leg(Walk::Camera, in_medium(vertex), nearness(edge), edge.reach, edge.t_camera);
-        self.light[i].end(self.plan, Walk::Light, site(vertex), leg, vertex.rho_camera)
+        let opposite = self.plan.distance_factor(Walk::Camera, in_medium(vertex), edge.reach, edge.t_camera);
+        self.light[i].end(self.plan, Walk::Light, site(vertex), opposite, vertex.rho_camera)
     }
 
     /// The end of the camera sub-path at vertex `i`, with the edge that the light's side would arrive by.
     fn camera_end(&self, i: usize) -> End<D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i - 1]);
-        let leg = self.plan.leg(Walk::Light, in_medium(vertex), nearness(edge), edge.reach, edge.t_light);
-        self.camera[i].end(self.plan, Walk::Camera, site(vertex), leg, vertex.rho_light)
+        let opposite = self.plan.distance_factor(Walk::Light, in_medium(vertex), edge.reach, edge.t_light);
+        self.camera[i].end(self.plan, Walk::Camera, site(vertex), opposite, vertex.rho_light)
     }
 
     /// `L_i`, given that vertex `i − 1` scatters towards it.
@@ -155,15 +145,16 @@ impl<'a, D: Densities> Recursion<'a, D> {
         let vertex = &self.path.vertices[i];
         let (light, camera) = (&self.light[i], &self.camera[i]);
         let (factor, merges) = if let VertexKind::Medium(medium) = vertex.kind {
-            let factors = self.plan.volume_factors(medium, light.leg, camera.leg, vertex.sin_theta);
+            let (c_light, c_camera) = (light.distance_factor, camera.distance_factor);
+            let factors = self.plan.volume_factors(medium, c_light, c_camera, vertex.sin_theta);
             (factor(&factors), factors.sum())
         } else {
-            let factor = self.plan.surface_factor(light.leg, camera.leg);
+            let factor = self.plan.surface_factor();
             (factor, D::of(Technique::Surf, factor))
         };
         let before_light = light.before(self.plan, vertex.rho_camera);
         let before_camera = camera.before(self.plan, vertex.rho_light);
-        self.plan.merge_weight(factor, merges, before_light, before_camera, camera.reuse)
+        Weight::of_merge(factor, merges, before_light, before_camera)
     }
 
     pub(crate) fn weight(&self, way: Way) -> Weight<D> {
@@ -185,11 +176,6 @@ impl<'a, D: Densities> Recursion<'a, D> {
                 self.camera_density(s - 1),
                 self.camera_end(s),
                 self.light_density(s),
-                plan.reuse(
-                    self.camera[s].reuse,
-                    path.vertices[s].rho_camera * path.vertices[s - 1].cos_camera
-                        / distance_squared(&path.edges[s - 1]),
-                ),
             ),
             Way::LightTracing => plan.light_tracing_weight(self.light_end(k - 1), self.camera_density(k - 1)),
             Way::Surf(i) => self.merge(i, |_| 0.0),
