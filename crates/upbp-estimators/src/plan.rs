@@ -120,7 +120,7 @@ pub struct PlanChoices {
     pub query_beams: BeamExtent,
 }
 
-/// How much the merges of a kernel count in a medium, in `[0, 1]` (`docs/theory.md`, section 6(c)): the light changes within a
+/// How much the merges of a kernel count in a medium, in `[0, 1]` (`docs/theory.md`, section 6.5): the light changes within a
 /// mean free path of a boundary, and a wider kernel averages over that. Where no other technique finds a path, the factor
 /// cancels out of the weights.
 fn trust(kernel: &Kernel, mean_free_path: f32) -> f64 {

@@ -5,7 +5,7 @@
 //! independent (a shared stream correlates them, `docs/theory.md`, section 10, row 6).
 //!
 //! The first decisions of a sub-path are points of Owen-scrambled (0, 2)-sequences, padded: every decision has an order and a
-//! scramble of its own (`docs/theory.md`, section 6(k)). The light sub-paths of an iteration are stratified among
+//! scramble of its own (`docs/theory.md`, section 6.7). The light sub-paths of an iteration are stratified among
 //! each other, the camera sub-paths of a pixel over iterations; each sub-path for itself is uniform and independent of all others,
 //! so nothing is biased. Later decisions, whose strata no longer mean anything, come from xoshiro256++.
 //!

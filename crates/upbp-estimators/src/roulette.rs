@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// When sub-paths end (`docs/theory.md`, section 6(l)).
+/// When sub-paths end (`docs/theory.md`, section 6.8).
 ///
 /// Every vertex tells a probability to [continue](crate::scene::Bsdf::continuation), its albedo. Light sub-paths go on with just that
 /// probability, so that all photons carry the same power. What a camera vertex finds differs by more than its albedo anyway, and first

@@ -9,7 +9,7 @@
 //! found, and then no upper end is given. Bias is not seen: neither that of kernels, nor light that no
 //! technique of the set can find.
 //!
-//! Formulas and sources: `docs/theory.md`, section 6(p). Oracles: `tests`, images with known truth.
+//! Formulas and sources: `docs/theory.md`, section 6.10. Oracles: `tests`, images with known truth.
 
 use std::fmt;
 use std::ops::AddAssign;

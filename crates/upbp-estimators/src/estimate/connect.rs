@@ -1,7 +1,7 @@
 //! Connections of a camera vertex to light vertices drawn from all of them.
 //!
 //! Drawing `M` of the `N_V` stored vertices instead of walking along one light sub-path keeps the cost of a camera vertex
-//! constant, however long light sub-paths are (`docs/theory.md`, section 6(m)).
+//! constant, however long light sub-paths are (`docs/theory.md`, section 6.9).
 
 use crate::light_map::LightMap;
 use crate::observer::{Joint, ObservedSample, Observer};
