@@ -5,8 +5,10 @@
 //! * [`plans`]: the choice of techniques.
 //! * [`runs`]: renders that are repeated, split, resumed, stopped, or very long; their memory.
 //! * [`hostile`]: hosts, numbers, files and scenes at the ends of what is possible, and beyond.
+//! * [`documents`]: links, and what documents and comments cite.
 
 mod agreement;
+mod documents;
 mod hostile;
 mod known_answers;
 mod plans;
