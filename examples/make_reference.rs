@@ -7,9 +7,6 @@
 //! them, the noise, and the difference in tiles and pixels, which is bias where it is more than noise. `@` is
 //! followed by the first radius of all kernels, relative to the scene.
 
-#[path = "support/scenes.rs"]
-mod scenes;
-
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -22,8 +19,7 @@ use upbp_core::{
     check_writable,
 };
 use upbp_scene::{ReadyScene, SceneError};
-
-use scenes::{Group, Shipped, names};
+use upbp_testing::shipped::{Group, Shipped, names};
 
 /// Fewest batches of a set: below that their spread says too little.
 const LEAST_BATCHES: u32 = 4;

@@ -3,6 +3,8 @@
 //! `cargo run --release --example host_renderer` writes `host_renderer.exr` and `host_renderer.png`.
 
 mod scene;
+#[cfg(test)]
+mod tests;
 
 use std::error::Error;
 use std::ops::ControlFlow;

@@ -12,12 +12,8 @@ mod analysis;
 mod measure;
 mod options;
 mod plot;
-#[path = "../support/scenes.rs"]
-mod scenes;
 mod subject;
 mod table;
-#[path = "../support/threads.rs"]
-mod threads;
 mod verdict;
 
 use std::error::Error;

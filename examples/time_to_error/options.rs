@@ -8,8 +8,6 @@ use std::str::FromStr;
 use clap::Parser;
 use upbp_core::{Settings, Techniques};
 
-use crate::threads::threads;
-
 /// The set that is judged: the choice of the program.
 pub(crate) const AUTO: &str = "auto";
 /// Everything, whether it helps or not.
@@ -68,7 +66,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FOLDER")]
     pub(crate) out: PathBuf,
     /// Threads [default: one per core; at most 16 per core]
-    #[arg(long, value_name = "T", value_parser = threads)]
+    #[arg(long, value_name = "T")]
     pub(crate) threads: Option<NonZeroUsize>,
 }
 

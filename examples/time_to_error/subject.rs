@@ -8,7 +8,7 @@ use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
 use upbp_core::{Image, open_exr, read_exr};
 use upbp_scene::ReadyScene;
 
-use crate::scenes::{Group, SCENES, Shipped};
+use upbp_testing::shipped::{Group, SCENES, Shipped};
 
 /// Mean errors of a perfect render, due to the noise of the reference; 0 where it is not known.
 #[derive(Clone, Copy, Debug, Default)]

@@ -2,7 +2,6 @@
 
 #![no_main]
 
-#[path = "../../tests/it/support/readers.rs"]
-mod readers;
+use upbp_testing::readers;
 
 libfuzzer_sys::fuzz_target!(|text: &str| readers::read_settings(text));

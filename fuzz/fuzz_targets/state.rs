@@ -2,8 +2,7 @@
 
 #![no_main]
 
-#[path = "../../tests/it/support/readers.rs"]
-mod readers;
+use upbp_testing::readers;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     readers::read_state(bytes);

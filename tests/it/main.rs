@@ -13,4 +13,3 @@ mod hostile;
 mod known_answers;
 mod plans;
 mod runs;
-mod support;

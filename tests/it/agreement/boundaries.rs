@@ -1,9 +1,9 @@
 //! Starts of rays on, or within rounding of, the boundary of a body.
 
-use crate::support::{assert_same, render, render_channels};
 use upbp_core::Settings;
 use upbp_core::check::check_scene;
 use upbp_scene::ReadyScene;
+use upbp_testing::{assert_same, render, render_channels};
 
 fn scene(text: &str) -> ReadyScene {
     match ReadyScene::from_ron_str(text, "") {

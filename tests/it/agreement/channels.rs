@@ -1,8 +1,8 @@
 //! Colours are three numbers and no more: which of them is called red makes no difference.
 
-use crate::support::{render, render_channels};
 use upbp_core::{LightPaths, Settings, TechniqueSet};
 use upbp_scene::ReadyScene;
+use upbp_testing::{render, render_channels};
 
 /// A scene whose colours are given as a function of the channel.
 fn scene(sigma_s: [f32; 3], colour: [f32; 3]) -> ReadyScene {

@@ -1,8 +1,8 @@
 //! Scenes far from the origin of their coordinates, and scenes of any size.
 
-use crate::support::render;
 use upbp_core::{LightPaths, Settings, TechniqueSet};
 use upbp_scene::ReadyScene;
+use upbp_testing::render;
 
 fn scene(scale: f32, offset: f32) -> ReadyScene {
     let p = |x: f32, y: f32, z: f32| {

@@ -3,7 +3,6 @@
 mod boundaries;
 mod channels;
 mod far_away;
-mod host_scene;
 mod rebuild;
 mod roulette;
 mod subsets;

@@ -8,10 +8,10 @@ use upbp_estimators::observer::LightEnd;
 use upbp_estimators::scene::Scene;
 use upbp_estimators::{Interior, MediumId, Roulette};
 
-use crate::support::closed_form::fog::Fog;
-use crate::support::closed_form::light::Source;
-use crate::support::closed_form::material::Material;
-use crate::support::closed_form::scene::ClosedForm;
+use upbp_testing::closed_form::fog::Fog;
+use upbp_testing::closed_form::light::Source;
+use upbp_testing::closed_form::material::Material;
+use upbp_testing::closed_form::scene::ClosedForm;
 
 /// Closer to a boundary or an end than this, double precision does not say on which side single precision
 /// was.

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::support::{Estimate, assert_same, channels, iterate};
 use upbp_core::{Roulette, Settings, Techniques};
 use upbp_scene::ReadyScene;
+use upbp_testing::{Estimate, assert_same, channels, iterate};
 
 /// Walks by the albedo at every vertex against walks that are spared, and that never end: 16 seeds of three iterations each.
 #[test]

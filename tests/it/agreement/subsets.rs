@@ -16,7 +16,7 @@ use upbp_estimators::{
     StreamKind, Technique, World,
 };
 
-use crate::support::closed_form::scene::ClosedForm;
+use upbp_testing::closed_form::scene::ClosedForm;
 
 const SIZE: u32 = 48;
 

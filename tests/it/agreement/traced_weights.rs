@@ -18,8 +18,8 @@ use upbp_estimators::{
 };
 
 use super::rebuild::{Trace, Vertex};
-use crate::support::closed_form::material::Material;
-use crate::support::closed_form::scene::ClosedForm;
+use upbp_testing::closed_form::material::Material;
+use upbp_testing::closed_form::scene::ClosedForm;
 
 /// Weights below this are compared with nothing: they are rounding of others.
 const SMALLEST_WEIGHT: f64 = 1e-6;

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use crate::support::{Estimate, assert_same, render_channels};
 use upbp_core::{BeamExtent, LightPaths, Radii, Radius, Settings};
 use upbp_scene::ReadyScene;
+use upbp_testing::{Estimate, assert_same, render_channels};
 
 /// Per channel: red, green, blue.
 type Rgb = [f64; 3];

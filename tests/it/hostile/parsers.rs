@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use crate::support::readers::{little, read_mesh, read_scene, read_settings, read_state, sealed};
 use proptest::prelude::*;
 use upbp_core::Settings;
 use upbp_scene::{ReadyScene, SceneDescription};
+use upbp_testing::readers::{little, read_mesh, read_scene, read_settings, read_state, sealed};
 
 const SCENES: [&str; 3] = [
     include_str!("../../../examples/scenes/cornell_media.ron"),
@@ -78,7 +78,7 @@ fn change(text: &str, changes: &[(usize, usize, usize, bool)]) -> String {
 /// Reads an image. A file for each thread: tests run at the same time.
 fn read_image(bytes: &[u8]) {
     let name = format!("image_{:?}.exr", std::thread::current().id());
-    crate::support::readers::read_image(bytes, &Path::new(env!("CARGO_TARGET_TMPDIR")).join(name));
+    upbp_testing::readers::read_image(bytes, &Path::new(env!("CARGO_TARGET_TMPDIR")).join(name));
 }
 
 /// A good image.

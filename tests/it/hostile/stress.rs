@@ -1,7 +1,6 @@
 //! A part of the stress matrix, a few cases of each group. All of it: `cargo run --release --example stress`.
 
-use crate::support::stress::execute::in_parallel;
-use crate::support::stress::grid::{Case, all};
+use upbp_testing::stress::{Case, all, in_parallel};
 
 /// Judges every n-th case of a group.
 fn part(group: &str, every: usize) {
@@ -11,7 +10,7 @@ fn part(group: &str, every: usize) {
     let failures: Vec<String> = cases
         .iter()
         .zip(results)
-        .filter_map(|(case, result)| result.err().map(|wrong| format!("{}: {wrong}", case.axes)))
+        .filter_map(|(case, result)| result.err().map(|wrong| format!("{case}: {wrong}")))
         .collect();
     assert!(failures.is_empty(), "{group}: {} failed\n{}", failures.len(), failures.join("\n"));
 }

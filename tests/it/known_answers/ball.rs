@@ -1,7 +1,7 @@
 //! A ball that absorbs and emits but does not scatter.
 
-use crate::support::cases::{Table, cases, narrow_camera, scene, settings};
-use crate::support::render;
+use upbp_testing::analytic::{Table, cases, narrow_camera, scene, settings};
+use upbp_testing::render;
 
 #[test]
 fn ball_nonscattering() {

@@ -1,7 +1,7 @@
 //! Nothing absorbs, or what is absorbed is emitted again: every ray has radiance 1.
 
-use crate::support::cases::{Case, Table, cases, scene, settings, vector};
-use crate::support::render;
+use upbp_testing::analytic::{Case, Table, cases, scene, settings, vector};
+use upbp_testing::render;
 
 /// What merges may lose at boundaries, where a kernel sticks out of its medium; falls with the radius.
 const BOUNDARY_LOSS: f64 = 0.005;

@@ -1,7 +1,7 @@
 //! A thick slab under a directional light: the emergent radiance of a half-space.
 
-use crate::support::cases::{Table, cases, medium, narrow_camera, scene, settings, vector};
-use crate::support::render;
+use upbp_testing::analytic::{Table, cases, medium, narrow_camera, scene, settings, vector};
+use upbp_testing::render;
 
 #[test]
 fn halfspace_isotropic() {

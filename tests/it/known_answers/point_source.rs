@@ -9,8 +9,8 @@ use upbp_estimators::{
     Kernel, Kernels, LookUps, PathLengths, Plan, PlanChoices, Roulette, StreamKind, World,
 };
 
-use crate::support::Estimate;
-use crate::support::cases::{Case, Table, cases, medium, narrow_camera, scene};
+use upbp_testing::Estimate;
+use upbp_testing::analytic::{Case, Table, cases, medium, narrow_camera, scene};
 
 /// Distances and fluxes of the photons of each light sub-path of a source of power 1.
 fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {

@@ -2,15 +2,10 @@
 //! independent renderer: short renders, errors in standard deviations. `examples/validate` does the same with more
 //! time and all techniques.
 
-#[path = "../../../examples/validate/compare.rs"]
-#[allow(dead_code, reason = "the example uses the rest")]
-mod compare;
-
-use std::path::Path;
-
-use compare::{Comparison, Reference, Spread};
 use upbp_core::Settings;
 use upbp_scene::ReadyScene;
+use upbp_testing::reference::{Comparison, Reference, Spread};
+use upbp_testing::shipped::Shipped;
 
 /// Iterations of each render: enough for the spread to be known.
 const ITERATIONS: u64 = 40;
@@ -24,11 +19,9 @@ const MEAN: f64 = 4.0;
 const TILE: f64 = 6.0;
 
 fn check(scene_name: &str) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let scene = ReadyScene::load(root.join(format!("examples/scenes/reference/{scene_name}.ron")))
-        .expect("a valid scene");
-    let reference = Reference::read(&root.join(format!("tests/data/references/{scene_name}.exr")))
-        .expect("an image with standard errors");
+    let shipped = Shipped::find(scene_name).expect("a shipped scene");
+    let scene = ReadyScene::load(shipped.scene()).expect("a valid scene");
+    let reference = Reference::read(&shipped.reference()).expect("an image with standard errors");
     let mut failures = Vec::new();
     for techniques in ["bpt", "bpt+surf+pp3d+pb2d+bb1d", "auto"] {
         let settings = Settings {

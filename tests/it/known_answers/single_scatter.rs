@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use crate::support::cases::{Case, Table, cases, medium, narrow_camera, scene, settings, vector};
-use crate::support::render;
 use upbp_core::{LightPaths, Settings};
+use upbp_testing::analytic::{Case, Table, cases, medium, narrow_camera, scene, settings, vector};
+use upbp_testing::render;
 
 /// Cases that merges can be asked in a test's time: the light neither hidden behind many mean free paths nor so close, or
 /// the phase function so peaked, that few photons carry all of it.

@@ -4,8 +4,8 @@
 //! shines with radiance 1, what light from that direction would have returned. Above the slab shines a red plane, below
 //! it a green one; the camera stands in the narrow gap above.
 
-use crate::support::cases::{Case, Table, cases, medium, narrow_camera, scene, settings};
-use crate::support::render_channels;
+use upbp_testing::analytic::{Case, Table, cases, medium, narrow_camera, scene, settings};
+use upbp_testing::render_channels;
 
 /// Between slab and planes, in mean free paths, against a half-width of 1e4: what leaves sideways is negligible.
 const GAP: f64 = 0.01;

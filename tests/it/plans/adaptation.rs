@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::support::{Estimate, assert_same, channels, renderer};
 use upbp_core::{LightPaths, Radii, Radius, RenderPlan, Settings, Start, TechniqueSet, Techniques, read_exr};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::{Count, Film};
+use upbp_testing::{Estimate, assert_same, channels, renderer};
 
 fn settings() -> Settings {
     Settings { deterministic: true, ..Settings::default() }

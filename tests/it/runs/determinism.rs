@@ -24,7 +24,7 @@ fn bits(threads: usize, techniques: &str) -> Vec<u32> {
             deterministic: true,
             ..Settings::default()
         };
-        let mut renderer = crate::support::renderer(&scene, settings);
+        let mut renderer = upbp_testing::renderer(&scene, settings);
         for _ in 0..3 {
             assert!(renderer.iterate());
         }
@@ -68,7 +68,7 @@ fn a_crop_shows_the_same_camera_samples_as_the_whole() {
             techniques: "pt".parse().expect("technique names"),
             ..Settings::default()
         };
-        let mut renderer = crate::support::renderer(&scene, settings);
+        let mut renderer = upbp_testing::renderer(&scene, settings);
         assert!(renderer.iterate());
         renderer.film().image()
     };
@@ -88,7 +88,7 @@ fn room_renderer(room: &ReadyScene) -> Renderer<'_> {
         beams: Some(20),
         ..Settings::default()
     };
-    let mut renderer = crate::support::renderer(room, settings);
+    let mut renderer = upbp_testing::renderer(room, settings);
     renderer.identify_scene("room", b"room");
     renderer
 }
@@ -116,7 +116,7 @@ proptest! {
         order in Just(vec![0, 1, 2]).prop_shuffle(),
         threads in 1..4_usize,
     ) {
-        let room = crate::support::room(6);
+        let room = upbp_testing::room(6);
         let mut whole = room_renderer(&room);
         whole.set_range(0..SHARED);
         while whole.iterate() {}
@@ -151,7 +151,7 @@ proptest! {
 
 #[test]
 fn what_does_not_belong_together_is_refused_by_name() {
-    let room = crate::support::room(6);
+    let room = upbp_testing::room(6);
     let render = |change: fn(&mut Settings), scene: &[u8], first: u64| {
         let mut settings = Settings {
             techniques: TechniqueSet::default().into(),
@@ -159,7 +159,7 @@ fn what_does_not_belong_together_is_refused_by_name() {
             ..Settings::default()
         };
         change(&mut settings);
-        let mut renderer = crate::support::renderer(&room, settings);
+        let mut renderer = upbp_testing::renderer(&room, settings);
         renderer.identify_scene("room", scene);
         renderer.set_range(first..first + 2);
         while renderer.iterate() {}

@@ -10,7 +10,7 @@ fn settings() -> Settings {
 
 #[test]
 fn the_preparation_says_what_it_does_and_can_be_cancelled() {
-    let room = crate::support::room(8);
+    let room = upbp_testing::room(8);
     let mut steps: Vec<Preparing> = Vec::new();
     let mut note = |step| steps.push(step);
     let start = Start { progress: Some(&mut note), ..Start::default() };
@@ -38,10 +38,10 @@ fn the_preparation_says_what_it_does_and_can_be_cancelled() {
 
 #[test]
 fn a_render_without_time_has_a_picture_and_goes_on_from_there() {
-    let room = crate::support::room(40);
+    let room = upbp_testing::room(40);
     let go_on = |_: &upbp_core::Progress<'_>| ControlFlow::Continue(());
     let render = |renderer: &mut Renderer<'_>, stop: Stop| renderer.render(&stop, go_on).reason;
-    let renderer = || crate::support::renderer(&room, settings());
+    let renderer = || upbp_testing::renderer(&room, settings());
     let mut whole = renderer();
     assert_eq!(render(&mut whole, Stop { iterations: Some(3), ..Stop::default() }), StopReason::Iterations);
 

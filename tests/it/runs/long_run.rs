@@ -26,7 +26,7 @@ fn renderer(room: &ReadyScene, change: impl Fn(&mut Settings)) -> Renderer<'_> {
         ..Settings::default()
     };
     change(&mut settings);
-    crate::support::renderer(room, settings)
+    upbp_testing::renderer(room, settings)
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn nothing_grows_with_the_number_of_iterations() {
         return;
     }
     let wanted: u64 = std::env::var("UPBP_ITERATIONS").map_or(4000, |text| text.parse().expect("a number"));
-    let room = crate::support::room(4);
+    let room = upbp_testing::room(4);
     let mut renderer = renderer(&room, |_| ());
     let start = Instant::now();
     let mut early = 0;
@@ -86,7 +86,7 @@ fn nothing_grows_with_the_number_of_iterations() {
 
 #[test]
 fn the_last_iterations_are_as_good_as_the_first() {
-    let room = crate::support::room(4);
+    let room = upbp_testing::room(4);
     for (what, radius) in
         [("auto", Radius::Auto), ("tiny", Radius::Absolute(1e-30)), ("scene", Radius::Scene(1e-12))]
     {

@@ -2,10 +2,10 @@
 
 use std::sync::OnceLock;
 
-use crate::support::readers::sealed;
 use proptest::prelude::*;
 use upbp_core::{ErrorPoint, LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
 use upbp_scene::ReadyScene;
+use upbp_testing::readers::sealed;
 
 /// The render that good states are of.
 fn renderer(room: &ReadyScene) -> Renderer<'_> {
@@ -14,7 +14,7 @@ fn renderer(room: &ReadyScene) -> Renderer<'_> {
         light_paths: LightPaths::Count(100),
         ..Settings::default()
     };
-    let mut renderer = crate::support::renderer(room, settings);
+    let mut renderer = upbp_testing::renderer(room, settings);
     renderer.identify_scene("room", b"room");
     renderer
 }
@@ -23,7 +23,7 @@ fn renderer(room: &ReadyScene) -> Renderer<'_> {
 fn good() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
-        let room = crate::support::room(5);
+        let room = upbp_testing::room(5);
         let mut renderer = renderer(&room);
         for range in [0..2, 7..8] {
             renderer.set_range(range);
@@ -150,7 +150,7 @@ fn counts_and_times_of_any_size_are_merged_reported_and_resumed() {
     state.merge(read("[(3,6)]")).expect("no iterations in common");
     let text = state.report().to_string();
     assert!(text.contains(&format!("{} walks lost", u64::MAX)), "{text}");
-    let room = crate::support::room(5);
+    let room = upbp_testing::room(5);
     let mut renderer = renderer(&room);
     renderer.resume(state).expect("the same render");
     assert!(renderer.iterate());

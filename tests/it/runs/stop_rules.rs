@@ -7,12 +7,12 @@ use upbp_scene::ReadyScene;
 
 fn renderer(room: &ReadyScene) -> Renderer<'_> {
     let settings = Settings { techniques: "bpt".parse().expect("a technique"), ..Settings::default() };
-    crate::support::renderer(room, settings)
+    upbp_testing::renderer(room, settings)
 }
 
 #[test]
 fn each_rule_stops() {
-    let room = crate::support::room(12);
+    let room = upbp_testing::room(12);
     let go_on = |_: &upbp_core::Progress<'_>| ControlFlow::Continue(());
 
     let mut by_count = renderer(&room);

@@ -10,9 +10,9 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, SystemTime};
 
-use crate::processor;
 use crate::program::{SMALL, command, folder};
 use upbp_core::State;
+use upbp_testing::processor;
 
 /// As [`program::command`], silent, one thread.
 fn render(folder: &Path, arguments: &[&str]) -> Command {

@@ -5,7 +5,4 @@ mod bad_input;
 mod interruption;
 #[cfg(unix)]
 mod outputs;
-#[cfg(unix)]
-#[path = "../../../../tests/support/processor.rs"]
-mod processor;
 mod program;

@@ -6,7 +6,6 @@
 //! elements only, and has to find as many hits as the tree; the other structures may differ by what their
 //! boxes lose to rounding.
 
-#[path = "lookups/alternatives.rs"]
 mod alternatives;
 
 use std::cell::LazyCell;

@@ -1,14 +1,15 @@
 //! The combinations, and what must hold for each.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::Mutex;
 
 use super::case::{Axes, Chromatic, Layout, Light, View};
 use super::execute::{Render, differs, render};
 use super::photon::photons;
 use super::walk;
-use crate::support::Estimate;
-use crate::support::cases as exact;
+use crate::analytic;
+use crate::statistics::Estimate;
 
 /// What must hold besides what always does.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,12 +30,19 @@ pub(crate) enum Check {
 
 /// A case of the matrix.
 #[derive(Clone, Debug)]
-pub(crate) struct Case {
+pub struct Case {
+    /// Group of the grid, a name in the tables.
     pub group: &'static str,
-    pub axes: Axes,
-    pub check: Check,
-    /// What kernel bias may change, relative.
-    pub slack: f64,
+    axes: Axes,
+    check: Check,
+    /// Bias of kernels that is allowed, relative to the mean.
+    slack: f64,
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.group, self.axes)
+    }
 }
 
 /// Iterations of the first attempt; each further one has four times as many.
@@ -51,7 +59,7 @@ impl Case {
     }
 
     /// Renders and judges; the seconds that it took, or what is wrong.
-    pub(crate) fn judge(&self) -> Result<f64, String> {
+    pub fn judge(&self) -> Result<f64, String> {
         if let Check::OnPhoton(index) = self.check {
             return self.on_photon(index);
         }
@@ -145,9 +153,9 @@ fn oracle(tau: f64, albedo: f64, g: f64, max_length: u32, walks: u32) -> Estimat
     found
 }
 
-pub(crate) const TAUS: [f64; 7] = [0.0, 1e-6, 1e-2, 1.0, 1e2, 1e4, 1e6];
-pub(crate) const ALBEDOS: [f64; 5] = [0.0, 0.1, 0.9, 0.999, 1.0];
-pub(crate) const ASYMMETRIES: [f64; 6] = [-0.99999, -0.9, 0.0, 1e-6, 0.9, 0.99999];
+const TAUS: [f64; 7] = [0.0, 1e-6, 1e-2, 1.0, 1e2, 1e4, 1e6];
+const ALBEDOS: [f64; 5] = [0.0, 0.1, 0.9, 0.999, 1.0];
+const ASYMMETRIES: [f64; 6] = [-0.99999, -0.9, 0.0, 1e-6, 0.9, 0.99999];
 const CHROMATICS: [Chromatic; 4] =
     [Chromatic::Grey, Chromatic::Ratio(10.0), Chromatic::Ratio(1e4), Chromatic::Clear];
 const SCALES: [f64; 5] = [1e-6, 1e-3, 1.0, 1e3, 1e6];
@@ -194,7 +202,7 @@ const VIEWS: [View; 8] = [
 ];
 
 /// All cases.
-pub(crate) fn all() -> Vec<Case> {
+pub fn all() -> Vec<Case> {
     let mut cases = Vec::new();
     media(&mut cases);
     furnaces(&mut cases);
@@ -414,7 +422,7 @@ fn lengths(cases: &mut Vec<Case>) {
 
 /// Reflectance and transmittance of slabs, of any size, against exact values.
 fn slabs(cases: &mut Vec<Case>) {
-    for (index, slab) in exact::cases("slab_RT").iter().enumerate() {
+    for (index, slab) in analytic::cases("slab_RT").iter().enumerate() {
         for cosine in slab.inputs("mu0") {
             let expected = |name| slab.expected(&[&format!("mu0_{cosine}"), name]);
             let check = Check::Exactly([expected("R_total"), expected("T_total")]);

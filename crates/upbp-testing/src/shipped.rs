@@ -1,10 +1,12 @@
 //! The scenes that have a reference image.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+
+use crate::root;
 
 /// The renderer that made the reference of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Group {
+pub enum Group {
     /// Another renderer: what is measured against it says something about agreement, too.
     Reference,
     /// This renderer, in a long run: scenes for comparing techniques with each other.
@@ -13,13 +15,15 @@ pub(crate) enum Group {
 
 /// A scene that comes with the repository.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shipped {
-    pub(crate) name: &'static str,
-    pub(crate) group: Group,
+pub struct Shipped {
+    /// Name of the files, without ending.
+    pub name: &'static str,
+    /// Renderer that made the reference.
+    pub group: Group,
 }
 
 /// The scenes with references.
-pub(crate) const SCENES: [Shipped; 18] = [
+pub const SCENES: [Shipped; 18] = [
     reference("absorb_only"),
     reference("chromatic_sphere"),
     reference("emission_grey"),
@@ -50,12 +54,12 @@ const fn suite(name: &'static str) -> Shipped {
 
 impl Shipped {
     /// The scene of that name.
-    pub(crate) fn find(name: &str) -> Option<Self> {
+    pub fn find(name: &str) -> Option<Self> {
         SCENES.into_iter().find(|scene| scene.name == name)
     }
 
     /// The scene file.
-    pub(crate) fn scene(&self) -> PathBuf {
+    pub fn scene(&self) -> PathBuf {
         let folder = match self.group {
             Group::Reference => "reference",
             Group::Suite => "suite",
@@ -64,8 +68,7 @@ impl Shipped {
     }
 
     /// The image with its standard errors.
-    #[allow(dead_code, reason = "not every program that shares this file compares")]
-    pub(crate) fn reference(&self) -> PathBuf {
+    pub fn reference(&self) -> PathBuf {
         let folder = match self.group {
             Group::Reference => "references",
             Group::Suite => "suite",
@@ -75,11 +78,6 @@ impl Shipped {
 }
 
 /// The names of a group.
-#[allow(dead_code, reason = "not every program that shares this file needs a list")]
-pub(crate) fn names(group: Group) -> impl Iterator<Item = &'static str> {
+pub fn names(group: Group) -> impl Iterator<Item = &'static str> {
     SCENES.into_iter().filter(move |scene| scene.group == group).map(|scene| scene.name)
-}
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
 }

@@ -15,12 +15,15 @@ const BUMP: f64 = 0.25;
 
 /// Something that a ray can meet.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Object {
-    pub(crate) shape: Shape,
+pub struct Object {
+    /// Geometry.
+    pub shape: Shape,
     /// `None`: an index-matched boundary.
-    pub(crate) material: Option<Material>,
-    pub(crate) interior: Option<Interior>,
-    pub(crate) emitter: Option<EmitterId>,
+    pub material: Option<Material>,
+    /// Body that the shape encloses.
+    pub interior: Option<Interior>,
+    /// Light that the shape is.
+    pub emitter: Option<EmitterId>,
     bumpy: bool,
 }
 
@@ -34,7 +37,8 @@ impl Object {
         Self { interior: Some(interior), ..self }
     }
 
-    pub(crate) fn shading_normal(&self, point: DVec3) -> DVec3 {
+    /// Shading normal at a point of the surface, of unit length.
+    pub fn shading_normal(&self, point: DVec3) -> DVec3 {
         let normal = self.shape.normal(point);
         if !self.bumpy {
             return normal;
@@ -44,17 +48,21 @@ impl Object {
     }
 }
 
-/// All of it.
-pub(crate) struct ClosedForm {
-    pub(crate) objects: Vec<Object>,
-    pub(crate) lights: Vec<Light>,
-    pub(crate) media: Vec<Fog>,
-    pub(crate) camera: Pinhole,
+/// The scene in closed form.
+pub struct ClosedForm {
+    /// Surfaces and boundaries.
+    pub objects: Vec<Object>,
+    /// Lights, at the positions of their [`EmitterId`].
+    pub lights: Vec<Light>,
+    /// Media, at the positions of their [`MediumId`].
+    pub media: Vec<Fog>,
+    /// Camera.
+    pub camera: Pinhole,
 }
 
 impl ClosedForm {
     /// The scene, with a film of `size` pixels a side, the camera at `centre`.
-    pub(crate) fn new(centre: Vec3, size: u32) -> Self {
+    pub fn new(centre: Vec3, size: u32) -> Self {
         let media = vec![
             // Chromatic and forward.
             Fog::new([0.05, 0.02, 0.1], [0.4, 0.6, 0.9], 0.6),
@@ -110,13 +118,13 @@ impl ClosedForm {
     }
 
     /// The body that counts at a point, by asking all of them.
-    pub(crate) fn body_at(&self, point: DVec3) -> Option<Interior> {
+    pub fn body_at(&self, point: DVec3) -> Option<Interior> {
         let around = self.objects.iter().filter(|object| object.shape.contains(point));
         around.filter_map(|object| object.interior).max_by_key(|interior| interior.priority)
     }
 
     /// The surface with a material that is nearest to a point, and how far it is.
-    pub(crate) fn surface_at(&self, point: DVec3) -> (&Object, f64) {
+    pub fn surface_at(&self, point: DVec3) -> (&Object, f64) {
         self.objects
             .iter()
             .filter(|object| object.material.is_some())

@@ -10,10 +10,6 @@
 //! rest) are stated, and rendered once more with fixed radii r, r/2, r/4: where kernels lie inside of their
 //! medium bias falls like r², what sticks out of it is a loss that falls like r.
 
-mod compare;
-#[path = "../support/scenes.rs"]
-mod scenes;
-
 use std::error::Error;
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -26,9 +22,9 @@ use upbp_core::{
     check_writable, write_text,
 };
 use upbp_scene::ReadyScene;
-
-use compare::{Comparison, Estimate, Reference, Spread};
-use scenes::{Group, SCENES, Shipped, names};
+use upbp_testing::Estimate;
+use upbp_testing::reference::{Comparison, Reference, Spread};
+use upbp_testing::shipped::{Group, SCENES, Shipped, names};
 
 const SETS: [&str; 8] = [
     "pt",

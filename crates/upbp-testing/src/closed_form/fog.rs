@@ -6,26 +6,31 @@ use upbp_media::{Medium, PhaseFunction, RaySegment, SegmentDensity};
 
 /// A homogeneous medium that chooses among its channels with probabilities of its own.
 #[derive(Clone, Debug)]
-pub(crate) struct Fog {
-    pub(crate) sigma_a: [f32; 3],
-    pub(crate) sigma_s: [f32; 3],
-    pub(crate) g: f32,
+pub struct Fog {
+    /// Absorption coefficients per channel, per unit of length.
+    pub sigma_a: [f32; 3],
+    /// Scattering coefficients per channel, per unit of length.
+    pub sigma_s: [f32; 3],
+    /// Mean cosine of the scattering angle.
+    pub g: f32,
     phase: PhaseFunction,
 }
 
 impl Fog {
     /// How often distances follow each channel.
-    pub(crate) const ALPHA: [f64; 3] = [0.5, 0.2, 0.3];
+    pub const ALPHA: [f64; 3] = [0.5, 0.2, 0.3];
 
     /// Probability to go on after a collision.
-    pub(crate) const CONTINUATION: f64 = 0.9;
+    pub const CONTINUATION: f64 = 0.9;
 
-    pub(crate) fn new(sigma_a: [f32; 3], sigma_s: [f32; 3], g: f32) -> Self {
+    /// Fog of these coefficients that scatters by Henyey and Greenstein.
+    pub fn new(sigma_a: [f32; 3], sigma_s: [f32; 3], g: f32) -> Self {
         let phase = PhaseFunction::henyey_greenstein(g).expect("in range");
         Self { sigma_a, sigma_s, g, phase }
     }
 
-    pub(crate) fn extinction(&self) -> [f64; 3] {
+    /// Extinction coefficients per channel, per unit of length.
+    pub fn extinction(&self) -> [f64; 3] {
         [0, 1, 2].map(|channel| f64::from(self.sigma_a[channel] + self.sigma_s[channel]))
     }
 }

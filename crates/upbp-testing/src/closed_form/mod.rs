@@ -5,9 +5,9 @@
 //! normals, roulette that depends on the side, emitters of every kind whose points are chosen for the
 //! receiver.
 
-pub(crate) mod camera;
-pub(crate) mod fog;
-pub(crate) mod light;
-pub(crate) mod material;
-pub(crate) mod scene;
-pub(crate) mod shape;
+pub mod camera;
+pub mod fog;
+pub mod light;
+pub mod material;
+pub mod scene;
+pub mod shape;

@@ -1,12 +1,11 @@
-//! The foreign scene of `examples/host_renderer`: every way to compute its picture gives the same picture.
-
-#[path = "../../../examples/host_renderer/scene.rs"]
-mod scene;
+//! The foreign scene of this example: every way to compute its picture gives the same picture.
 
 use std::ops::Range;
 
-use crate::support::{Estimate, render, render_by};
 use upbp_core::{Image, Radii, Radius, Renderer, Settings};
+use upbp_testing::{Estimate, render, render_by};
+
+use crate::scene;
 
 fn settings(techniques: &str) -> Settings {
     let radius = Radius::Absolute(0.01);
@@ -74,7 +73,7 @@ fn any_number_of_threads_and_any_split_give_the_same_bits() {
 #[test]
 fn the_ready_made_scene_looks_the_same() {
     let room = scene::Room::new(24).expect("valid coefficients");
-    let ready_made = crate::support::room(24);
+    let ready_made = upbp_testing::room(24);
     for techniques in ["bpt", "bpt+surf+pp3d+pb2d+bb1d"] {
         let (theirs, their_image) = render_room(&room, &settings(techniques), 150);
         let (ours, our_image) = render(&ready_made, &settings(techniques), 150);

@@ -8,11 +8,13 @@ use std::path::Path;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
 use upbp_core::{Film, Image, open_exr};
 
+use crate::statistics::Estimate;
+
 /// Side of a tile, pixels.
 const TILE: usize = 8;
 
 /// A converged picture and its standard error per pixel. The channels of a pixel share their noise.
-pub(crate) struct Reference {
+pub struct Reference {
     width: usize,
     pixels: Vec<[f64; 3]>,
     errors: Vec<[f64; 3]>,
@@ -20,7 +22,7 @@ pub(crate) struct Reference {
 
 impl Reference {
     /// Reads the channels `R`, `stderr.R` and so on.
-    pub(crate) fn read(path: &Path) -> Result<Self, exr::error::Error> {
+    pub fn read(path: &Path) -> Result<Self, exr::error::Error> {
         let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
         let layer = image.all_attributes().from_buffered(open_exr(path)?)?.layer_data;
         let width = layer.size.width();
@@ -42,7 +44,7 @@ impl Reference {
     }
 
     /// The picture alone.
-    pub(crate) fn image(&self) -> Image {
+    pub fn image(&self) -> Image {
         Image {
             width: self.width as u32,
             height: (self.pixels.len() / self.width) as u32,
@@ -51,7 +53,7 @@ impl Reference {
     }
 
     /// Mean of the picture per channel. Its pixels are independent of each other.
-    pub(crate) fn mean(&self) -> [Estimate; 3] {
+    pub fn mean(&self) -> [Estimate; 3] {
         let n = self.pixels.len() as f64;
         std::array::from_fn(|c| Estimate {
             mean: self.pixels.iter().map(|pixel| pixel[c]).sum::<f64>() / n,
@@ -60,48 +62,19 @@ impl Reference {
     }
 
     /// relMSE of the reference itself, due to its noise: what a perfect render seems to have.
-    pub(crate) fn floor(&self) -> f64 {
+    pub fn floor(&self) -> f64 {
         let pixels = self.pixels.iter().flatten().zip(self.errors.iter().flatten());
         pixels.map(|(r, s)| s * s / (r * r + 0.01)).sum::<f64>() / (3 * self.pixels.len()) as f64
     }
 }
 
-/// A mean with its standard error.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Estimate {
-    pub(crate) mean: f64,
-    pub(crate) error: f64,
-}
-
-impl Estimate {
-    /// From sums of independent values and of their squares.
-    fn new(n: f64, sum: f64, squares: f64) -> Self {
-        let mean = sum / n;
-        Self { mean, error: ((squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt() }
-    }
-
-    /// Difference to an independent estimate in standard errors.
-    pub(crate) fn sigmas(&self, other: &Self) -> f64 {
-        let difference = self.mean - other.mean;
-        // What was the same in every iteration, such as an environment that is seen directly, is exact only
-        // up to rounding and to what is too rare to have happened, such as the corner of a body in the corner
-        // of a pixel.
-        let unseen = 1e-4 * other.mean.abs();
-        difference / self.error.max(unseen).hypot(other.error).max(f64::MIN_POSITIVE)
-    }
-
-    /// Difference relative to `other`, in percent.
-    pub(crate) fn percent(&self, other: &Self) -> f64 {
-        100.0 * (self.mean / other.mean - 1.0)
-    }
-}
-
-impl std::ops::Sub for Estimate {
-    type Output = Self;
-
-    fn sub(self, other: Self) -> Self {
-        Self { mean: self.mean - other.mean, error: self.error.hypot(other.error) }
-    }
+/// Difference of a render to a reference in standard errors.
+fn sigmas(render: &Estimate, reference: &Estimate) -> f64 {
+    let difference = render.mean - reference.mean;
+    // What was the same in every iteration, such as an environment that is seen directly, is exact only up to
+    // rounding and to what is too rare to have happened, such as the corner of a body in the corner of a pixel.
+    let unseen = 1e-4 * reference.mean.abs();
+    difference / render.error.max(unseen).hypot(reference.error).max(f64::MIN_POSITIVE)
 }
 
 /// Means over tiles of [`TILE`] pixels, row by row. The last is the mean of the whole picture, gathered in
@@ -125,7 +98,7 @@ fn tiles(image: &Image) -> Vec<[f64; 3]> {
 
 /// Gathers the spread of a render's iterations.
 #[derive(Default)]
-pub(crate) struct Spread {
+pub struct Spread {
     iterations: u64,
     before: Vec<[f64; 3]>,
     squares: Vec<[f64; 3]>,
@@ -133,7 +106,7 @@ pub(crate) struct Spread {
 
 impl Spread {
     /// To be called after every iteration.
-    pub(crate) fn add(&mut self, film: &Film) {
+    pub fn add(&mut self, film: &Film) {
         let n = film.iterations();
         assert_eq!(n, self.iterations + 1, "every iteration is looked at");
         let mut sums = tiles(&film.image());
@@ -151,37 +124,38 @@ impl Spread {
     }
 
     /// Mean of the picture per channel.
-    pub(crate) fn mean(&self) -> [Estimate; 3] {
+    pub fn mean(&self) -> [Estimate; 3] {
         self.before.last().map_or([Estimate::default(); 3], |_| self.tile(self.before.len() - 1))
     }
 
     fn tile(&self, index: usize) -> [Estimate; 3] {
         let n = self.iterations as f64;
-        std::array::from_fn(|c| Estimate::new(n, self.before[index][c], self.squares[index][c]))
+        std::array::from_fn(|c| Estimate::from_sums(n, self.before[index][c], self.squares[index][c]))
     }
 }
 
 /// A render and a reference, each value the worst of the three channels.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Comparison {
+pub struct Comparison {
     /// Mean of the picture.
-    pub(crate) mean: [Estimate; 3],
+    pub mean: [Estimate; 3],
     /// Its difference to the reference in standard errors.
-    pub(crate) sigmas: [f64; 3],
+    pub sigmas: [f64; 3],
     /// Difference of the means of the picture in percent.
-    pub(crate) percent: [f64; 3],
+    pub percent: [f64; 3],
     /// Mean square of the pixels' differences in standard errors, expected 1.
-    pub(crate) chi_square: f64,
+    pub chi_square: f64,
     /// Share of the pixels beyond 3.5 standard errors, `[0, 1]`.
-    pub(crate) outliers: f64,
+    pub outliers: f64,
     /// Largest difference of a tile in standard errors.
-    pub(crate) tile: f64,
+    pub tile: f64,
     /// relMSE, over all channels.
-    pub(crate) relative_mse: f64,
+    pub relative_mse: f64,
 }
 
 impl Comparison {
-    pub(crate) fn new(film: &Film, spread: &Spread, reference: &Reference) -> Self {
+    /// Compares a film with a reference; `spread` has seen each of its iterations.
+    pub fn new(film: &Film, spread: &Spread, reference: &Reference) -> Self {
         let (image, variance) = (film.image(), film.variance());
         assert_eq!(image.pixels.len(), reference.pixels.len(), "the reference has the film's size");
         let mean = spread.mean();
@@ -196,7 +170,7 @@ impl Comparison {
                     mean: f64::from(image.pixels[i][c]),
                     error: f64::from(variance.pixels[i][c]).sqrt(),
                 };
-                let sigmas = own.sigmas(&Estimate { mean: r[c], error: s[c] });
+                let sigmas = sigmas(&own, &Estimate { mean: r[c], error: s[c] });
                 squares += sigmas * sigmas;
                 far += f64::from(u8::from(sigmas.abs() > 3.5));
                 let (column, row) = (i % reference.width / TILE, i / reference.width / TILE);
@@ -211,12 +185,12 @@ impl Comparison {
             let area = (TILE * TILE) as f64;
             for (index, (sum, square)) in tile_sums.into_iter().enumerate() {
                 let expected = Estimate { mean: sum / area, error: square.sqrt() / area };
-                tile = tile.max(spread.tile(index)[c].sigmas(&expected).abs());
+                tile = tile.max(sigmas(&spread.tile(index)[c], &expected).abs());
             }
         }
         Self {
             mean,
-            sigmas: std::array::from_fn(|c| mean[c].sigmas(&expected[c])),
+            sigmas: std::array::from_fn(|c| sigmas(&mean[c], &expected[c])),
             percent: std::array::from_fn(|c| mean[c].percent(&expected[c])),
             chi_square,
             outliers,
@@ -226,12 +200,12 @@ impl Comparison {
     }
 
     /// Largest difference of the mean in standard errors.
-    pub(crate) fn worst_sigmas(&self) -> f64 {
+    pub fn worst_sigmas(&self) -> f64 {
         worst(self.sigmas)
     }
 
     /// Largest difference of the mean in percent.
-    pub(crate) fn worst_percent(&self) -> f64 {
+    pub fn worst_percent(&self) -> f64 {
         worst(self.percent)
     }
 }

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::case::{EYE, FIELD_OF_VIEW};
-use crate::support::Estimate;
+use crate::statistics::Estimate;
 
 /// A small generator: Steele et al., "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014.
 struct Random(u64);

@@ -3,11 +3,6 @@
 //! `cargo run --release --example stress` takes minutes on two cores; `-- --filter transform` runs the
 //! cases whose line contains the words. Ends with exit code 1 if any case failed.
 
-#[path = "../../tests/it/support/mod.rs"]
-mod support;
-#[path = "../support/threads.rs"]
-mod threads;
-
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::num::NonZeroUsize;
@@ -17,8 +12,7 @@ use std::time::Instant;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use support::stress::execute::in_parallel;
-use support::stress::grid::{Case, all};
+use upbp_testing::stress::{Case, all, in_parallel};
 
 /// Renders scenes at the ends of what a description can say.
 #[derive(Debug, Parser)]
@@ -30,8 +24,8 @@ struct Options {
     /// Every n-th case only
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
-    /// Cases at the same time [default: one per core; at most 16 per core]
-    #[arg(long, value_parser = threads::threads)]
+    /// Cases at the same time [default: one per core]
+    #[arg(long)]
     threads: Option<NonZeroUsize>,
     /// Print the cases instead of rendering them
     #[arg(long)]
@@ -49,16 +43,12 @@ fn main() -> ExitCode {
     }
 }
 
-fn line(case: &Case) -> String {
-    format!("{} {}", case.group, case.axes)
-}
-
 fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
-    let chosen = |case: &Case| options.filter.iter().all(|word| line(case).contains(word.as_str()));
+    let chosen = |case: &Case| options.filter.iter().all(|word| case.to_string().contains(word.as_str()));
     let cases: Vec<Case> = all().into_iter().filter(chosen).step_by(options.every as usize).collect();
     if options.list {
         for case in &cases {
-            println!("{}", line(case));
+            println!("{case}");
         }
         return Ok(true);
     }
@@ -72,7 +62,7 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     let results = in_parallel(cases.len(), workers.get(), |index| {
         let result = cases[index].judge();
         if let Err(wrong) = &result {
-            bar.suspend(|| println!("FAILED {}: {wrong}", line(&cases[index])));
+            bar.suspend(|| println!("FAILED {}: {wrong}", cases[index]));
         }
         bar.inc(1);
         result

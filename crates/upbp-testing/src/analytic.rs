@@ -5,47 +5,49 @@ use serde_json::Value;
 use upbp_core::{Radii, Radius, Settings};
 use upbp_scene::ReadyScene;
 
-use crate::support::Estimate;
+use crate::statistics::Estimate;
 
 /// A case of the table.
 #[derive(Deserialize)]
-pub(crate) struct Case {
+pub struct Case {
+    /// Name of the case.
     pub id: String,
     kind: String,
     inputs: Value,
     expected: Value,
+    /// Accuracy of what is expected: absolute.
     pub accuracy: f64,
 }
 
 impl Case {
     /// A number among the inputs.
-    pub(crate) fn input(&self, name: &str) -> f64 {
+    pub fn input(&self, name: &str) -> f64 {
         self.inputs[name].as_f64().unwrap_or_else(|| panic!("{}: no number `{name}`", self.id))
     }
 
     /// A number among the inputs that may be absent.
-    pub(crate) fn optional(&self, name: &str) -> Option<f64> {
+    pub fn optional(&self, name: &str) -> Option<f64> {
         self.inputs[name].as_f64()
     }
 
     /// Numbers among the inputs.
-    pub(crate) fn inputs(&self, name: &str) -> Vec<f64> {
+    pub fn inputs(&self, name: &str) -> Vec<f64> {
         numbers(&self.inputs[name])
     }
 
     /// A word among the inputs.
-    pub(crate) fn word(&self, name: &str) -> &str {
+    pub fn word(&self, name: &str) -> &str {
         self.inputs[name].as_str().unwrap_or_else(|| panic!("{}: no text `{name}`", self.id))
     }
 
     /// What is expected, by its path of names.
-    pub(crate) fn expected(&self, path: &[&str]) -> f64 {
+    pub fn expected(&self, path: &[&str]) -> f64 {
         let value = path.iter().fold(&self.expected, |value, name| &value[*name]);
         value.as_f64().unwrap_or_else(|| panic!("{}: nothing expected of {path:?}", self.id))
     }
 
     /// A list of what is expected.
-    pub(crate) fn expected_list(&self, name: &str) -> Vec<f64> {
+    pub fn expected_list(&self, name: &str) -> Vec<f64> {
         numbers(&self.expected[name])
     }
 }
@@ -55,9 +57,9 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 /// The cases of a kind.
-pub(crate) fn cases(kind: &str) -> Vec<Case> {
+pub fn cases(kind: &str) -> Vec<Case> {
     let all: Vec<Case> =
-        serde_json::from_str(include_str!("../../data/analytic.json")).expect("a list of cases");
+        serde_json::from_str(include_str!("../../../tests/data/analytic.json")).expect("a list of cases");
     let chosen: Vec<Case> = all.into_iter().filter(|case| case.kind == kind).collect();
     assert!(!chosen.is_empty(), "no case of {kind}");
     chosen
@@ -65,14 +67,14 @@ pub(crate) fn cases(kind: &str) -> Vec<Case> {
 
 /// Results beside what is expected.
 #[derive(Default)]
-pub(crate) struct Table {
+pub struct Table {
     failures: Vec<String>,
 }
 
 impl Table {
     /// A result with its standard error. `slack` is what it may differ without being wrong: accuracy of the expected
     /// value, finite geometry, kernel bias.
-    pub(crate) fn check(&mut self, name: &str, result: Estimate, expected: f64, slack: f64) {
+    pub fn check(&mut self, name: &str, result: Estimate, expected: f64, slack: f64) {
         let difference = result.mean - expected;
         // Below single precision an error means nothing.
         let sigmas = if result.error > 1e-6 * expected.abs() {
@@ -95,13 +97,13 @@ impl Table {
     }
 
     /// Fails if any result was beyond its bar.
-    pub(crate) fn finish(self) {
+    pub fn finish(self) {
         assert!(self.failures.is_empty(), "beyond the bar:\n{}", self.failures.join("\n"));
     }
 }
 
 /// A scene from the parts of its description that matter.
-pub(crate) fn scene(parts: &str) -> ReadyScene {
+pub fn scene(parts: &str) -> ReadyScene {
     let text = format!("(version: 1,\n{parts}\n)");
     match ReadyScene::from_ron_str(&text, "") {
         Ok(scene) => scene,
@@ -110,7 +112,7 @@ pub(crate) fn scene(parts: &str) -> ReadyScene {
 }
 
 /// A camera whose film of `size` squared pixels covers so little that all of them see the same.
-pub(crate) fn narrow_camera(origin: [f64; 3], target: [f64; 3], size: u32) -> String {
+pub fn narrow_camera(origin: [f64; 3], target: [f64; 3], size: u32) -> String {
     let along = [0, 1, 2].map(|i| target[i] - origin[i]);
     // Upright along the axis that the view is farthest from.
     let axis = (0..3).min_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs())).unwrap_or(0);
@@ -125,18 +127,18 @@ pub(crate) fn narrow_camera(origin: [f64; 3], target: [f64; 3], size: u32) -> St
 }
 
 /// A vector in a scene file.
-pub(crate) fn vector(v: [f64; 3]) -> String {
+pub fn vector(v: [f64; 3]) -> String {
     format!("({:?}, {:?}, {:?})", v[0], v[1], v[2])
 }
 
 /// A homogeneous medium in a scene file.
-pub(crate) fn medium(sigma_a: f64, sigma_s: f64, g: f64) -> String {
+pub fn medium(sigma_a: f64, sigma_s: f64, g: f64) -> String {
     let phase = if g == 0.0 { "Isotropic".to_owned() } else { format!("HenyeyGreenstein({g:?})") };
     format!("Homogeneous(sigma_a: {sigma_a:?}, sigma_s: {sigma_s:?}, phase: {phase})")
 }
 
 /// Settings for a set of techniques, with fixed radii if there are any.
-pub(crate) fn settings(techniques: &str, radius: Option<f64>) -> Settings {
+pub fn settings(techniques: &str, radius: Option<f64>) -> Settings {
     let radius = radius.map_or(Radius::Auto, |radius| Radius::Absolute(radius as f32));
     Settings {
         techniques: techniques.parse().expect("technique names"),

@@ -1,8 +1,6 @@
 //! Everything that reads files, and what becomes of a file that is accepted: an error or a result, never a panic. For
 //! `tests/it/hostile/parsers.rs` and the targets in `fuzz/`.
 
-#![allow(dead_code, reason = "each target uses its part")]
-
 use std::path::Path;
 
 use upbp_core::{LightPaths, Settings, State, StateError};
@@ -10,7 +8,7 @@ use upbp_scene::obj::ObjMesh;
 use upbp_scene::{ReadyScene, SceneDescription};
 
 /// Settings for a little of a render.
-pub(crate) fn little() -> Settings {
+pub fn little() -> Settings {
     Settings {
         techniques: "all".parse().expect("technique names"),
         light_paths: LightPaths::Count(8),
@@ -20,7 +18,7 @@ pub(crate) fn little() -> Settings {
 }
 
 /// Reads a scene; one that is accepted is written, read again, and a little of it rendered.
-pub(crate) fn read_scene(text: &str) {
+pub fn read_scene(text: &str) {
     let Ok(mut description) = SceneDescription::from_ron(text) else { return };
     let written = description.to_ron().expect("what was read can be written");
     assert_eq!(SceneDescription::from_ron(&written).expect("what was written can be read"), description);
@@ -37,20 +35,22 @@ pub(crate) fn read_scene(text: &str) {
     }
 }
 
-pub(crate) fn read_settings(text: &str) {
+/// Reads settings; those that are accepted are checked.
+pub fn read_settings(text: &str) {
     if let Ok(settings) = Settings::from_ron(text) {
         let _ = settings.validate();
     }
 }
 
-pub(crate) fn read_mesh(text: &str) {
+/// Reads a mesh; one that is accepted becomes a shape.
+pub fn read_mesh(text: &str) {
     if let Ok(mesh) = ObjMesh::parse(text) {
         let _ = upbp_accel::TriangleMesh::new(mesh.positions, mesh.indices, mesh.normals);
     }
 }
 
 /// Reads an image, by way of a file.
-pub(crate) fn read_image(bytes: &[u8], path: &Path) {
+pub fn read_image(bytes: &[u8], path: &Path) {
     std::fs::write(path, bytes).expect("a writable folder");
     let _ = upbp_scene::light::EnvironmentImage::load(path);
     let _ = upbp_core::read_exr(path);
@@ -58,7 +58,7 @@ pub(crate) fn read_image(bytes: &[u8], path: &Path) {
 }
 
 /// Reads a state; one that is accepted is looked at, written, read again, and merged.
-pub(crate) fn read_state(bytes: &[u8]) {
+pub fn read_state(bytes: &[u8]) {
     let Ok(mut state) = State::read(bytes) else { return };
     let film = state.film();
     let _ = (film.image(), film.variance(), film.estimated_error(), film.shares(), film.fingerprint());
@@ -94,7 +94,7 @@ fn replace_between(bytes: &[u8], start: &[u8], end: &[u8], new: &[u8]) -> Vec<u8
 }
 
 /// A changed state file with a good beginning, lengths and checksums: else nothing behind them would ever be reached.
-pub(crate) fn sealed(bytes: &[u8]) -> Vec<u8> {
+pub fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut sealed = b"UPBPSTAT\x02\0\0\0".to_vec();
     let mut checksum = 0xcbf2_9ce4_8422_2325_u64;
     let mut rest = bytes.get(12..).unwrap_or_default();

@@ -6,28 +6,36 @@ use glam::DVec3;
 
 /// A surface without thickness.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Shape {
+pub enum Shape {
+    /// A sphere.
     Sphere {
+        /// Centre.
         centre: DVec3,
+        /// Radius.
         radius: f64,
     },
     /// `corner + u·edges[0] + v·edges[1]`, the edges perpendicular; the normal is their cross product.
     Rectangle {
+        /// One corner.
         corner: DVec3,
+        /// The two edges at the corner.
         edges: [DVec3; 2],
     },
 }
 
 impl Shape {
-    pub(crate) fn rectangle(corner: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Self {
+    /// A rectangle from a corner and the edges there.
+    pub fn rectangle(corner: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Self {
         Self::Rectangle { corner: corner.into(), edges: [u.into(), v.into()] }
     }
 
-    pub(crate) fn sphere(centre: [f64; 3], radius: f64) -> Self {
+    /// A sphere.
+    pub fn sphere(centre: [f64; 3], radius: f64) -> Self {
         Self::Sphere { centre: centre.into(), radius }
     }
 
-    pub(crate) fn normal(&self, point: DVec3) -> DVec3 {
+    /// Geometric normal at a point of the surface, of unit length.
+    pub fn normal(&self, point: DVec3) -> DVec3 {
         match self {
             Self::Sphere { centre, .. } => (point - centre).normalize(),
             Self::Rectangle { edges: [u, v], .. } => u.cross(*v).normalize(),
@@ -35,7 +43,7 @@ impl Shape {
     }
 
     /// Distances at which the line meets the surface.
-    pub(crate) fn roots(&self, origin: DVec3, direction: DVec3) -> [Option<f64>; 2] {
+    pub fn roots(&self, origin: DVec3, direction: DVec3) -> [Option<f64>; 2] {
         match self {
             Self::Sphere { centre, radius } => {
                 let between = origin - centre;
@@ -59,12 +67,13 @@ impl Shape {
         }
     }
 
-    pub(crate) fn coordinates(corner: DVec3, edges: &[DVec3; 2], point: DVec3) -> [f64; 2] {
+    /// Position of a point along the edges of a rectangle, in `[0, 1]²` inside.
+    pub fn coordinates(corner: DVec3, edges: &[DVec3; 2], point: DVec3) -> [f64; 2] {
         edges.map(|edge| (point - corner).dot(edge) / edge.length_squared())
     }
 
     /// The nearest point of the surface's sphere or plane.
-    pub(crate) fn snap(&self, point: DVec3) -> DVec3 {
+    pub fn snap(&self, point: DVec3) -> DVec3 {
         match self {
             Self::Sphere { centre, radius } => centre + (point - centre).normalize() * *radius,
             Self::Rectangle { corner, .. } => {
@@ -75,7 +84,7 @@ impl Shape {
     }
 
     /// How far a point is from the surface.
-    pub(crate) fn distance(&self, point: DVec3) -> f64 {
+    pub fn distance(&self, point: DVec3) -> f64 {
         match self {
             Self::Sphere { .. } => (point - self.snap(point)).length(),
             Self::Rectangle { corner, edges } => {
@@ -85,11 +94,13 @@ impl Shape {
         }
     }
 
-    pub(crate) fn contains(&self, point: DVec3) -> bool {
+    /// Whether a point is inside of a sphere.
+    pub fn contains(&self, point: DVec3) -> bool {
         matches!(self, Self::Sphere { centre, radius } if (point - centre).length() < *radius)
     }
 
-    pub(crate) fn area(&self) -> f64 {
+    /// Area of the surface.
+    pub fn area(&self) -> f64 {
         match self {
             Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
             Self::Rectangle { edges: [u, v], .. } => u.cross(*v).length(),

@@ -5,11 +5,13 @@ use upbp_estimators::scene::{Camera, CameraConnection, CameraRay};
 
 /// A pinhole that looks along −z.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pinhole {
-    pub(crate) centre: Vec3,
-    pub(crate) size: u32,
+pub struct Pinhole {
+    /// Position of the pinhole.
+    pub centre: Vec3,
+    /// Pixels per side of the film.
+    pub size: u32,
     /// Distance of the film in pixels.
-    pub(crate) film_distance: f32,
+    pub film_distance: f32,
 }
 
 impl Pinhole {

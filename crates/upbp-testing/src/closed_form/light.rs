@@ -14,18 +14,23 @@ use super::shape::Shape;
 
 /// A light, with its share of the choice.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Light {
-    pub(crate) source: Source,
-    pub(crate) power: f32,
+pub struct Light {
+    /// Kind and geometry.
+    pub source: Source,
+    /// Weight in the choice among the lights.
+    pub power: f32,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Source {
+/// Kinds of lights.
+pub enum Source {
     /// One side of a rectangle.
     Area(Shape),
+    /// A point that shines in all directions.
     Point(DVec3),
     /// The direction that the light goes.
     Directional(DVec3),
+    /// Light from all directions at infinity.
     Environment,
 }
 
@@ -52,7 +57,7 @@ impl Source {
     }
 
     /// `L_0` and `ρL_0`.
-    pub(crate) fn pdf_emission(&self, bounds: &BoundingSphere, cos: f64) -> [f64; 2] {
+    pub fn pdf_emission(&self, bounds: &BoundingSphere, cos: f64) -> [f64; 2] {
         let disc = FRAC_1_PI / f64::from(bounds.radius).powi(2);
         match self {
             Self::Area(shape) => [1.0 / shape.area(), cos * FRAC_1_PI],
@@ -63,7 +68,7 @@ impl Source {
     }
 
     /// `p_nee`.
-    pub(crate) fn pdf_incident(&self, point: DVec3, direction: DVec3, receiver: DVec3) -> f64 {
+    pub fn pdf_incident(&self, point: DVec3, direction: DVec3, receiver: DVec3) -> f64 {
         match self {
             Self::Area(Shape::Rectangle { corner, edges }) => {
                 let u = Shape::coordinates(*corner, edges, point)[0].clamp(0.0, 1.0);

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use upbp_core::{Counters, Film, RenderError, Settings};
 use upbp_scene::ReadyScene;
 
-use super::processor;
-use crate::support::Estimate;
+use crate::processor;
+use crate::statistics::Estimate;
 
 /// A render that takes more processor seconds has hung.
 const LIMIT: f64 = 60.0;
@@ -171,7 +171,7 @@ pub(crate) fn differs(a: &Estimate, b: &Estimate, slack: f64) -> Option<String> 
 const SIGMAS: f64 = 5.0;
 
 /// The results of jobs `0..count`, of which `workers` run at a time.
-pub(crate) fn in_parallel<T: Send>(count: usize, workers: usize, job: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub fn in_parallel<T: Send>(count: usize, workers: usize, job: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let work = || {
         let take = || Some(next.fetch_add(1, Ordering::Relaxed)).filter(|index| *index < count);

@@ -8,13 +8,14 @@ use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 
 /// How a surface scatters. All formulas depend on the cosines with the shading normal only, signed.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Material {
+pub enum Material {
     /// Diffuse reflection on both sides.
     Diffuse,
     /// Diffuse reflection beside a mirror, chosen by angle.
     Coated,
     /// Diffuse reflection and transmission.
     Paper,
+    /// Smooth reflection.
     Mirror,
     /// Smooth refraction, lobes chosen with different probabilities on the two sides.
     Glass,
@@ -39,12 +40,13 @@ fn fresnel(cos: f64, eta_from: f64, eta_to: f64) -> f64 {
 impl Material {
     const ALBEDO: f64 = 0.7;
 
-    pub(crate) fn is_smooth(self) -> bool {
+    /// Whether there is a lobe with a density.
+    pub fn is_smooth(self) -> bool {
         matches!(self, Self::Diffuse | Self::Coated | Self::Paper)
     }
 
     /// Density of the smooth lobes per solid angle.
-    pub(crate) fn pdf(self, from: f64, to: f64) -> f64 {
+    pub fn pdf(self, from: f64, to: f64) -> f64 {
         let same_side = from * to > 0.0;
         match self {
             Self::Diffuse if same_side => to.abs() * FRAC_1_PI,
@@ -58,7 +60,7 @@ impl Material {
     }
 
     /// Probability of the Dirac lobe that reflects, or that refracts; indices on the two sides of the event.
-    pub(crate) fn dirac(self, from: f64, reflects: bool, eta_from: f64, eta_other: f64) -> f64 {
+    pub fn dirac(self, from: f64, reflects: bool, eta_from: f64, eta_other: f64) -> f64 {
         match self {
             Self::Coated if reflects => coat(from),
             Self::Mirror if reflects => 1.0,
@@ -77,7 +79,8 @@ impl Material {
         }
     }
 
-    pub(crate) fn continuation(self, from: f64) -> f64 {
+    /// Probability to go on after arriving at this cosine.
+    pub fn continuation(self, from: f64) -> f64 {
         match self {
             Self::Diffuse | Self::Coated => 0.6 + 0.3 * from.abs(),
             Self::Paper => {
@@ -101,7 +104,8 @@ impl Material {
     }
 }
 
-pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+/// A direction with a density proportional to its cosine with z.
+pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let (sin, cos) = (TAU * f64::from(u[1])).sin_cos();
     let r = f64::from(u[0]).sqrt();
     DVec3::new(r * cos, r * sin, (1.0 - f64::from(u[0])).sqrt()).as_vec3()
