@@ -1,6 +1,7 @@
 //! Counts of what the walks did and of what they had to drop.
 
 use serde::{Deserialize, Serialize};
+use upbp_media::Spectrum;
 
 use crate::technique::Technique;
 
@@ -54,5 +55,21 @@ impl Counters {
     #[must_use]
     pub const fn contributions_of(&self, technique: Technique) -> u64 {
         self.contributions[technique as usize]
+    }
+
+    /// The weighted contribution, counted; or nothing, counted as dropped, if it is not a radiance.
+    #[inline]
+    pub(crate) fn accept(&mut self, technique: Technique, value: Spectrum, weight: f64) -> Option<Spectrum> {
+        if value.is_black() || weight == 0.0 {
+            return None;
+        }
+        let contribution = value * weight as f32;
+        if contribution.is_finite() && contribution.is_non_negative() {
+            self.contributions[technique as usize] += 1;
+            Some(contribution)
+        } else {
+            self.dropped += 1;
+            None
+        }
     }
 }

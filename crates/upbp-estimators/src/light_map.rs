@@ -2,10 +2,10 @@
 
 use upbp_accel::{PointTree, SegmentTree, SplitParams};
 
+use crate::iteration::Plan;
 use crate::mis::Densities;
-use crate::plan::Plan;
+use crate::path::{LightVertex, PhotonBeam, Site};
 use crate::technique::Technique;
-use crate::walk::{LightVertex, PhotonBeam, Site};
 
 /// Light vertices and photon beams with their look-up structures.
 pub struct LightMap<B, D = f64> {

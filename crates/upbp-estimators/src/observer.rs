@@ -4,9 +4,9 @@ use glam::Vec3;
 use upbp_media::Spectrum;
 
 use crate::mis::{Densities, Weight};
+use crate::path::Site;
 use crate::scene::{EmitterId, EmitterPoint};
 use crate::technique::Technique;
-use crate::walk::Site;
 
 /// The light end of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]

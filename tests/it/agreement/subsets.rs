@@ -9,8 +9,9 @@ use std::num::NonZeroU32;
 use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::scene::Bsdf;
-use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Spectrum,
     StreamKind, Technique, World,

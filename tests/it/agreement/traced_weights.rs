@@ -8,10 +8,9 @@ use glam::Vec3;
 use upbp_estimators::mis::oracle::{Path, Strategy};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::path::{Context, Extent, LightChunk, Passage, Scratch, Site};
 use upbp_estimators::scene::Scene;
-use upbp_estimators::walk::{
-    Context, Extent, LightChunk, Passage, Scratch, Site, trace_camera_path, trace_light_path,
-};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Stream,
     StreamKind, Technique, TechniqueSet, World,

@@ -26,11 +26,12 @@ use rayon::prelude::*;
 use upbp_core::media::{Homogeneous, PhaseFunction};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{ObservedSample, Observer};
+use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
     EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
-use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, Kernel, Kernels, LightMap, LookUps, MediumId, PathLengths, Plan, PlanChoices, Ray, Roulette,
     Spectrum, StreamKind, TechniqueSet, World,

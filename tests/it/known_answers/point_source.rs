@@ -4,7 +4,8 @@
 
 use upbp_core::TechniqueSet;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
-use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_light_path};
+use upbp_estimators::path::{Context, LightChunk, Scratch};
+use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
     Kernel, Kernels, LookUps, PathLengths, Plan, PlanChoices, Roulette, StreamKind, World,
 };

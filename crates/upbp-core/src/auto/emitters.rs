@@ -8,8 +8,9 @@
 
 use rayon::prelude::*;
 use upbp_estimators::observer::{DynObserver, Joint, LightEnd, ObservedSample, Observer};
+use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
-use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_camera_path, trace_light_path};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, EmitterShares, LightMap, Plan, StreamKind, World};
 
 use crate::budget::Budget;

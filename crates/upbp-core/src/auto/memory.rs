@@ -4,7 +4,7 @@
 //! their look-up structures, and what building those takes for a moment, from light sub-paths. The pilot tells how many of
 //! each a sub-path leaves. What does not grow is not counted: the program, the scene, the threads.
 
-use upbp_estimators::walk::{LightVertex, PhotonBeam};
+use upbp_estimators::path::{LightVertex, PhotonBeam};
 
 use crate::auto::statistics::Pilot;
 

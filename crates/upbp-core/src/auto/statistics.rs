@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{DynObserver, ObservedVertex, Observer};
+use upbp_estimators::path::{Context, LightVertex, Scratch, Site};
 use upbp_estimators::scene::Scene;
-use upbp_estimators::walk::{Context, LightVertex, Scratch, Site, trace_camera_path};
+use upbp_estimators::trace::trace_camera_path;
 use upbp_estimators::{
     Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, StreamKind, Technique,
     TechniqueSet, World,

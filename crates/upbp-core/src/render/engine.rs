@@ -7,8 +7,8 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
+use upbp_estimators::path::Context;
 use upbp_estimators::scene::{PixelRect, Scene};
-use upbp_estimators::walk::Context;
 use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
 
 use crate::auto::choices;

@@ -6,9 +6,9 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::scene::{PixelRect, Scene};
-use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
-use upbp_estimators::walk::{trace_camera_path, trace_light_path};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, Layer, LightMap, StreamKind};
 
 use crate::auto::memory::LightCounts;

@@ -6,16 +6,12 @@
 //! per technique ([`ByTechnique`]), from which the weights of any other sample counts follow. [`oracle`] enumerates the
 //! same weights the slow, obvious way, and the tests hold one to the other.
 
+mod counts;
 mod densities;
 pub mod oracle;
-mod plan;
 mod recursion;
 mod weights;
 
+pub use counts::{BeamExtent, Heuristic, MergeSite, MisPlan, PARALLEL_SIN2, VolumeMerges};
 pub use densities::{ByTechnique, Densities, Weight};
-pub use plan::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
-pub use recursion::{Edge, MergeSite, Pending, Tip};
-pub use weights::End;
-
-/// Below this `sin²θ` two beams count as parallel: BB1D neither contributes nor counts in weights.
-pub const PARALLEL_SIN2: f64 = upbp_accel::PARALLEL_SIN2 as f64;
+pub use recursion::{Edge, End, Pending, Tip};

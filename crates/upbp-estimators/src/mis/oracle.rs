@@ -6,8 +6,7 @@
 
 use upbp_media::MediumId;
 
-use super::PARALLEL_SIN2;
-use super::plan::{BeamExtent, Heuristic, MisPlan};
+use super::counts::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2};
 
 /// What a vertex is.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,11 +5,10 @@
 //! ρ′ with which the other side's walk would scatter at `u_i`: `B_i = D_i + ρ′ E_i`. A vertex carries `D` and `E`.
 //! The same recursion serves both walks. Oracle: [`super::oracle`].
 
-use upbp_media::{EdgeDensity, MediumId};
+use upbp_media::EdgeDensity;
 
+use super::counts::{BeamExtent, MergeSite, MisPlan};
 use super::densities::Densities;
-use super::plan::{BeamExtent, MisPlan};
-use super::weights::End;
 use crate::scene::Walk;
 use crate::technique::Technique;
 
@@ -52,6 +51,22 @@ impl<D: Densities> Tip<D> {
     }
 }
 
+/// One sub-path's end, seen from the completed path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct End<D = f64> {
+    /// `F`: the sum of the merge factors at the vertex, as the heuristic takes it.
+    pub merges: D,
+    /// `B`: all techniques that split the path before the vertex.
+    pub before: D,
+}
+
+impl<D: Densities> End<D> {
+    pub(super) fn sum(self, plan: &MisPlan, density: f64) -> D {
+        // The density may be zero (the other walk cannot get here) while B is anything.
+        if density > 0.0 { (self.merges + self.before) * plan.pow(density) } else { D::ZERO }
+    }
+}
+
 /// The merges at a vertex, from the distance factors of `walk` and of the opposite one.
 #[inline]
 fn merges<D: Densities>(plan: &MisPlan, walk: Walk, site: MergeSite, own: f64, opposite: f64) -> D {
@@ -59,22 +74,6 @@ fn merges<D: Densities>(plan: &MisPlan, walk: Walk, site: MergeSite, own: f64, o
         Walk::Light => plan.merge_sum(site, own, opposite),
         Walk::Camera => plan.merge_sum(site, opposite, own),
     }
-}
-
-/// Which merges are possible at a vertex.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MergeSite {
-    /// None: an end of the path, or a Dirac lobe.
-    None,
-    /// Surface merging.
-    Surface,
-    /// The merges of a medium.
-    Medium {
-        /// The medium.
-        medium: MediumId,
-        /// Sine of the angle between the incoming and the outgoing line.
-        sin_theta: f64,
-    },
 }
 
 /// A vertex that has scattered: what it passes on to the next vertex, whose distance is not known yet.

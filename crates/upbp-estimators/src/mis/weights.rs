@@ -1,24 +1,9 @@
 //! Weights of completed paths from the two sub-path ends (`docs/theory.md`, section 4.4).
 
+use super::counts::MisPlan;
 use super::densities::{Densities, Weight};
-use super::plan::MisPlan;
+use super::recursion::{End, Tip};
 use crate::technique::Technique;
-
-/// One sub-path's end, seen from the completed path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct End<D = f64> {
-    /// `F`: the sum of the merge factors at the vertex, as the heuristic takes it.
-    pub merges: D,
-    /// `B`: all techniques that split the path before the vertex.
-    pub before: D,
-}
-
-impl<D: Densities> End<D> {
-    fn sum(self, plan: &MisPlan, density: f64) -> D {
-        // The density may be zero (the other walk cannot get here) while B is anything.
-        if density > 0.0 { (self.merges + self.before) * plan.pow(density) } else { D::ZERO }
-    }
-}
 
 impl<D: Densities> Weight<D> {
     /// A merge with factor `factor` (of the sum `merges`) between two sub-paths that end at the same vertex. (4.4)
@@ -79,7 +64,7 @@ impl MisPlan {
     #[must_use]
     pub fn hit_weight<D: Densities>(
         &self,
-        tip: &super::Tip<D>,
+        tip: &Tip<D>,
         pdf_incident: f64,
         pdf_position: f64,
         pdf_direction: f64,

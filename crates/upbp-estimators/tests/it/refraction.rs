@@ -2,11 +2,11 @@
 //! Jacobian of refraction by finite differences.
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
+use upbp_estimators::path::{Scattered, Site, SurfaceSite};
 use upbp_estimators::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
     EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
-use upbp_estimators::walk::{Scattered, Site, SurfaceSite};
 use upbp_estimators::{Ray, Roulette, Spectrum, Stream, StreamKind, Survival};
 use upbp_media::Homogeneous;
 

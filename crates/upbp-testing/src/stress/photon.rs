@@ -3,7 +3,8 @@
 
 use glam::Vec3;
 use upbp_core::Settings;
-use upbp_estimators::walk::{Context, LightChunk, Scratch, trace_light_path};
+use upbp_estimators::path::{Context, LightChunk, Scratch};
+use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{StreamKind, World};
 use upbp_scene::ReadyScene;
 

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use upbp_estimators::observer::Observer;
+use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::scene::Scene;
-use upbp_estimators::walk::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
-use upbp_estimators::walk::{trace_camera_path, trace_light_path};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, LightMap, Plan, StreamKind, World};
 
 use super::PASSES;

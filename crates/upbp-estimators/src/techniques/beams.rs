@@ -7,12 +7,13 @@ use glam::Vec3;
 use upbp_accel::Ray;
 use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
+use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, Tip, Weight};
 use crate::observer::{Joint, ObservedSample, Observer};
+use crate::path::{Context, Passage, PhotonBeam, QueryEdge, Site, Span};
 use crate::scene::{Scene, Walk};
 use crate::technique::Technique;
-use crate::walk::{Context, Output, Passage, PhotonBeam, QueryEdge, Site, Span};
 
 /// The merges along an edge of the camera sub-path, through all its media. A short query beam ends where the walk stops.
 pub(crate) fn along_beam<S: Scene, O: Observer<S::Bsdf> + ?Sized>(

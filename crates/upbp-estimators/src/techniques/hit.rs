@@ -3,12 +3,13 @@
 use glam::Vec3;
 use upbp_media::{Medium, Spectrum};
 
+use crate::film_sample::Output;
 use crate::mis::{Densities, Edge, Weight};
 use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
+use crate::path::Context;
+use crate::path::{Passage, QueryEdge};
 use crate::scene::{Emitter, EmitterId, EmitterPoint, Hit, Scene, Walk};
 use crate::technique::Technique;
-use crate::walk::Context;
-use crate::walk::{Output, Passage, QueryEdge};
 
 /// Emission of media along the whole ray to the next surface, integrated in closed form.
 ///

@@ -1,10 +1,10 @@
 //! Light tracing: a light vertex and the lens.
 
 use crate::observer::{Joint, ObservedSample, Observer};
+use crate::path::{Context, LightChunk, LightVertex, Sides, Splat, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Camera, Crossing, Scene, Walk};
 use crate::technique::Technique;
-use crate::walk::{Context, LightChunk, LightVertex, Sides, Splat, Target, clear_edge, ray_origin};
 
 /// Connects a light vertex to the camera; `sides` are the bodies around it.
 pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(

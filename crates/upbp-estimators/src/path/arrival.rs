@@ -4,26 +4,26 @@ use glam::Vec3;
 use upbp_media::EdgeDensity;
 
 use super::context::Context;
-use super::passage::Passage;
-use super::site::{Scattered, Sides, Site};
+use super::edge::Passage;
+use super::interaction::{Scattered, Sides, Site};
 use crate::mis::{Densities, MergeSite, Pending, Tip};
 use crate::scene::Scene;
 
 /// The end of an edge.
-pub(super) struct Arrived<B> {
-    pub(super) position: Vec3,
-    pub(super) distance: f32,
-    pub(super) density: EdgeDensity,
-    pub(super) site: Site<B>,
+pub(crate) struct Arrived<B> {
+    pub(crate) position: Vec3,
+    pub(crate) distance: f32,
+    pub(crate) density: EdgeDensity,
+    pub(crate) site: Site<B>,
     /// The bodies around it.
-    pub(super) sides: Sides,
+    pub(crate) sides: Sides,
 }
 
 #[expect(
     clippy::large_enum_variant,
     reason = "lives on the stack for a moment, and is nearly always the large one"
 )]
-pub(super) enum Arrival<B> {
+pub(crate) enum Arrival<B> {
     /// At a vertex.
     Vertex(Arrived<B>),
     /// To infinity.
@@ -34,7 +34,7 @@ pub(super) enum Arrival<B> {
     Lost,
 }
 
-pub(super) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival<S::Bsdf> {
+pub(crate) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival<S::Bsdf> {
     if passage.is_lost() {
         return Arrival::Lost;
     }
@@ -71,7 +71,7 @@ pub(super) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival
 }
 
 /// What the weights of the next vertex need of one that has scattered.
-pub(super) fn pend<S: Scene, D: Densities>(
+pub(crate) fn pend<S: Scene, D: Densities>(
     context: &Context<'_, S>,
     tip: &Tip<D>,
     site: &Site<S::Bsdf>,

@@ -3,8 +3,8 @@
 use upbp_media::Medium;
 
 use crate::kernel::Kernel;
-use crate::look_ups::LookUps;
 use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
+use crate::periods::LookUps;
 use crate::roulette::Roulette;
 use crate::scene::Scene;
 use crate::technique::{Technique, TechniqueSet};

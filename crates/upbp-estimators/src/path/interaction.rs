@@ -3,11 +3,13 @@
 use glam::Vec3;
 use upbp_media::{Interior, Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
 
-use super::MIN_COSINE;
 use crate::mis::MergeSite;
 use crate::random::Stream;
 use crate::roulette::{Roulette, Survival};
 use crate::scene::{Bsdf, Hit, Interface, Scene, Walk};
+
+/// Directions closer to a tangent plane than this end a walk and forbid a connection, on both sides alike.
+pub(crate) const MIN_COSINE: f32 = 1e-6;
 
 /// Where a path scatters.
 #[derive(Clone, Copy, Debug)]

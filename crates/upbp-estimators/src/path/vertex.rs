@@ -5,7 +5,7 @@ use upbp_accel::Segment;
 use upbp_media::{EdgeDensity, MediumId, Spectrum};
 
 use super::context::Context;
-use super::site::Site;
+use super::interaction::{Sides, Site};
 use crate::counters::Counters;
 use crate::mis::{Densities, Pending, Tip};
 use crate::scene::{Emitter, EmitterId, EmitterPoint, Scene};
@@ -96,6 +96,30 @@ pub struct PhotonBeam<D = f64> {
     pub depth: u32,
     /// Index of the sub-path.
     pub path: u32,
+}
+
+/// A camera sub-path between two vertices.
+pub(crate) struct QueryEdge<D> {
+    /// Importance over density at the edge's first vertex, after scattering.
+    pub(crate) throughput: Spectrum,
+    /// What the weights need of the first vertex.
+    pub(crate) pending: Pending<D>,
+    /// Samples that connect the first vertex to one on this edge, as the heuristic takes them.
+    pub(crate) connections: D,
+    /// Edges from the camera to a vertex on this edge.
+    pub(crate) depth: u32,
+}
+
+/// A camera sub-path's end at a vertex.
+pub(crate) struct QueryVertex<B, D> {
+    pub(crate) position: Vec3,
+    /// Direction to the vertex before, towards the camera.
+    pub(crate) towards_camera: Vec3,
+    pub(crate) throughput: Spectrum,
+    pub(crate) tip: Tip<D>,
+    pub(crate) depth: u32,
+    pub(crate) site: Site<B>,
+    pub(crate) sides: Sides,
 }
 
 /// A contribution of light tracing to some pixel.

@@ -4,20 +4,19 @@ use glam::Vec3;
 use upbp_accel::{Segment, offset_origin};
 use upbp_media::{Medium, MediumId, MediumStack, Spectrum};
 
-use super::arrival::{Arrival, Arrived, arrive, pend};
-use super::context::{Context, Scratch};
-use super::passage::{Extent, Passage, Span};
-use super::photon::{EdgeSource, LightChunk, LightVertex, PhotonBeam};
-use super::visibility::ray_origin;
 use crate::counters::Counters;
-use crate::estimate::light_tracing;
 use crate::mis::{BeamExtent, Densities, Edge, Pending};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
+use crate::path::{
+    Arrival, Arrived, Context, EdgeSource, Extent, LightChunk, LightVertex, MIN_COSINE, Passage, PhotonBeam,
+    Scratch, Span, arrive, pend, ray_origin,
+};
+use crate::prepared::World;
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
 use crate::scene::{Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
-use crate::world::World;
+use crate::techniques::light_tracing;
 
 /// The walk's state between two vertices.
 struct Flight<D> {
@@ -151,7 +150,7 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let pdf_position = emission.pdf_position * probability;
     let density = pdf_position * emission.pdf_direction;
     let throughput = emission.radiance * (cos / density);
-    if !(cos >= super::MIN_COSINE && density > 0.0) || throughput.is_black() || !throughput.is_finite() {
+    if !(cos >= MIN_COSINE && density > 0.0) || throughput.is_black() || !throughput.is_finite() {
         return None;
     }
     observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });

@@ -3,11 +3,12 @@
 use serde::{Deserialize, Serialize};
 use upbp_media::MediumId;
 
-use super::PARALLEL_SIN2;
 use super::densities::Densities;
-use super::recursion::MergeSite;
 use crate::scene::Walk;
 use crate::technique::Technique;
+
+/// Below this `sin²θ` two beams count as parallel: BB1D neither contributes nor counts in weights.
+pub const PARALLEL_SIN2: f64 = upbp_accel::PARALLEL_SIN2 as f64;
 
 /// How the densities of techniques are turned into weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -39,6 +40,22 @@ pub struct VolumeMerges {
     pub bp2d: f64,
     /// `n V_1`, photon beams around query beams.
     pub bb1d: f64,
+}
+
+/// Which merges are possible at a vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MergeSite {
+    /// None: an end of the path, or a Dirac lobe.
+    None,
+    /// Surface merging.
+    Surface,
+    /// The merges of a medium.
+    Medium {
+        /// The medium.
+        medium: MediumId,
+        /// Sine of the angle between the incoming and the outgoing line.
+        sin_theta: f64,
+    },
 }
 
 /// Sample counts and kernel volumes of one iteration.

@@ -4,8 +4,8 @@ use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
 use upbp_media::{EdgeDensity, Medium, MediumStack, RaySegment};
 
-use super::passage::{correction, correction_of_escape, is_hidden, may_correct, medium_of};
-use super::site::Site;
+use super::edge::{correction, correction_of_escape, is_hidden, may_correct, medium_of};
+use super::interaction::Site;
 use crate::scene::{Crossing, MAX_CROSSINGS, Scene};
 
 /// The far end of a connection.

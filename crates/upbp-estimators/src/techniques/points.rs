@@ -3,12 +3,13 @@
 use upbp_media::{Medium, MediumId};
 
 use super::beams::beam_tip;
+use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::mis::{Densities, Weight};
 use crate::observer::{Joint, ObservedSample, Observer};
+use crate::path::{Context, LightVertex, QueryVertex, Site, SurfaceSite};
 use crate::scene::{Scene, Walk};
 use crate::technique::Technique;
-use crate::walk::{Context, LightVertex, Output, QueryVertex, Site, SurfaceSite};
 
 /// Photons whose surface faces away by more than this do not lie on the query's surface: cosine of the angle between
 /// the two normals.

@@ -3,12 +3,13 @@
 //! Drawing `M` of the `N_V` stored vertices instead of walking along one light sub-path keeps the cost of a camera vertex
 //! constant, however long light sub-paths are (`docs/theory.md`, section 6.9).
 
+use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::{Joint, ObservedSample, Observer};
+use crate::path::{Context, LightVertex, QueryVertex, Site, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Crossing, Scene, Walk};
 use crate::technique::Technique;
-use crate::walk::{Context, LightVertex, Output, QueryVertex, Site, Target, clear_edge, ray_origin};
 
 /// Connects `vertex` to as many light vertices as the plan says.
 pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(

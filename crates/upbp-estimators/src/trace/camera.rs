@@ -1,82 +1,19 @@
 //! Camera sub-paths: one per pixel sample, with every technique that ends on them.
 
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use upbp_media::Spectrum;
 
-use super::arrival::{Arrival, arrive, pend};
-use super::context::{Context, Scratch};
-use super::passage::Extent;
-use super::site::{Sides, Site};
-use super::visibility::ray_origin;
 use crate::counters::Counters;
-use crate::estimate;
+use crate::film_sample::{CameraWalk, Output};
 use crate::light_map::LightMap;
-use crate::mis::{Densities, Edge, Pending, Tip, Weight};
+use crate::mis::{Densities, Edge, Pending};
 use crate::observer::{ObservedVertex, Observer};
+use crate::path::{Arrival, Context, Extent, QueryEdge, QueryVertex, Scratch, arrive, pend, ray_origin};
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
 use crate::scene::{Camera, Scene, Walk};
 use crate::technique::{Layer, Technique};
-
-/// The result of one camera sub-path: radiance per layer, weighted.
-#[derive(Clone, Copy, Debug)]
-pub struct CameraWalk {
-    /// Contributions by [`Layer`].
-    pub layers: [Spectrum; Layer::COUNT],
-    /// Of them, light met before the first vertex that scatters: seen directly, by mirrors and through glass. How bright it
-    /// is depends on the place on the film alone, not on luck further on.
-    pub seen: Spectrum,
-}
-
-/// What a technique adds to: the layers of the sample at hand and the counters of the pass.
-pub(crate) struct Output<'a, O: ?Sized> {
-    pub(crate) layers: &'a mut [Spectrum; Layer::COUNT],
-    pub(crate) counters: &'a mut Counters,
-    pub(crate) observer: &'a mut O,
-}
-
-impl<O: ?Sized> Output<'_, O> {
-    /// Adds a weighted contribution; whether it was accepted.
-    #[inline]
-    pub(crate) fn add<D: Densities>(
-        &mut self,
-        technique: Technique,
-        value: Spectrum,
-        weight: &Weight<D>,
-    ) -> bool {
-        match self.counters.accept(technique, value, weight.value()) {
-            Some(contribution) => {
-                self.layers[technique.layer() as usize] += contribution;
-                true
-            }
-            None => false,
-        }
-    }
-}
-
-/// A camera sub-path between two vertices.
-pub(crate) struct QueryEdge<D> {
-    /// Importance over density at the edge's first vertex, after scattering.
-    pub(crate) throughput: Spectrum,
-    /// What the weights need of the first vertex.
-    pub(crate) pending: Pending<D>,
-    /// Samples that connect the first vertex to one on this edge, as the heuristic takes them.
-    pub(crate) connections: D,
-    /// Edges from the camera to a vertex on this edge.
-    pub(crate) depth: u32,
-}
-
-/// A camera sub-path's end at a vertex.
-pub(crate) struct QueryVertex<B, D> {
-    pub(crate) position: Vec3,
-    /// Direction to the vertex before, towards the camera.
-    pub(crate) towards_camera: Vec3,
-    pub(crate) throughput: Spectrum,
-    pub(crate) tip: Tip<D>,
-    pub(crate) depth: u32,
-    pub(crate) site: Site<B>,
-    pub(crate) sides: Sides,
-}
+use crate::techniques;
 
 /// Traces the camera sub-path of one sample of a pixel. `index` addresses its random numbers.
 #[expect(clippy::too_many_arguments, reason = "one call per sample, with the state of the pass")]
@@ -124,13 +61,13 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         scratch.passage.trace(scene, origin, direction, &stack, 0.0, extent, &mut stream);
         out.counters.boundary_conflicts += scratch.passage.take_conflicts();
         let passage = &scratch.passage;
-        estimate::emission_along(context, passage, &edge, &mut out);
-        estimate::along_beam(context, map, passage, &edge, &mut out);
+        techniques::emission_along(context, passage, &edge, &mut out);
+        techniques::along_beam(context, map, passage, &edge, &mut out);
 
         let arrived = match arrive(scene, passage) {
             Arrival::Vertex(arrived) => arrived,
             Arrival::Escaped => {
-                estimate::environment(context, passage, &edge, &mut out);
+                techniques::environment(context, passage, &edge, &mut out);
                 break;
             }
             Arrival::Absorbed => break,
@@ -154,7 +91,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             in_medium,
         );
         if !in_medium && let Some(hit) = &passage.hit {
-            estimate::emitter_hit(context, hit, direction, origin, &mis_edge, throughput, &edge, &mut out);
+            techniques::emitter_hit(context, hit, direction, origin, &mis_edge, throughput, &edge, &mut out);
         }
         if depth == plan.lengths.max {
             out.counters.cut_walks += u64::from(arrived.site.is_connectible());
@@ -181,9 +118,9 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
                 walk.seen = out.layers[Layer::Bpt as usize];
                 scattered_before = true;
             }
-            estimate::next_events(context, &vertex, &mut stream, &mut scratch.crossings, &mut out);
-            estimate::connections(context, map, &vertex, &mut stream, &mut scratch.crossings, &mut out);
-            estimate::at_point(context, map, &vertex, &mut out);
+            techniques::next_events(context, &vertex, &mut stream, &mut scratch.crossings, &mut out);
+            techniques::connections(context, map, &vertex, &mut stream, &mut scratch.crossings, &mut out);
+            techniques::at_point(context, map, &vertex, &mut out);
         }
 
         let Some(scattered) =

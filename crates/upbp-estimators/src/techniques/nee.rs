@@ -1,10 +1,11 @@
 //! Next event estimation: a camera vertex and a point chosen on a light.
 
+use crate::film_sample::Output;
 use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
+use crate::path::{Context, MIN_COSINE, QueryVertex, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
-use crate::walk::{Context, MIN_COSINE, Output, QueryVertex, Target, clear_edge, ray_origin};
 
 /// Connects `vertex` to as many points on lights as the plan says.
 pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(

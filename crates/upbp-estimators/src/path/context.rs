@@ -1,0 +1,34 @@
+//! What every walk needs.
+
+use super::edge::Passage;
+use crate::iteration::Plan;
+use crate::prepared::World;
+use crate::scene::{Crossing, Scene};
+
+/// The scene and the plan of an iteration.
+pub struct Context<'a, S: Scene> {
+    /// The scene, made ready.
+    pub world: &'a World<'a, S>,
+    /// What the iteration does.
+    pub plan: &'a Plan,
+}
+
+impl<S: Scene> Clone for Context<'_, S> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<S: Scene> Copy for Context<'_, S> {}
+
+/// Buffers of one thread, kept from path to path.
+pub struct Scratch<B> {
+    pub(crate) passage: Passage<B>,
+    pub(crate) crossings: Vec<Crossing>,
+}
+
+impl<B: Copy> Default for Scratch<B> {
+    fn default() -> Self {
+        Self { passage: Passage::new(), crossings: Vec::new() }
+    }
+}

@@ -1,0 +1,18 @@
+//! Sub-paths as data: edges, the vertices at their ends, what lies between two vertices.
+
+mod arrival;
+mod context;
+mod edge;
+mod interaction;
+mod vertex;
+mod visibility;
+
+pub(crate) use arrival::{Arrival, Arrived, arrive, pend};
+pub use context::{Context, Scratch};
+pub use edge::{Extent, Passage, Span};
+pub(crate) use interaction::MIN_COSINE;
+pub use interaction::{Evaluation, Scattered, Sides, Site, SurfaceSite};
+pub use vertex::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
+pub(crate) use vertex::{QueryEdge, QueryVertex};
+pub(crate) use visibility::ray_origin;
+pub use visibility::{Target, clear_edge};

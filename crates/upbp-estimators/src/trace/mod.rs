@@ -1,0 +1,7 @@
+//! The two walks, on top of everything else.
+
+mod camera;
+mod light;
+
+pub use camera::trace_camera_path;
+pub use light::trace_light_path;
