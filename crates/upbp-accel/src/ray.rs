@@ -24,13 +24,13 @@ impl Ray {
         Self { origin, direction, t_min: 0.0, t_max: f32::INFINITY }
     }
 
-    /// The same line with another range.
+    /// The ray with another range of distances, scene units.
     #[must_use]
     pub fn with_range(self, t_min: f32, t_max: f32) -> Self {
         Self { t_min, t_max, ..self }
     }
 
-    /// The point at distance `t`.
+    /// The point at distance `t`, scene units.
     #[must_use]
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + self.direction * t
@@ -40,8 +40,8 @@ impl Ray {
 /// Offset from the surface in units of the rounding error of the largest coordinate.
 ///
 /// A point that is rounded once is off its surface by at most `√3/2` such units, as is the sum that is
-/// returned; 4 would do for the shapes of this crate. The rest is margin for hosts, whose own intersections may
-/// be good to fewer digits.
+/// returned; 4 would do for the shapes of this crate. The rest is margin for hosts, whose own intersections
+/// may be good to fewer digits.
 const OFFSET_ULPS: f32 = 32.0;
 
 /// Moves a surface point off its surface, to the side that `direction` points to.

@@ -1,10 +1,10 @@
-//! The box along the axes.
+//! The axis-aligned box.
 
 use glam::Vec3;
 
 use super::error::{GeometryError, finite};
 
-/// A box along the axes; its normals point outwards.
+/// An axis-aligned box; its normals point outwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisBox {
     min: Vec3,
@@ -39,7 +39,7 @@ impl AxisBox {
         self.max
     }
 
-    /// Areas of one face across x, y and z.
+    /// Areas of the faces across x, y and z, square scene units.
     fn face_areas(&self) -> Vec3 {
         let size = self.max - self.min;
         Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y)
@@ -67,7 +67,7 @@ impl AxisBox {
             remaining -= areas[face / 2];
             face += 1;
         }
-        // What is left of the random number inside the face is uniform again.
+        // The rest of the random number inside the face is uniform again.
         let first = (remaining / areas[face / 2]).clamp(0.0, 1.0);
         let axis = face / 2;
         let (min, max) = (self.min.to_array(), self.max.to_array());
@@ -91,7 +91,8 @@ impl AxisBox {
         (self.min, self.max)
     }
 
-    /// Distance and face at which the line enters and leaves. A face is `2·axis`, plus one on the upper side.
+    /// Distances and faces at which the line enters and leaves. A face is `2·axis`, plus one on the upper
+    /// side.
     pub(super) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[(f64, u32); 2]> {
         let direction = direction.as_dvec3();
         let low = self.min.as_dvec3() - origin.as_dvec3();
@@ -100,8 +101,8 @@ impl AxisBox {
         let (low, high) = (low * inverse, high * inverse);
         let (mut entry, mut exit) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
         for (axis, face) in [(0, 0), (1, 2), (2, 4)] {
-            // Along a face: in its plane, where the product is not a number, counts as inside; beside the box both
-            // distances have the same sign and are infinite.
+            // Along a face: in its plane, where the product is not a number, counts as inside; beside the box
+            // both distances have the same sign and are infinite.
             let (near, far) = if inverse[axis].is_sign_positive() {
                 ((low[axis], face), (high[axis], face + 1))
             } else {
@@ -132,7 +133,7 @@ impl AxisBox {
         position
     }
 
-    /// Where a point of a face lies along the other two axes, each mapped to `[0, 1]`.
+    /// Coordinates of a point of a face along the other two axes, each mapped to `[0, 1]`.
     pub(super) fn uv(&self, face: u32, position: Vec3) -> [f32; 2] {
         let relative = ((position - self.min) / (self.max - self.min)).clamp(Vec3::ZERO, Vec3::ONE);
         let axis = face as usize / 2;

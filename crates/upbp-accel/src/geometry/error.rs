@@ -1,6 +1,6 @@
-//! What can be wrong with geometry that is handed in.
+//! The error of geometry that is handed in.
 
-/// Why a shape or a scene was refused.
+/// The reason for which a shape or a scene is refused.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GeometryError {
@@ -50,7 +50,7 @@ pub enum GeometryError {
     },
 }
 
-/// Passes `value` if all its components are finite.
+/// Accepts a vector whose components are all finite.
 pub(super) fn finite(value: glam::Vec3, what: &'static str) -> Result<glam::Vec3, GeometryError> {
     if value.is_finite() { Ok(value) } else { Err(GeometryError::NonFinite { what }) }
 }

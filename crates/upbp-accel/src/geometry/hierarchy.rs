@@ -14,10 +14,11 @@ use obvhs::{Boundable, BvhBuildParams};
 
 use crate::ray::Ray;
 
-/// Widens a slab's far end by the rounding of a difference, a reciprocal and a product, twice over.
+/// Factor on the far distance of a slab: the rounding of a difference, a reciprocal and a product, twice
+/// over.
 const SLAB_MARGIN: f32 = 1.0 + 8.0 * f32::EPSILON;
 
-/// Aligned vectors: a slab test is a handful of vector instructions.
+/// A node with aligned vectors: a slab test is a handful of vector instructions.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     min: Vec3A,
@@ -48,7 +49,7 @@ impl Boundable for Group {
 }
 
 impl Hierarchy {
-    /// Builds over boxes; also returns the order in which leaves refer to them.
+    /// Builds over boxes; also returns the order of the boxes in the leaves.
     pub(super) fn build(boxes: &[(Vec3, Vec3)]) -> (Self, Vec<u32>) {
         if boxes.is_empty() {
             return (Self { nodes: Vec::new() }, Vec::new());
@@ -77,7 +78,7 @@ impl Hierarchy {
         (Self { nodes }, order)
     }
 
-    /// Calls `leaf` with ranges of primitives that `ray` may meet, near ones first as far as that is known.
+    /// Calls `leaf` with the ranges of primitives that `ray` may meet, the nearer child of each node first.
     ///
     /// The second argument of `leaf` is the far end of the ray, which it may lower.
     pub(super) fn traverse(
@@ -130,7 +131,7 @@ impl Hierarchy {
     }
 }
 
-/// Sorts primitives by the centres of their boxes and groups equal ones.
+/// Sorts primitives by the centres of their boxes, and groups those with the same centre.
 fn group_by_centre(boxes: &[(Vec3, Vec3)]) -> (Vec<u32>, Vec<Group>) {
     let centre = |index: u32| {
         let (min, max) = boxes[index as usize];
@@ -157,7 +158,7 @@ fn group_by_centre(boxes: &[(Vec3, Vec3)]) -> (Vec<u32>, Vec<Group>) {
 struct Slabs {
     origin: Vec3A,
     inverse: Vec3A,
-    /// Axes along which the ray goes down.
+    /// Axes along which the direction is negative.
     negative: BVec3A,
     t_min: f32,
 }
@@ -169,7 +170,7 @@ impl Slabs {
         Self { origin: ray.origin.into(), inverse, negative, t_min: ray.t_min }
     }
 
-    /// Where the ray enters the box, if it does before `t_max`.
+    /// The distance at which the ray enters the box, if that is before `t_max`.
     ///
     /// A zero component of the direction gives infinite distances to both planes of its axis, or NaN for a
     /// plane that holds the origin. The comparisons are written so that a NaN does not constrain: a ray that

@@ -1,8 +1,8 @@
-//! Where a ray meets a surface.
+//! Intersections of rays with surfaces.
 
 use glam::Vec3;
 
-/// The place of a shape in the list that a [`SceneGeometry`](super::SceneGeometry) was built from.
+/// Index of a shape in the list that a [`SceneGeometry`](super::SceneGeometry) was built from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ShapeId(pub u32);
 
@@ -13,30 +13,31 @@ pub struct Candidate {
     pub t: f32,
     /// The shape that is met.
     pub shape: ShapeId,
-    /// Which part of the shape: the triangle of a mesh, the face of a box (`2·axis`, plus one on the upper
-    /// side), 0 where a line enters a sphere and 1 where it leaves, 0 for a quad.
+    /// Part of the shape: the triangle of a mesh, the face of a box (`2·axis`, plus one on the upper side), 0
+    /// where a line enters a sphere and 1 where it leaves, 0 for a quad.
     pub primitive: u32,
-    /// Where on a quad (`[0, 1]²`), or the weights of the second and third corner of a triangle. Zero
+    /// Coordinates on a quad, in `[0, 1]²`, or the weights of the second and third corner of a triangle. Zero
     /// for spheres and boxes: see [`SceneGeometry::uv`](super::SceneGeometry::uv).
     pub uv: [f32; 2],
 }
 
-/// What a visitor of intersections wants next.
+/// The answer of a visitor to an intersection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Visit {
-    /// Go on.
+    /// Go on with all further intersections.
     Continue,
-    /// Go on, but only with intersections nearer than this distance. A greater distance than before has no
-    /// effect.
+    /// Go on with intersections nearer than this distance, in scene units. Cannot undo an earlier, smaller
+    /// limit.
     ShrinkTo(f32),
-    /// No more.
+    /// End the traversal.
     Stop,
 }
 
-/// Surface data at an intersection.
+/// Position and normals of the surface at an intersection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// The point, recomputed on the surface and rounded once, whatever the distance that the ray came from.
+    /// The point, recomputed on the surface and rounded once, so that it is as exact after a long ray as
+    /// after a short one.
     pub position: Vec3,
     /// Unit normal of the surface: outwards for closed shapes, by the winding for quads and triangles.
     pub geometric_normal: Vec3,

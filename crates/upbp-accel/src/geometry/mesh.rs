@@ -22,7 +22,7 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// The mesh of these triangles; with `normals`, one per position, it is shaded smoothly.
+    /// The mesh of triangles that index `positions`; with `normals`, one per position, it is shaded smoothly.
     ///
     /// Triangles without area are dropped and counted, see [`TriangleMesh::dropped_triangles`].
     pub fn new(
@@ -134,7 +134,7 @@ impl TriangleMesh {
         let triangle =
             self.cumulative_area.partition_point(|&sum| sum <= target).min(self.triangles.len() - 1);
         let before = if triangle == 0 { 0.0 } else { self.cumulative_area[triangle - 1] };
-        // What is left of the random number inside the triangle is uniform again.
+        // The rest of the random number inside the triangle is uniform again.
         let left = ((target - before) / (self.cumulative_area[triangle] - before)).clamp(0.0, 1.0);
         let root = left.sqrt();
         let (b, c) = (root * (1.0 - f64::from(u[1])), root * f64::from(u[1]));
@@ -199,7 +199,8 @@ impl TriangleMesh {
     }
 }
 
-/// The normal of a triangle, as long as twice its area. In double precision, so that small ones have one.
+/// The normal of a triangle, of twice its area in length; in double precision, so that that of a small
+/// triangle does not vanish.
 fn cross(positions: &[Vec3], triangle: [u32; 3]) -> DVec3 {
     let [a, b, c] = triangle.map(|vertex| positions[vertex as usize].as_dvec3());
     (b - a).cross(c - a)
@@ -209,7 +210,7 @@ fn doubled_area(positions: &[Vec3], triangle: [u32; 3]) -> f64 {
     cross(positions, triangle).length()
 }
 
-/// See [`TriangleMesh::is_closed`].
+/// Whether every edge joins exactly two triangles that are wound alike; equal positions count as one.
 fn is_closed(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
     // Adding zero turns −0 into +0, which is the same place.
     let key = |vertex: u32| positions[vertex as usize].to_array().map(|x| (x + 0.0).to_bits());

@@ -1,4 +1,4 @@
-//! Surfaces: shapes, meshes and the hierarchy over them.
+//! Surfaces: shapes, meshes, and the hierarchy by which rays find them.
 
 mod axis_box;
 mod error;

@@ -12,7 +12,7 @@ use super::sphere::Sphere;
 use super::triangle::RayShear;
 use crate::ray::Ray;
 
-/// A primitive with what its test needs, so that a leaf is read in one go.
+/// A primitive together with the geometry for its test, so that a leaf is read in one go.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
     shape: ShapeId,
@@ -64,7 +64,7 @@ impl Item {
 pub(super) struct Probe {
     origin: Vec3,
     direction: Vec3,
-    /// Only where there are triangles.
+    /// `None` in a scene without triangles.
     shear: Option<RayShear>,
 }
 
@@ -74,8 +74,8 @@ impl Probe {
         Self { origin: ray.origin, direction: ray.direction, shear }
     }
 
-    /// Calls `found` with the intersections of the line and the primitive that lie in the open interval `(t_min, t_max)`,
-    /// where `found` may lower `t_max`.
+    /// Calls `found` with the intersections of the line and the primitive that lie in the open interval
+    /// `(t_min, t_max)`, where `found` may lower `t_max`.
     #[inline]
     pub(super) fn intersect(
         &self,

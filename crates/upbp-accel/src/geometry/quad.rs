@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::error::{GeometryError, finite};
 
-/// A parallelogram `origin + u·edge_u + v·edge_v` with `u` and `v` in `[0, 1]`.
+/// A parallelogram, the points `origin + u·edge_u + v·edge_v` with `u` and `v` in `[0, 1]`.
 ///
 /// Its normal is `edge_u × edge_v`, normalised.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Quad {
 }
 
 impl Quad {
-    /// The parallelogram at `origin` with these edges, which must not be parallel.
+    /// The parallelogram at `origin` with two edges, in scene units, which must not be parallel.
     pub fn new(origin: Vec3, edge_u: Vec3, edge_v: Vec3) -> Result<Self, GeometryError> {
         let origin = finite(origin, "the origin of a quad")?;
         let edge_u = finite(edge_u, "the first edge of a quad")?;
@@ -84,9 +84,9 @@ impl Quad {
         (min.as_vec3().map(f32::next_down), max.as_vec3().map(f32::next_up))
     }
 
-    /// Where the line meets the quad: the distance, and the coordinates on the quad.
+    /// The distance at which the line meets the quad, and the coordinates of that point on the quad.
     ///
-    /// In double precision: what leaks between neighbours is then what their corners differ by.
+    /// In double precision, so that neighbours have no gap beyond the difference of their corners.
     pub(super) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<(f64, [f32; 2])> {
         let [edge_u, edge_v] = [self.edge_u, self.edge_v].map(Vec3::as_dvec3);
         let direction = direction.as_dvec3();

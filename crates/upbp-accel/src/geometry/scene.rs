@@ -136,8 +136,8 @@ impl SceneGeometry {
         }
     }
 
-    /// Whether `ray` meets the surface of an intersection from its front, the side of the geometric normal: goes into
-    /// a closed shape.
+    /// Whether `ray` meets the surface of an intersection from its front, the side of the geometric normal:
+    /// goes into a closed shape.
     ///
     /// # Panics
     /// If the candidate does not belong to this scene.
@@ -152,8 +152,8 @@ impl SceneGeometry {
         normal.dot(ray.direction) < 0.0
     }
 
-    /// Coordinates of a point of a surface: azimuth and polar angle of a sphere around y, coordinates on a quad or on a
-    /// box's face, all in `[0, 1]`; weights of the second and third corner of a triangle.
+    /// Coordinates of a point of a surface: azimuth and polar angle of a sphere around y, coordinates on a
+    /// quad or on a box's face, all in `[0, 1]`; weights of the second and third corner of a triangle.
     ///
     /// # Panics
     /// If the candidate does not belong to this scene.

@@ -32,7 +32,7 @@ impl Shape {
         }
     }
 
-    /// A point distributed uniformly over the surface, and the geometric normal there.
+    /// Draws a point uniformly over the surface; returns it with the geometric normal.
     ///
     /// `u` is uniform in `[0, 1)²`; the density is `1 / area()` per square scene unit.
     #[must_use]
@@ -68,7 +68,7 @@ impl Shape {
         }
     }
 
-    /// The least and the greatest coordinates.
+    /// The least and the greatest coordinates of the surface, scene units.
     #[must_use]
     pub fn aabb(&self) -> (Vec3, Vec3) {
         match self {
@@ -79,7 +79,7 @@ impl Shape {
         }
     }
 
-    /// The same shape elsewhere.
+    /// The shape, moved by a vector in scene units.
     #[must_use]
     pub fn translated(self, by: Vec3) -> Self {
         match self {

@@ -1,4 +1,4 @@
-//! Ray against triangle, without cracks.
+//! The test of a ray against triangles, without cracks between neighbours.
 //!
 //! The vertices are sheared so that the ray becomes an axis; what remains is a point-in-triangle test in the
 //! plane, in which neighbours compute the same number for their common edge (Woop, Benthin, Wald,
@@ -8,7 +8,7 @@
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-/// What a ray's tests against triangles have in common.
+/// A ray, prepared for tests against triangles.
 pub(super) struct RayShear {
     origin: Vec3,
     direction: DVec3,
@@ -16,7 +16,7 @@ pub(super) struct RayShear {
     slope: Vec2,
 }
 
-/// Where a line meets a triangle.
+/// The point in which a line meets a triangle.
 pub(super) struct TriangleHit {
     /// Distance along the ray; may be negative.
     pub(super) t: f64,
@@ -39,13 +39,13 @@ impl RayShear {
         Self { origin, direction: direction.as_dvec3(), axes, slope }
     }
 
-    /// The vertex as seen along the ray.
+    /// Projects a vertex, relative to the origin, along the ray.
     fn project(&self, from_origin: Vec3) -> Vec2 {
         let [x, y, z] = self.axes;
         Vec2::new(from_origin[x], from_origin[y]) - self.slope * from_origin[z]
     }
 
-    /// Where the line meets the triangle, if it does. Both sides count.
+    /// Finds the point in which the line meets the triangle, from either side.
     #[inline]
     pub(super) fn intersect(&self, corners: [Vec3; 3]) -> Option<TriangleHit> {
         let [a, b, c] = corners.map(|corner| self.project(corner - self.origin));
@@ -58,7 +58,7 @@ impl RayShear {
         self.confirm(corners, [a, b, c])
     }
 
-    /// The part of the test that few triangles reach, in double precision: signs are exact there.
+    /// Decides in double precision, where signs are exact, what single precision did not exclude.
     fn confirm(&self, corners: [Vec3; 3], projected: [Vec2; 3]) -> Option<TriangleHit> {
         let [a, b, c] = projected.map(Vec2::as_dvec2);
         let (u, v, w) = (c.perp_dot(b), a.perp_dot(c), b.perp_dot(a));

@@ -1,4 +1,4 @@
-//! Where a ray and a segment come closest.
+//! The closest approach of a ray and a segment.
 //!
 //! Two beams almost never meet. Estimators therefore blur along their common perpendicular: a segment counts
 //! where the ray passes it within a radius. Source: `docs/theory.md`, section 2.6. Oracle:
@@ -42,7 +42,7 @@ impl Segment {
     }
 }
 
-/// Where a ray and a segment come closest.
+/// The nearest points of a ray and a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestApproach {
     /// Distance along the ray, scene units, in `[t_min, t_max)`.
@@ -55,65 +55,32 @@ pub struct ClosestApproach {
     pub sin_theta: f32,
 }
 
-/// Finds where `ray` and `segment` come closest, if that is within `radius` and inside both.
+/// Finds the nearest points of `ray` and `segment`, if they are less than `radius` apart and inside both.
 ///
 /// `None` for parallel lines ([`PARALLEL_SIN2`]) and for closest points beyond an end. The half-open ranges
 /// make the pieces of a split beam add up: a point between two pieces belongs to exactly one.
 #[must_use]
 #[inline]
 pub fn closest_approach(ray: &Ray, segment: &Segment, radius: f32) -> Option<ClosestApproach> {
+    let (a, b) = (ray.direction, segment.direction);
     // The difference first: both origins may be far from the origin of the scene.
     let between = segment.origin - ray.origin;
-    let lines = Lines::solve(ray.direction.to_array(), segment.direction.to_array(), between.to_array());
-    let distance = lines.volume.abs() * lines.inverse_sin2.sqrt();
-    let inside = (ray.t_min..ray.t_max).contains(&lines.t_ray)
-        && (segment.start..segment.end).contains(&lines.t_segment);
-    (lines.sin2 >= PARALLEL_SIN2 && inside && distance < radius).then(|| ClosestApproach {
-        t_ray: lines.t_ray,
-        t_segment: lines.t_segment,
+    // The cross-product form: the one that divides by the product of the directions fails for perpendicular
+    // lines.
+    let normal = a.cross(b);
+    let sin2 = normal.length_squared();
+    let inverse_sin2 = sin2.recip();
+    let t_ray = between.cross(b).dot(normal) * inverse_sin2;
+    let t_segment = between.cross(a).dot(normal) * inverse_sin2;
+    let distance = between.dot(normal).abs() * inverse_sin2.sqrt();
+    let inside = (ray.t_min..ray.t_max).contains(&t_ray) && (segment.start..segment.end).contains(&t_segment);
+    // Parallel lines gave infinite numbers or NaN.
+    (sin2 >= PARALLEL_SIN2 && inside && distance < radius).then(|| ClosestApproach {
+        t_ray,
+        t_segment,
         distance,
-        sin_theta: lines.sin2.sqrt().min(1.0),
+        sin_theta: sin2.sqrt().min(1.0),
     })
-}
-
-/// The closest points of two lines, before any question of ends. Infinite or NaN for parallel lines.
-pub(super) struct Lines {
-    pub(super) t_ray: f32,
-    pub(super) t_segment: f32,
-    /// `w·n`: the distance times the sine.
-    pub(super) volume: f32,
-    pub(super) sin2: f32,
-    pub(super) inverse_sin2: f32,
-}
-
-impl Lines {
-    /// Solves for directions `a`, `b` and the difference `w` of the origins.
-    ///
-    /// The cross-product form: the one that divides by the product of the directions fails for
-    /// perpendicular lines. Plain arrays, so that a loop over eight lines vectorises.
-    #[inline(always)]
-    pub(super) fn solve(a: [f32; 3], b: [f32; 3], w: [f32; 3]) -> Self {
-        let n = cross(a, b);
-        let sin2 = dot(n, n);
-        let inverse_sin2 = 1.0 / sin2;
-        Self {
-            t_ray: dot(cross(w, b), n) * inverse_sin2,
-            t_segment: dot(cross(w, a), n) * inverse_sin2,
-            volume: dot(w, n),
-            sin2,
-            inverse_sin2,
-        }
-    }
-}
-
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! Eight boxes, as they are or in a cache line.
+//! Groups of eight boxes, in full precision or in a cache line.
 
 use glam::Vec3;
 
-use super::lanes::{Task, WIDTH, Wide, run};
+use super::lanes::{TO_WHOLE, Task, WIDTH, Wide, run};
 
 /// The box around some items: least and greatest corner.
 pub(super) type Bounds = (Vec3, Vec3);
@@ -12,17 +12,17 @@ pub(super) fn union(a: Bounds, b: Bounds) -> Bounds {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// Eight boxes for vectorised tests. The box of an unused lane ends before it begins.
+/// Eight boxes, tested at once. The box of an unused lane ends before it begins.
 pub(super) trait Boxes: Copy + Send {
-    /// Around up to eight boxes.
+    /// Packs up to eight boxes.
     fn around(boxes: &[Bounds]) -> Self;
-    /// The least coordinates along an axis.
+    /// The least coordinate of each box along an axis.
     fn min<W: Wide>(&self, wide: W, axis: usize) -> W::F;
-    /// The greatest coordinates along an axis.
+    /// The greatest coordinate of each box along an axis.
     fn max<W: Wide>(&self, wide: W, axis: usize) -> W::F;
 }
 
-/// Boxes as they are.
+/// Eight boxes in full precision.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Exact {
@@ -53,8 +53,8 @@ impl Boxes for Exact {
     }
 }
 
-/// Boxes rounded outwards to a grid with the same step along all axes. For boxes of like size only: small ones
-/// among large ones would grow many times.
+/// Eight boxes rounded outwards to a grid of 256 places with the same step along all axes. For boxes of like
+/// size only: small ones among large ones would grow many times.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Rounded {
@@ -65,7 +65,7 @@ pub(super) struct Rounded {
 }
 
 impl Rounded {
-    /// As the tests compute it.
+    /// The coordinate of a place of the grid, computed as the tests compute it.
     fn at(&self, axis: usize, place: u8) -> f32 {
         self.origin[axis] + f32::from(place) * self.step
     }
@@ -102,7 +102,7 @@ impl Boxes for Rounded {
     }
 }
 
-/// Rounds boxes to a grid that is known.
+/// Rounds boxes outwards to a grid whose origin and step are known.
 struct Round<'a> {
     rounded: &'a mut Rounded,
     boxes: &'a [Bounds],
@@ -111,8 +111,6 @@ struct Round<'a> {
 impl Task for Round<'_> {
     #[inline(always)]
     fn run(self, wide: impl Wide) {
-        /// Between this and twice as much, numbers have a distance of one, and their last bits count from here.
-        const WHOLE: f32 = (1 << 23) as f32;
         let Self { rounded, boxes } = self;
         let (step, inverse) = (rounded.step, rounded.step.recip());
         for axis in 0..3 {
@@ -124,20 +122,20 @@ impl Task for Round<'_> {
             let at = |place: f32| origin + place * step;
             let nearest = |x: f32| {
                 let place = (x - origin) * inverse;
-                // Also where there is no such number.
+                // Written so that NaN becomes a place too.
                 let place = if place < 255.0 { place } else { 255.0 };
-                place + WHOLE - WHOLE
+                place + TO_WHOLE - TO_WHOLE
             };
             let (mut least, mut greatest) = (min.map(nearest), max.map(nearest));
             for lane in 0..WIDTH {
                 least[lane] -= if at(least[lane]) > min[lane] { 1.0 } else { 0.0 };
                 greatest[lane] += if at(greatest[lane]) < max[lane] { 1.0 } else { 0.0 };
             }
-            let byte = |place: f32| (place + WHOLE).to_bits() as u8;
+            let byte = |place: f32| (place + TO_WHOLE).to_bits() as u8;
             (rounded.min[axis], rounded.max[axis]) = (least.map(byte), greatest.map(byte));
             let held = wide.less_equal(wide.load(&least.map(at)), wide.load(&min))
                 & wide.less_equal(wide.load(&max), wide.load(&greatest.map(at)));
-            // Rounding may be off by more.
+            // Where rounding was off by more than one place.
             if held != 0xff {
                 for lane in 0..WIDTH {
                     while rounded.at(axis, rounded.min[axis][lane]) > min[lane] {

@@ -1,13 +1,27 @@
-//! Eight numbers at once.
+//! Arithmetic on eight numbers at once.
 //!
-//! The compiler does not find the vector instructions by itself: it takes loops over eight lanes apart in order
-//! to build the mask of the result. So the operations are named. Each rounds as the scalar one does and none is
-//! fused, so that results do not depend on the instruction set.
+//! The compiler does not find the vector instructions by itself: it takes loops over eight lanes apart in
+//! order to build the mask of the result. So the operations are named. Each rounds as the scalar one does and
+//! none is fused, so that results do not depend on the instruction set.
 
 use pulp::Arch;
 
-/// Items per block, and children per node of a tree.
+/// Numbers in a vector, thus items in a block and children of a node.
 pub(super) const WIDTH: usize = 8;
+
+/// Adding this to a number from 0 to itself rounds to a whole one, which the last bits of the sum hold: from
+/// here to twice as much, neighbouring numbers have a distance of one.
+pub(super) const TO_WHOLE: f32 = (1 << 23) as f32;
+
+/// The lanes whose bit is set, in ascending order.
+#[inline(always)]
+pub(super) fn set_lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
+        bits &= bits - 1;
+        Some(lane)
+    })
+}
 
 /// The operations on eight numbers. Masks have one bit per lane.
 pub(super) trait Wide: Copy {
@@ -15,7 +29,6 @@ pub(super) trait Wide: Copy {
     type F: Copy;
 
     fn load(self, lanes: &[f32; WIDTH]) -> Self::F;
-    /// Whole numbers.
     fn load_bytes(self, lanes: [u8; WIDTH]) -> Self::F;
     fn store(self, lanes: Self::F) -> [f32; WIDTH];
     fn splat(self, x: f32) -> Self::F;
@@ -49,7 +62,7 @@ pub(super) trait Wide: Copy {
         [self.mul(a[0], b), self.mul(a[1], b), self.mul(a[2], b)]
     }
 
-    /// In the order of the scalar code.
+    /// Dot product, in the order of the scalar code.
     #[inline(always)]
     fn dot(self, a: [Self::F; 3], b: [Self::F; 3]) -> Self::F {
         self.add(self.add(self.mul(a[0], b[0]), self.mul(a[1], b[1])), self.mul(a[2], b[2]))
@@ -63,14 +76,23 @@ pub(super) trait Wide: Copy {
             self.sub(self.mul(a[0], b[1]), self.mul(a[1], b[0])),
         ]
     }
+
+    /// Distance `t` along a unit `direction` to the foot of the perpendicular from `offset`, both seen from
+    /// the start of the line, and the squared distance from the foot.
+    #[inline(always)]
+    fn perpendicular(self, offset: [Self::F; 3], direction: [Self::F; 3]) -> [Self::F; 2] {
+        let t = self.dot(offset, direction);
+        let across = self.sub3(offset, self.scale3(direction, t));
+        [t, self.dot(across, across)]
+    }
 }
 
-/// What can be done with any kind of [`Wide`].
+/// Work that any kind of [`Wide`] can do.
 pub(super) trait Task {
     fn run(self, wide: impl Wide);
 }
 
-/// Does a task with the best instructions that this processor has.
+/// Runs a task with the best instructions that this processor has.
 #[inline]
 pub(super) fn run(task: impl Task) {
     match Arch::new() {

@@ -1,7 +1,8 @@
-//! Where photons and beams are near a point or a ray.
+//! Look-up structures: photon points and photon beams near a point or a ray.
 //!
-//! Both structures rest on one [packed tree](tree): items are sorted into blocks of eight, blocks into
-//! nodes of eight. The search radius belongs to the query, which widens the boxes that it tests.
+//! Both rest on one [packed tree](tree), items sorted into blocks of eight and blocks into nodes of eight,
+//! and on one [traversal](query). The search radius belongs to the query, which widens the boxes that it
+//! tests.
 
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
 
@@ -10,9 +11,11 @@ mod boxes;
 mod lanes;
 mod point_tree;
 mod query;
+mod region;
 mod segment_tree;
 mod sort;
 mod split;
+mod split_choice;
 mod tree;
 
 pub use approach::{ClosestApproach, PARALLEL_SIN2, Segment, closest_approach};

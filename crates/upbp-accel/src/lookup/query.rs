@@ -1,103 +1,157 @@
-//! What a query tests eight boxes with.
-
-use glam::Vec3;
+//! The traversal that all queries share.
+//!
+//! A query is a [`Region`] that boxes are tested against, and a test of the items in a block. Leaves and
+//! blocks are what misses the cache: both are gathered in lists before they are looked at, so that many are
+//! fetched at the same time.
 
 use super::boxes::Boxes;
-use super::lanes::Wide;
-use crate::ray::Ray;
+use super::lanes::{Task, WIDTH, Wide, run, set_lanes};
+use super::region::Region;
+use super::tree::{MAX_LEVELS, PackedTree};
 
-/// Rounding of the tests on items, as a multiple of the greatest distance in their computation: what an
-/// item's test accepts in single precision, its box must not lose.
-const ROUNDING: f32 = 8.0 * f32::EPSILON;
+/// The greatest number of blocks or leaves that wait to be looked at.
+const WAITING: usize = 24;
 
-/// The lanes whose bit is set.
-#[inline(always)]
-pub(super) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
-        bits &= bits - 1;
-        Some(lane)
-    })
+/// The search of blocks for items. Its methods are compiled into the traversal, for the instruction set at
+/// hand.
+pub(super) trait Query<B> {
+    /// Results of a test of eight items.
+    type Found: Copy + Default;
+
+    /// The items of a block that are wanted, one bit per lane.
+    fn test<W: Wide>(&self, wide: W, block: &B) -> (u32, Self::Found);
+
+    /// Reports a wanted item, with the results of its block.
+    fn report(&mut self, block: &B, found: &Self::Found, lane: usize);
 }
 
-/// A ray with a radius.
-pub(super) struct RayProbe {
-    origin: [f32; 3],
-    inverse: [f32; 3],
-    negative: [bool; 3],
-    t_min: f32,
-    t_max: f32,
-    radius: f32,
-}
-
-impl RayProbe {
-    /// `extent` bounds the distances that the tests on items compute with.
-    pub(super) fn new(ray: &Ray, radius: f32, extent: f32) -> Self {
-        let inverse = ray.direction.recip().to_array();
-        Self {
-            origin: ray.origin.to_array(),
-            inverse,
-            negative: inverse.map(f32::is_sign_negative),
-            t_min: ray.t_min,
-            t_max: ray.t_max,
-            radius: radius * 1.001 + ROUNDING * extent,
+impl<L: Boxes, B> PackedTree<L, B> {
+    /// Reports the wanted items of all blocks whose boxes overlap `region`, in the order of the blocks.
+    #[inline]
+    pub(super) fn search(&self, region: impl Region, query: impl Query<B>) {
+        if !self.nodes.is_empty() {
+            run(Traversal { tree: self, region, query });
         }
     }
+}
 
-    /// The boxes that the ray meets, each widened by the radius.
-    ///
-    /// A zero component of the direction gives infinite distances, or NaN for a plane that holds the origin.
-    /// The comparisons are written so that a NaN does not constrain.
+struct Traversal<'a, L, B, R, Q> {
+    tree: &'a PackedTree<L, B>,
+    region: R,
+    query: Q,
+}
+
+impl<L: Boxes, B, R: Region, Q: Query<B>> Task for Traversal<'_, L, B, R, Q> {
     #[inline(always)]
-    pub(super) fn test<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
-        let mut near = wide.splat(self.t_min);
-        let mut far = wide.splat(self.t_max);
-        for axis in 0..3 {
-            let negative = self.negative[axis];
-            let (enter, exit) = if negative {
-                (boxes.max(wide, axis), boxes.min(wide, axis))
-            } else {
-                (boxes.min(wide, axis), boxes.max(wide, axis))
-            };
-            let outwards = wide.splat(if negative { self.radius } else { -self.radius });
-            let (origin, inverse) = (wide.splat(self.origin[axis]), wide.splat(self.inverse[axis]));
-            let from = wide.mul(wide.add(wide.sub(enter, origin), outwards), inverse);
-            let to = wide.mul(wide.sub(wide.sub(exit, origin), outwards), inverse);
-            near = wide.greater_of(from, near);
-            far = wide.less_of(to, far);
+    fn run(mut self, wide: impl Wide) {
+        // Lanes still to be visited and the first child, per level. So the stack is as high as the tree.
+        let mut stack = [(0_u32, 0_u32); MAX_LEVELS];
+        let (mut level, mut index) = (0, 0);
+        let mut leaves = List::default();
+        loop {
+            let node = &self.tree.nodes[index];
+            let met = self.region.overlaps(wide, &node.boxes) & u32::from(node.existing);
+            if node.over_leaves {
+                leaves.extend(node.first, met);
+                if leaves.is_full() {
+                    self.leaves(wide, &mut leaves);
+                }
+            } else if met != 0 {
+                stack[level] = (met, node.first);
+                level += 1;
+            }
+            while level > 0 && stack[level - 1].0 == 0 {
+                level -= 1;
+            }
+            if level == 0 {
+                return self.leaves(wide, &mut leaves);
+            }
+            let (met, first) = &mut stack[level - 1];
+            index = (*first + met.trailing_zeros()) as usize;
+            *met &= *met - 1;
         }
-        wide.less_equal(near, far)
     }
 }
 
-/// A ball.
-pub(super) struct BallProbe {
-    centre: [f32; 3],
-    radius2: f32,
-}
-
-impl BallProbe {
-    /// For items whose test has no more rounding than that of their box.
-    pub(super) fn exact(centre: Vec3, radius: f32) -> Self {
-        Self { centre: centre.to_array(), radius2: radius * radius }
-    }
-
-    /// For items whose test rounds more; `extent` bounds the distances that it computes with.
-    pub(super) fn widened(centre: Vec3, radius: f32, extent: f32) -> Self {
-        Self::exact(centre, radius * 1.001 + ROUNDING * extent)
-    }
-
-    /// The boxes that overlap the ball.
+impl<L: Boxes, B, R: Region, Q: Query<B>> Traversal<'_, L, B, R, Q> {
     #[inline(always)]
-    pub(super) fn test<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
-        let (mut distance2, zero) = (wide.splat(0.0), wide.splat(0.0));
-        for axis in 0..3 {
-            let centre = wide.splat(self.centre[axis]);
-            let below = wide.sub(boxes.min(wide, axis), centre);
-            let above = wide.sub(centre, boxes.max(wide, axis));
-            let outside = wide.greater_of(wide.greater_of(below, above), zero);
-            distance2 = wide.add(distance2, wide.mul(outside, outside));
+    fn leaves(&mut self, wide: impl Wide, leaves: &mut List) {
+        let mut blocks = List::default();
+        for &leaf in leaves.take() {
+            let met = self.region.overlaps(wide, &self.tree.leaves[leaf as usize]);
+            blocks.extend(leaf * WIDTH as u32, met);
+            if blocks.is_full() {
+                self.blocks(wide, &mut blocks);
+            }
         }
-        wide.less_equal(distance2, wide.splat(self.radius2))
+        self.blocks(wide, &mut blocks);
+    }
+
+    /// Tests all blocks before anything is reported: the tests wait for memory, not for each other.
+    #[inline(always)]
+    fn blocks(&mut self, wide: impl Wide, blocks: &mut List) {
+        let (mut wanted, mut found) = ([0; WAITING], [Q::Found::default(); WAITING]);
+        let (tree, blocks) = (self.tree, blocks.take());
+        for ((wanted, found), &block) in wanted.iter_mut().zip(&mut found).zip(blocks) {
+            (*wanted, *found) = self.query.test(wide, &tree.blocks[block as usize]);
+        }
+        for ((&wanted, found), &block) in wanted.iter().zip(&found).zip(blocks) {
+            let block = &tree.blocks[block as usize];
+            for lane in set_lanes(wanted) {
+                self.query.report(block, found, lane);
+            }
+        }
+    }
+}
+
+/// Blocks or leaves that wait.
+#[derive(Default)]
+struct List {
+    indices: [u32; WAITING],
+    len: usize,
+}
+
+/// The lanes whose bit is set, by the bits.
+const LANES: [[u8; WIDTH]; 256] = {
+    let mut lanes = [[0; WIDTH]; 256];
+    let mut bits = 0;
+    while bits < 256 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < WIDTH {
+            if bits >> lane & 1 == 1 {
+                lanes[bits][count] = lane as u8;
+                count += 1;
+            }
+            lane += 1;
+        }
+        bits += 1;
+    }
+    lanes
+};
+
+impl List {
+    /// Adds the indices from `first` whose bit is set; there has to be room for eight. Has no branch to
+    /// mispredict.
+    #[inline(always)]
+    fn extend(&mut self, first: u32, bits: u32) {
+        let lanes = &LANES[(bits & 0xff) as usize];
+        let room = &mut self.indices[self.len..][..WIDTH];
+        for (to, &lane) in room.iter_mut().zip(lanes) {
+            *to = first + u32::from(lane);
+        }
+        self.len += (bits & 0xff).count_ones() as usize;
+    }
+
+    /// Whether there is no room for eight more.
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        self.len > WAITING - WIDTH
+    }
+
+    /// Empties the list.
+    #[inline(always)]
+    fn take(&mut self) -> &[u32] {
+        let len = std::mem::take(&mut self.len);
+        &self.indices[..len]
     }
 }

@@ -1,24 +1,23 @@
 //! Segments, looked up around a ray (BB1D) or around a point (BP2D).
 
-use std::cell::Cell;
-
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::approach::{ClosestApproach, Segment, closest_approach};
-use super::boxes::{Boxes, Exact};
+use super::boxes::Exact;
 use super::lanes::{WIDTH, Wide};
-use super::query::{BallProbe, RayProbe, lanes};
+use super::query::Query;
+use super::region::{Ball, ThickRay};
 use super::sort::Item;
 use super::split::{Piece, SplitParams, split};
-use super::tree::{PackedTree, Query};
+use super::tree::PackedTree;
 use crate::ray::Ray;
 
-/// Eight pieces; what most of them fail by is in three cache lines. An unused lane is NaN, which no comparison
-/// accepts.
+/// Eight pieces. The data by which most pieces fail is in the first three cache lines. An unused lane is NaN,
+/// which no comparison accepts.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-struct Block {
+pub(super) struct Block {
     origin: [[f32; WIDTH]; 3],
     direction: [[f32; WIDTH]; 3],
     start: [f32; WIDTH],
@@ -55,23 +54,22 @@ impl Block {
     }
 }
 
-/// Segments with a payload each, for look-ups with any radius.
+/// Segments with a payload each, searched with any radius.
 ///
-/// Long segments are split into pieces inside; a hit is reported once all the same. The same segments
-/// give the same tree and the same order of visits, whatever the number of threads.
+/// Long segments are split into pieces inside; each hit is still reported once. The same segments give the
+/// same tree and the same order of visits, whatever the number of threads.
 #[derive(Clone, Debug)]
 pub struct SegmentTree<P> {
-    tree: PackedTree<Exact>,
-    blocks: Vec<Block>,
+    pub(super) tree: PackedTree<Exact, Block>,
     payloads: Vec<P>,
-    /// The greatest distance from a segment to the point that it is measured from.
-    reach: f32,
+    /// The greatest distance of an end from the origin of its segment, scene units.
+    max_distance: f32,
     pieces: usize,
     dropped: usize,
 }
 
 impl<P: Copy + Send + Sync> SegmentTree<P> {
-    /// Builds over segments. Those that are empty or have numbers that are not finite are dropped and
+    /// Builds the tree. Segments that are empty or not finite are dropped and
     /// [counted](SegmentTree::dropped): clip a beam without an end to the scene first.
     ///
     /// # Panics
@@ -95,198 +93,100 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
             let (piece, segment) = piece_of(item);
             bounds(segment, piece)
         };
-        let (tree, blocks) = PackedTree::build(items, bounds, Block::EMPTY, |block, items| {
+        let tree = PackedTree::build(items, bounds, Block::EMPTY, |block, items| {
             for (lane, item) in items.iter().enumerate() {
                 let (piece, segment) = piece_of(item);
                 block.set(lane, piece, segment);
             }
         });
         let ends = segments.iter().flat_map(|(segment, _)| [segment.start, segment.end]);
-        let reach = ends.fold(0.0, |reach: f32, end| reach.max(end.abs()));
+        let max_distance = ends.fold(0.0, |max: f32, end| max.max(end.abs()));
         let payloads = segments.into_iter().map(|(_, payload)| payload).collect();
-        Self { tree, blocks, payloads, reach, pieces: pieces.len(), dropped }
+        Self { tree, payloads, max_distance, pieces: pieces.len(), dropped }
     }
 
     /// Visits every segment that the ray passes within `radius`, see
     /// [`closest_approach`](crate::closest_approach).
     ///
-    /// Among lines that are parallel within rounding, a hit at the very end of the ray's range may be missed.
+    /// If the ray and a segment are parallel within rounding, a hit at the very end of the ray's range may be
+    /// missed.
     pub fn around_ray(&self, ray: &Ray, radius: f32, visit: impl FnMut(P, ClosestApproach)) {
-        if radius.is_nan() || radius <= 0.0 {
-            return;
+        if radius > 0.0 {
+            let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin) + self.max_distance);
+            self.tree.search(region, AroundRay { payloads: &self.payloads, ray: *ray, radius, visit });
         }
-        let probe = RayProbe::new(ray, radius, self.tree.extent_from(ray.origin) + self.reach);
-        self.tree.ask(AroundRay { segments: self, probe, ray: *ray, radius, visit });
     }
 
-    /// Visits every segment nearer than `radius` to `point`, with the distance along the segment, from its
-    /// origin, to the foot of the perpendicular, and the squared distance from it. The foot is in
-    /// `[start, end)`.
-    pub fn around_point(&self, point: Vec3, radius: f32, visit: impl FnMut(P, f32, f32)) {
-        if radius.is_nan() || radius <= 0.0 {
-            return;
-        }
-        let probe = BallProbe::widened(point, radius, self.tree.extent_from(point) + self.reach);
-        self.tree.ask(AroundPoint { segments: self, probe, point, radius2: radius * radius, visit });
-    }
-}
-
-impl SplitParams {
-    /// Of so many segments, one is looked at.
-    const SAMPLED: usize = 16;
-
-    /// Segments that are looked at, at least and at most: fewer tell nothing, more tell nothing new.
-    const SAMPLE: (usize, usize) = (64, 1024);
-
-    /// Rays that ask among them.
-    const RAYS: usize = 128;
-
-    /// The default, or no split where that looks better: among beams through one place, whose pieces lie there together, and
-    /// all the more the fewer they are.
+    /// Visits every segment nearer than `radius` to `point`.
     ///
-    /// Decided by how many boxes and blocks some rays between segments have to look at, with and without a split of a sample;
-    /// depends on nothing but the segments.
-    #[must_use]
-    pub fn choose<P>(segments: &[(Segment, P)]) -> Self {
-        let (least, most) = Self::SAMPLE;
-        let (split, whole) = (Self::default(), Self { pieces_per_segment: 1.0, ..Self::default() });
-        let count = (segments.len() / Self::SAMPLED).min(most);
-        if count < least {
-            return split;
+    /// `visit` gets the payload, the distance along the segment from its origin to the foot of the
+    /// perpendicular, in `[start, end)`, and the squared distance between foot and point, in scene units.
+    pub fn around_point(&self, point: Vec3, radius: f32, visit: impl FnMut(P, f32, f32)) {
+        if radius > 0.0 {
+            let ball = Ball::widened(point, radius, self.tree.extent_from(point) + self.max_distance);
+            let radius2 = radius * radius;
+            self.tree.search(ball, AroundPoint { payloads: &self.payloads, point, radius2, visit });
         }
-        // Scattered: segments may repeat with a period.
-        let scattered =
-            |i: usize, count: usize| ((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % count;
-        let stride = segments.len() / count;
-        let sampled = |i: usize| (segments[i * stride + scattered(i, stride)].0, ());
-        let sample: Vec<_> = (0..count).map(sampled).filter(|(segment, ())| segment.is_usable()).collect();
-        let place = |i: usize| {
-            let segment = sample.get(scattered(i, count))?.0;
-            let part = (scattered(i + 1, 256) as f32 + 0.5) / 256.0;
-            Some(segment.at(segment.start + (segment.end - segment.start) * part))
-        };
-        let ray = |i: usize| {
-            let (a, b) = (place(2 * i)?, place(2 * i + 1)?);
-            Some(Ray::new(a, (b - a).try_normalize()?).with_range(f32::NEG_INFINITY, f32::INFINITY))
-        };
-        let rays: Vec<_> = (0..Self::RAYS).filter_map(ray).collect();
-        let effort = |params| SegmentTree::build(sample.clone(), params).effort(&rays) as f64;
-        // Pieces gain about so much more among more segments, and have to gain so much as they take more memory.
-        let more = (segments.len() as f64 / count as f64).powf(0.1);
-        if effort(whole) * more >= effort(split) * 1.45 { split } else { whole }
     }
 }
 
-/// Counts what is in the way of rays without width.
-struct Effort<'a> {
-    probe: RayProbe,
-    total: &'a Cell<u64>,
-}
-
-impl Query for Effort<'_> {
-    #[inline(always)]
-    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
-        self.total.set(self.total.get() + 1);
-        self.probe.test(wide, boxes)
-    }
-
-    #[inline(always)]
-    fn blocks<W: Wide>(&mut self, _: W, blocks: &[u32]) {
-        self.total.set(self.total.get() + 2 * blocks.len() as u64);
-    }
-}
-
-impl<P> SegmentTree<P> {
-    /// The number of nodes and leaves that rays without width have to look at, and twice that of blocks.
-    fn effort(&self, rays: &[Ray]) -> u64 {
-        let total = Cell::new(0);
-        for ray in rays {
-            self.tree.ask(Effort { probe: RayProbe::new(ray, 0.0, 0.0), total: &total });
-        }
-        total.get()
-    }
-}
-
+/// Segments that a ray passes within a radius.
 struct AroundRay<'a, P, V> {
-    segments: &'a SegmentTree<P>,
-    probe: RayProbe,
+    payloads: &'a [P],
     ray: Ray,
     radius: f32,
     visit: V,
 }
 
-impl<P: Copy, V: FnMut(P, ClosestApproach)> Query for AroundRay<'_, P, V> {
-    #[inline(always)]
-    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
-        self.probe.test(wide, boxes)
-    }
+impl<P: Copy, V: FnMut(P, ClosestApproach)> Query<Block> for AroundRay<'_, P, V> {
+    type Found = ();
 
+    /// Compares the distance between the lines with the radius, without a division. Squares lose the last
+    /// bits, or vanish: this keeps too many lanes rather than too few.
     #[inline(always)]
-    fn blocks<W: Wide>(&mut self, wide: W, blocks: &[u32]) {
-        for &block in blocks {
-            self.block(wide, &self.segments.blocks[block as usize]);
-        }
-    }
-}
-
-impl<P: Copy, V: FnMut(P, ClosestApproach)> AroundRay<'_, P, V> {
-    #[inline(always)]
-    fn block<W: Wide>(&mut self, wide: W, block: &Block) {
+    fn test<W: Wide>(&self, wide: W, block: &Block) -> (u32, ()) {
         let direction = wide.load3(&block.direction);
         let between = wide.sub3(wide.load3(&block.origin), wide.splat3(self.ray.origin.to_array()));
         let normal = wide.cross(wide.splat3(self.ray.direction.to_array()), direction);
         let volume = wide.dot(between, normal);
         let sin2 = wide.dot(normal, normal);
-        // The distance between the lines, without a division. Squares lose the last bits, or vanish; the decision
-        // is made once more below.
         let radius2 = wide.splat(self.radius * self.radius * 1.000_01);
         let limit = wide.add(wide.mul(radius2, sin2), wide.splat(f32::MIN_POSITIVE));
-        let near = wide.less_equal(wide.mul(volume, volume), limit);
-        for lane in lanes(near) {
-            if let Some(approach) = closest_approach(&self.ray, &block.piece(lane), self.radius) {
-                (self.visit)(self.segments.payloads[block.segment[lane] as usize], approach);
-            }
+        (wide.less_equal(wide.mul(volume, volume), limit), ())
+    }
+
+    #[inline(always)]
+    fn report(&mut self, block: &Block, (): &(), lane: usize) {
+        if let Some(approach) = closest_approach(&self.ray, &block.piece(lane), self.radius) {
+            (self.visit)(self.payloads[block.segment[lane] as usize], approach);
         }
     }
 }
 
+/// Segments nearer than a radius to a point; finds distances along them and squared distances from them.
 struct AroundPoint<'a, P, V> {
-    segments: &'a SegmentTree<P>,
-    probe: BallProbe,
+    payloads: &'a [P],
     point: Vec3,
     radius2: f32,
     visit: V,
 }
 
-impl<P: Copy, V: FnMut(P, f32, f32)> Query for AroundPoint<'_, P, V> {
-    #[inline(always)]
-    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
-        self.probe.test(wide, boxes)
-    }
+impl<P: Copy, V: FnMut(P, f32, f32)> Query<Block> for AroundPoint<'_, P, V> {
+    type Found = [[f32; WIDTH]; 2];
 
     #[inline(always)]
-    fn blocks<W: Wide>(&mut self, wide: W, blocks: &[u32]) {
-        for &block in blocks {
-            self.block(wide, &self.segments.blocks[block as usize]);
-        }
-    }
-}
-
-impl<P: Copy, V: FnMut(P, f32, f32)> AroundPoint<'_, P, V> {
-    #[inline(always)]
-    fn block<W: Wide>(&mut self, wide: W, block: &Block) {
-        let direction = wide.load3(&block.direction);
+    fn test<W: Wide>(&self, wide: W, block: &Block) -> (u32, Self::Found) {
         let offset = wide.sub3(wide.splat3(self.point.to_array()), wide.load3(&block.origin));
-        let t = wide.dot(offset, direction);
-        let across = wide.sub3(offset, wide.scale3(direction, t));
-        let distance2 = wide.dot(across, across);
+        let [t, distance2] = wide.perpendicular(offset, wide.load3(&block.direction));
         let inside = wide.less(distance2, wide.splat(self.radius2))
             & wide.less_equal(wide.load(&block.start), t)
             & wide.less(t, wide.load(&block.end));
-        let (t, distance2) = (wide.store(t), wide.store(distance2));
-        for lane in lanes(inside) {
-            (self.visit)(self.segments.payloads[block.segment[lane] as usize], t[lane], distance2[lane]);
-        }
+        (inside, [t, distance2].map(|lanes| wide.store(lanes)))
+    }
+
+    #[inline(always)]
+    fn report(&mut self, block: &Block, [t, distance2]: &Self::Found, lane: usize) {
+        (self.visit)(self.payloads[block.segment[lane] as usize], t[lane], distance2[lane]);
     }
 }
 
@@ -309,7 +209,7 @@ impl<P> SegmentTree<P> {
         self.pieces
     }
 
-    /// The number of segments that were empty or not finite.
+    /// The number of segments that were left out because they were empty or not finite.
     #[must_use]
     pub fn dropped(&self) -> usize {
         self.dropped
@@ -318,13 +218,12 @@ impl<P> SegmentTree<P> {
     /// Memory in use, bytes.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
-        self.tree.memory_bytes()
-            + self.blocks.capacity() * size_of::<Block>()
-            + self.payloads.capacity() * size_of::<P>()
+        self.tree.memory_bytes() + self.payloads.capacity() * size_of::<P>()
     }
 }
 
-/// The box of a piece, rounded outwards: far from the origin the ends are coarser than a radius may be.
+/// The box of a piece, rounded outwards: far from the origin of the scene, ends are coarser than a radius may
+/// be.
 fn bounds(segment: &Segment, piece: Piece) -> (Vec3, Vec3) {
     let at = |s: f32| segment.origin.as_dvec3() + segment.direction.as_dvec3() * f64::from(s);
     let (a, b) = (at(piece.start), at(piece.end));

@@ -1,33 +1,34 @@
 //! The order of items in a tree.
 //!
-//! Items are sorted as by recursive median splits across the widest extent. The upper levels take the medians
-//! of a sample: they put every item into a bucket in one pass, instead of moving all of them once a level. A bucket
-//! fits in the cache of a core and is split at exact medians. Neither depends on the number of threads.
+//! Items are sorted as by recursive median splits across the widest extent. The upper levels use the medians
+//! of a sample: they put every item into a bucket in one pass, instead of moving all items once per level. A
+//! bucket fits in the cache of a core and is split at exact medians. Neither depends on the number of
+//! threads.
 
 use std::cmp::Ordering;
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::lanes::{Task, WIDTH, Wide, run};
+use super::lanes::{TO_WHOLE, Task, WIDTH, Wide, run};
 
-/// Something with a place.
+/// A place with data, before it has its place in a tree.
 pub(super) type Item<T> = (Vec3, T);
 
-/// Buckets are made for about this many items or more.
+/// Items per bucket: between this and eight times as many, but for fewer items than this.
 const BUCKET: usize = 1 << 10;
 
 /// Sampled items per bucket.
 const SAMPLES: usize = 32;
 
-/// Items that are sorted into buckets at once: they stay in the cache of a core.
+/// Items that are sorted into buckets together: they stay in the cache of a core.
 const CHUNK: usize = 1 << 14;
 
 /// Items in the order of their buckets.
 pub(super) struct Buckets<T> {
     /// Runs of items, each sorted by bucket.
     chunks: Vec<Vec<Item<T>>>,
-    /// Where each bucket starts in each chunk, and after the last one the length of the chunk.
+    /// Starts of the buckets in each chunk, followed by the length of the chunk.
     starts: Vec<Vec<u32>>,
     /// The number of items of each bucket.
     pub(super) counts: Vec<usize>,
@@ -58,12 +59,13 @@ impl<T: Copy + Send + Sync> Buckets<T> {
     }
 }
 
-/// Three levels of a k-d tree. Lane `i − 1` is split `i`: its children are `2i` and `2i + 1`, the root is 1. The planes
-/// of a lane are at infinity along all axes but one.
+/// Three levels of a k-d tree. Lane `i − 1` is split `i`: its children are `2i` and `2i + 1`, the root is 1.
+/// The planes of a lane are at infinity along all axes but one.
 #[derive(Clone, Copy)]
 struct Splits([[f32; WIDTH]; 3]);
 
-/// Where splits lead that have the point on their far side, one bit per lane: one to eight.
+/// The child, one to eight, that a point belongs to, by the splits (one bit per lane) whose far side it is
+/// on.
 const CHILDREN: [u8; 256] = {
     let mut children = [0; 256];
     let mut beyond = 0;
@@ -131,7 +133,7 @@ impl Splitters {
             sum += *start;
             *start = sum;
         }
-        // Places in a chunk are moved, instead of items, as long as there is something to move them to.
+        // Indices are sorted instead of items, which are larger; each item is then copied once.
         let mut order = vec![0_u16; chunk.len()];
         for (index, &bucket) in buckets.iter().enumerate().rev() {
             let start = &mut starts[bucket as usize];
@@ -142,7 +144,7 @@ impl Splitters {
     }
 }
 
-/// Finds the buckets of items, and counts how many each has.
+/// Finds the buckets of items, and counts the items of each bucket.
 struct Descent<'a, T> {
     splitters: &'a Splitters,
     items: &'a [Item<T>],
@@ -153,7 +155,7 @@ struct Descent<'a, T> {
 impl<T> Task for Descent<'_, T> {
     #[inline(always)]
     fn run(self, wide: impl Wide) {
-        /// Each has to wait for its memory.
+        /// Items that descend together: each has to wait for its memory.
         const TOGETHER: usize = 16;
         let nodes = &self.splitters.nodes[..];
         for (buckets, items) in self.buckets.chunks_mut(TOGETHER).zip(self.items.chunks(TOGETHER)) {
@@ -176,7 +178,7 @@ impl<T> Task for Descent<'_, T> {
     }
 }
 
-/// Sorts items so that every run of `capacity` of them is compact.
+/// Sorts items so that every run of `capacity` items is compact.
 pub(super) fn split<T: Copy + Send>(items: &mut [Item<T>], capacity: usize) {
     let parts = items.len().div_ceil(capacity);
     if parts <= 1 {
@@ -190,7 +192,7 @@ pub(super) fn split<T: Copy + Send>(items: &mut [Item<T>], capacity: usize) {
     }
     let middle = parts.div_ceil(2) * capacity;
     select(items, axis, middle);
-    // A bucket of many items that are all but the same need not be left to one thread.
+    // A bucket has this many items only if they are all but the same: one thread need not do it alone.
     let parallel = items.len() > CHUNK;
     let (left, right) = items.split_at_mut(middle);
     if parallel {
@@ -224,7 +226,7 @@ impl<T: Copy> Task for SplitFew<'_, T> {
     }
 }
 
-/// Where items were and where they are now.
+/// Items that were copied `from` one place `to` another: each serves as the space of the next copy.
 struct Moved<'a, T> {
     from: &'a mut [Item<T>],
     to: &'a mut [Item<T>],
@@ -238,15 +240,14 @@ impl<T> Moved<'_, T> {
     }
 }
 
-/// Splits up to `N` items, at most 64, as [`split`] does into runs of eight, by counting for each how many come before:
-/// there is nothing to mispredict. Items nearer than 2⁻²³ of the extent keep their order.
+/// Splits up to `N` items, at most 64, as [`split`] does into runs of eight. The place of an item is the
+/// number of items before it: the count has no branch to mispredict. Items nearer than 2⁻²³ of the extent
+/// keep their order.
 #[inline(always)]
 fn halves<'a, const N: usize, T: Copy>(
     items: &'a mut [Item<T>],
     sorted: &'a mut [Item<T>],
 ) -> [Moved<'a, T>; 2] {
-    /// Between this and twice as much, numbers have a distance of one, and their last bits count from here.
-    const WHOLE: f32 = (1 << 23) as f32;
     let parts = items.len().div_ceil(WIDTH);
     let middle = parts.div_ceil(2) * WIDTH;
     if parts <= 1 {
@@ -256,7 +257,7 @@ fn halves<'a, const N: usize, T: Copy>(
     }
     let (min, max) = corners(items);
     let axis = (max - min).max_position();
-    let scale = WHOLE / (max[axis] - min[axis]);
+    let scale = TO_WHOLE / (max[axis] - min[axis]);
     let mut places = [0.0; N];
     for (place, item) in places.iter_mut().zip(&*items) {
         *place = item.0[axis];
@@ -264,9 +265,9 @@ fn halves<'a, const N: usize, T: Copy>(
     let mut keys = [0; N];
     for (index, (key, place)) in keys.iter_mut().zip(&places).enumerate() {
         let place = (place - min[axis]) * scale;
-        // In range even if the difference or the scale is not.
-        let place = if place < WHOLE - 1.0 { place } else { WHOLE - 1.0 };
-        *key = ((place + WHOLE).to_bits() << 8 >> 2 | u32::from(index as u8)).cast_signed();
+        // In range even if the difference or the scale is infinite or NaN.
+        let place = if place < TO_WHOLE - 1.0 { place } else { TO_WHOLE - 1.0 };
+        *key = ((place + TO_WHOLE).to_bits() << 8 >> 2 | u32::from(index as u8)).cast_signed();
     }
     let mut ranks = [0_i32; N];
     for &other in &keys[..items.len()] {
@@ -294,7 +295,7 @@ fn select<T>(items: &mut [Item<T>], axis: usize, middle: usize) {
     }
 }
 
-/// The corners of the box around items. Several boxes grow by turns, none waits for the last item.
+/// The corners of the box around items. Four boxes grow in turn, so that none waits for the item before.
 #[inline(always)]
 fn corners<T>(items: &[Item<T>]) -> (Vec3, Vec3) {
     const BY_TURNS: usize = 4;

@@ -1,44 +1,34 @@
 //! The tree under both look-up structures.
 //!
-//! [Sorted](super::sort) items are packed eight to a block, and blocks and nodes eight to a node. The nodes
-//! above the blocks, the leaves, are the many; their place says where their blocks are. They and the blocks are what
-//! misses the cache. So both are gathered in lists before they are looked at: many are fetched at the same time.
+//! [Sorted](super::sort) items are packed eight to a block, and blocks and nodes eight to a node. Most nodes
+//! are leaves, the nodes above blocks: a leaf's place says where its blocks are, so that it has nothing but
+//! boxes.
 
 use glam::Vec3;
 use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
 use super::boxes::{Bounds, Boxes, Exact, union};
-use super::lanes::{Task, WIDTH, Wide, run};
+use super::lanes::WIDTH;
 use super::sort::{Buckets, Item, split, split_few};
 
 /// Items of a leaf, of all its blocks.
 const LEAF: usize = WIDTH * WIDTH;
 
-/// Levels that 2³² items can have above the leaves: nine if all are in one bucket, and as many above the buckets.
-const MAX_LEVELS: usize = 18;
-
-/// The greatest number of blocks or leaves that wait to be looked at.
-pub(super) const WAITING: usize = 24;
-
-/// What a traversal asks. Its methods are compiled into the traversal, for the instruction set of that.
-pub(super) trait Query {
-    /// The boxes that may hold what is looked for, one bit per lane.
-    fn boxes<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32;
-
-    /// Looks at the items of up to [`WAITING`] blocks.
-    fn blocks<W: Wide>(&mut self, wide: W, blocks: &[u32]);
-}
+/// Levels that 2³² items can have above the leaves: nine if all are in one bucket, and nine above the
+/// buckets.
+pub(super) const MAX_LEVELS: usize = 18;
 
 /// A node above other nodes.
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    boxes: Exact,
+pub(super) struct Node {
+    pub(super) boxes: Exact,
     /// The first child; the others follow.
-    first: u32,
+    pub(super) first: u32,
     /// One bit for each child.
-    existing: u8,
-    over_leaves: bool,
+    pub(super) existing: u8,
+    /// Whether the children are leaves.
+    pub(super) over_leaves: bool,
 }
 
 impl Node {
@@ -48,30 +38,28 @@ impl Node {
     }
 }
 
-/// A hierarchy over blocks of eight items, with leaves of a kind of boxes.
+/// A hierarchy over blocks `B` of eight items, with leaves of a kind of boxes `L`.
 #[derive(Clone, Debug)]
-pub(super) struct PackedTree<L> {
+pub(super) struct PackedTree<L, B> {
     /// The root first.
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
     /// The blocks of a leaf start at eight times its place.
-    leaves: Vec<L>,
+    pub(super) leaves: Vec<L>,
+    pub(super) blocks: Vec<B>,
     bounds: Bounds,
 }
 
-impl<L: Boxes> PackedTree<L> {
-    /// A tree over nothing.
-    pub(super) const EMPTY: Self =
-        Self { nodes: Vec::new(), leaves: Vec::new(), bounds: (Vec3::ZERO, Vec3::ZERO) };
-
-    /// Builds over items at finite places with the given finite bounds, and packs up to eight items at a time
-    /// into an `empty` block; the leaves that are not full have some that stay empty. Items are let go as soon as they are
-    /// sorted into buckets, before there are blocks.
-    pub(super) fn build<T: Copy + Send + Sync, B: Copy + Send + Sync>(
+impl<L: Boxes, B: Copy + Send + Sync> PackedTree<L, B> {
+    /// Builds over items at finite places with finite `bounds`.
+    ///
+    /// `fill` packs up to eight items into an `empty` block; leaves that are not full have blocks that stay
+    /// empty. Items are dropped as soon as they are sorted into buckets, before there are blocks.
+    pub(super) fn build<T: Copy + Send + Sync>(
         items: Vec<Item<T>>,
         bounds: impl Fn(&Item<T>) -> Bounds + Sync,
         empty: B,
         fill: impl Fn(&mut B, &[Item<T>]) + Sync,
-    ) -> (Self, Vec<B>) {
+    ) -> Self {
         assert!(u32::try_from(items.len()).is_ok(), "{} items are more than can be indexed", items.len());
         let buckets = Buckets::new(items);
         let leaves = || buckets.counts.iter().map(|count| count.div_ceil(LEAF));
@@ -96,11 +84,11 @@ impl<L: Boxes> PackedTree<L> {
         });
         let branches: Vec<_> = branches.collect();
         drop(buckets);
-        (Self::join(&branches), blocks)
+        Self::join(&branches, blocks)
     }
 
     /// Puts branches under common nodes, eight at a time.
-    fn join(branches: &[Branch<L>]) -> Self {
+    fn join(branches: &[Branch<L>], blocks: Vec<B>) -> Self {
         // The levels above the branches, from the root down.
         let mut levels = vec![branches.iter().map(|branch| branch.bounds).collect::<Vec<_>>()];
         while levels[0].len() > 1 {
@@ -133,127 +121,25 @@ impl<L: Boxes> PackedTree<L> {
             nodes.extend(branch.nodes[1..].iter().map(|node| moved(node, start)));
         }
         let leaves = branches.iter().map(|branch| &branch.leaves[..]).collect::<Vec<_>>().concat();
-        Self { nodes, leaves, bounds: levels[0].first().copied().unwrap_or_default() }
+        Self { nodes, leaves, blocks, bounds: levels[0].first().copied().unwrap_or_default() }
     }
+}
 
-    /// The greatest sum of coordinate differences between `point` and anything in the tree.
+impl<L, B> PackedTree<L, B> {
+    /// A tree over nothing.
+    pub(super) const EMPTY: Self =
+        Self { nodes: Vec::new(), leaves: Vec::new(), blocks: Vec::new(), bounds: (Vec3::ZERO, Vec3::ZERO) };
+
+    /// The greatest sum of coordinate differences between `point` and anything in the tree, scene units.
     pub(super) fn extent_from(&self, point: Vec3) -> f32 {
         (self.bounds.0 - point).abs().max((self.bounds.1 - point).abs()).element_sum()
     }
 
+    /// Memory in use, bytes.
     pub(super) fn memory_bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<Node>() + self.leaves.capacity() * size_of::<L>()
-    }
-
-    /// Asks `query` about every block under the boxes that it accepts, in the order of the blocks.
-    #[inline]
-    pub(super) fn ask(&self, query: impl Query) {
-        if !self.nodes.is_empty() {
-            run(Traversal { tree: self, query });
-        }
-    }
-}
-
-struct Traversal<'a, L, Q> {
-    tree: &'a PackedTree<L>,
-    query: Q,
-}
-
-impl<L: Boxes, Q: Query> Task for Traversal<'_, L, Q> {
-    #[inline(always)]
-    fn run(mut self, wide: impl Wide) {
-        // Lanes still to be visited and the first child, per level. So the stack is as high as the tree.
-        let mut stack = [(0_u32, 0_u32); MAX_LEVELS];
-        let (mut level, mut index) = (0, 0);
-        let mut leaves = List::default();
-        loop {
-            let node = &self.tree.nodes[index];
-            let met = self.query.boxes(wide, &node.boxes) & u32::from(node.existing);
-            if node.over_leaves {
-                leaves.extend(node.first, met);
-                if leaves.is_full() {
-                    self.leaves(wide, &mut leaves);
-                }
-            } else if met != 0 {
-                stack[level] = (met, node.first);
-                level += 1;
-            }
-            while level > 0 && stack[level - 1].0 == 0 {
-                level -= 1;
-            }
-            if level == 0 {
-                return self.leaves(wide, &mut leaves);
-            }
-            let (met, first) = &mut stack[level - 1];
-            index = (*first + met.trailing_zeros()) as usize;
-            *met &= *met - 1;
-        }
-    }
-}
-
-impl<L: Boxes, Q: Query> Traversal<'_, L, Q> {
-    #[inline(always)]
-    fn leaves(&mut self, wide: impl Wide, leaves: &mut List) {
-        let mut blocks = List::default();
-        for &leaf in leaves.take() {
-            let met = self.query.boxes(wide, &self.tree.leaves[leaf as usize]);
-            blocks.extend(leaf * WIDTH as u32, met);
-            if blocks.is_full() {
-                self.query.blocks(wide, blocks.take());
-            }
-        }
-        self.query.blocks(wide, blocks.take());
-    }
-}
-
-/// Blocks or leaves that wait.
-#[derive(Default)]
-struct List {
-    indices: [u32; WAITING],
-    len: usize,
-}
-
-/// The lanes whose bit is set, by the bits.
-const LANES: [[u8; WIDTH]; 256] = {
-    let mut lanes = [[0; WIDTH]; 256];
-    let mut bits = 0;
-    while bits < 256 {
-        let (mut lane, mut count) = (0, 0);
-        while lane < WIDTH {
-            if bits >> lane & 1 == 1 {
-                lanes[bits][count] = lane as u8;
-                count += 1;
-            }
-            lane += 1;
-        }
-        bits += 1;
-    }
-    lanes
-};
-
-impl List {
-    /// Adds those after `first` whose bit is set; there has to be room for all. Nothing can be mispredicted.
-    #[inline(always)]
-    fn extend(&mut self, first: u32, bits: u32) {
-        let lanes = &LANES[(bits & 0xff) as usize];
-        let room = &mut self.indices[self.len..][..WIDTH];
-        for (to, &lane) in room.iter_mut().zip(lanes) {
-            *to = first + u32::from(lane);
-        }
-        self.len += (bits & 0xff).count_ones() as usize;
-    }
-
-    /// Whether not all lanes of another node have room.
-    #[inline(always)]
-    fn is_full(&self) -> bool {
-        self.len > WAITING - WIDTH
-    }
-
-    /// Empties the list.
-    #[inline(always)]
-    fn take(&mut self) -> &[u32] {
-        let len = std::mem::take(&mut self.len);
-        &self.indices[..len]
+        self.nodes.capacity() * size_of::<Node>()
+            + self.leaves.capacity() * size_of::<L>()
+            + self.blocks.capacity() * size_of::<B>()
     }
 }
 

@@ -47,7 +47,7 @@ impl Random {
     }
 }
 
-/// How positions are spread.
+/// Distributions of positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Spread {
     Uniform,
