@@ -1,4 +1,4 @@
-//! What a constructor of this crate refuses.
+//! The error of constructors.
 
 use crate::Spectrum;
 
@@ -48,7 +48,7 @@ pub enum MediaError {
     Empty {
         /// The list, as the documentation names it.
         what: &'static str,
-        /// What it must hold, in words.
+        /// The required contents, in words.
         expected: &'static str,
     },
 }

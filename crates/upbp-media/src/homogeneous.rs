@@ -1,9 +1,9 @@
-//! The same coefficients everywhere.
+//! The homogeneous medium: coefficients that are the same everywhere.
 //!
-//! Distances are drawn from a mixture of the channels' exponentials, anew on every segment:
-//! `S = Σ α_c e^{−σ_c ℓ}`, `p = Σ α_c σ_c e^{−σ_c ℓ}`. The estimate divides by the mixture, so that the
-//! throughput of a segment never exceeds `1/α_c`, whatever the ratio of the channels. The probabilities `α` are
-//! those of `mixture.rs`. A purely absorbing medium is passed with probability one.
+//! Distances are drawn from a mixture of the channels' exponentials, anew on every segment: `S = Σ α_c
+//! e^{−σ_c ℓ}`, `p = Σ α_c σ_c e^{−σ_c ℓ}`. The estimate divides by the mixture, so that the throughput of a
+//! segment never exceeds `1/α_c`, whatever the ratio of the channels. The probabilities `α` are those of
+//! `mixture.rs`. A purely absorbing medium is passed with probability one.
 //!
 //! Source: `docs/theory.md`, section 1.4, policy B. Oracles: quadrature and
 //! `tests::grey_equals_the_mixture_of_three_equal_channels`.
@@ -21,7 +21,7 @@ const MIN_CONTINUATION: f32 = 0.01;
 /// Distance between neighbouring random numbers: 2⁻²⁴.
 const LAST_BIT: f64 = 1.0 / 16_777_216.0;
 
-/// How distances are drawn; follows from the coefficients.
+/// The distribution of distances, which follows from the coefficients.
 #[derive(Copy, Clone, Debug, PartialEq)]
 enum Sampling {
     /// No channel scatters: walks always pass.
@@ -63,8 +63,8 @@ impl Homogeneous {
         Ok(Self { sigma_a, sigma_s, sigma_t, emission: Spectrum::ZERO, phase, sampling })
     }
 
-    /// The same medium glowing with radiance `L_e`, in W m⁻² sr⁻¹: the source term per length is
-    /// `σ_a L_e`, and an opaque stretch without scattering shows `L_e`.
+    /// Makes the medium glow with radiance `L_e`, in W m⁻² sr⁻¹: the source term per length is `σ_a L_e`, and an
+    /// opaque stretch without scattering shows `L_e`.
     ///
     /// A channel without absorption does not glow.
     ///
@@ -101,14 +101,14 @@ impl Homogeneous {
     }
 }
 
-/// Length as the exponentials take it: an infinite one becomes the largest number, so that a channel
-/// without extinction passes it (0 · ∞ is not a number).
+/// The length of a segment in scene units, at most the largest number: an infinite length times an extinction of
+/// zero would not be a number.
 #[inline]
 fn finite_length(segment: &RaySegment) -> f64 {
     segment.length_f64().min(f64::MAX)
 }
 
-/// `e^{−σ ℓ}` per channel. In double precision: an edge multiplies many of them.
+/// Transmittance `e^{−σ ℓ}` per channel, in double precision: an edge multiplies the factors of all its segments.
 #[inline]
 fn attenuation(sigma: Spectrum, length: f64) -> [f64; 3] {
     sigma.to_array().map(|sigma| (-f64::from(sigma) * length).exp())
@@ -119,30 +119,24 @@ fn to_spectrum(channels: [f64; 3]) -> Spectrum {
     Spectrum::from_array(channels.map(|value| value as f32))
 }
 
-/// One exponential with extinction `sigma`.
+/// The densities of one exponential with extinction `sigma`.
 #[inline]
 fn grey_density(sigma: f64, length: f64) -> SegmentDensity {
-    let reach = (-sigma * length).exp();
-    let stop = sigma * reach;
-    SegmentDensity {
-        transmittance: Spectrum::splat(reach as f32),
-        reach,
-        stop_at_end: stop,
-        stop_at_start: stop,
-    }
+    let passes = (-sigma * length).exp();
+    SegmentDensity::symmetric(Spectrum::splat(passes as f32), passes, sigma * passes)
 }
 
-/// The mixture of three exponentials.
+/// The densities of a mixture of three exponentials.
 #[inline]
 fn chromatic_density(alpha: &[f64; 3], sigma: Spectrum, length: f64) -> SegmentDensity {
     let channels = attenuation(sigma, length);
-    let (mut reach, mut stop) = (0.0, 0.0);
+    let (mut passes, mut stops) = (0.0, 0.0);
     for c in 0..3 {
         let share = alpha[c] * channels[c];
-        reach += share;
-        stop += share * f64::from(sigma[c]);
+        passes += share;
+        stops += share * f64::from(sigma[c]);
     }
-    SegmentDensity { transmittance: to_spectrum(channels), reach, stop_at_end: stop, stop_at_start: stop }
+    SegmentDensity::symmetric(to_spectrum(channels), passes, stops)
 }
 
 impl Medium for Homogeneous {
@@ -164,7 +158,7 @@ impl Medium for Homogeneous {
     #[inline]
     fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32> {
         let u_channel = f64::from(u_channel);
-        // The extinction, and what the choice of it leaves of the random number, again in [0, 1).
+        // The extinction of the drawn channel, and the rest of the random number, again in [0, 1).
         let (sigma, rest) = match self.sampling {
             Sampling::Never => return None,
             Sampling::Grey => (self.sigma_t.r(), u_channel),
@@ -178,8 +172,8 @@ impl Medium for Homogeneous {
                 }
             }
         };
-        // Random numbers are multiples of 2⁻²⁴: in a medium of optical thickness 10⁻⁸, the smallest of them alone would make
-        // six times as many collisions as there are. The rest goes below their last bit.
+        // Random numbers are multiples of 2⁻²⁴: in a medium of optical thickness 10⁻⁸, zero alone would make six
+        // times the right number of collisions. The rest goes below the last bit.
         let u_distance = f64::from(u_distance) + rest * LAST_BIT;
         // 1 − u is in (0, 1], so that the logarithm is finite. A channel without extinction gives ∞, or 0/0
         // for u = 0: both fail the comparison and pass.

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 
-/// A participating medium: what a stretch of it does to light, and how walks through it are sampled.
+/// A participating medium: transmittance, emission and sampled distances along stretches of rays.
 ///
 /// The densities that [`segment`](Self::segment) reports are those of
 /// [`sample_distance`](Self::sample_distance), whichever channel was drawn and whichever way the walk
@@ -14,9 +14,9 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 /// - neither depends on the throughput of the path, since the density must be computable from the other
 ///   end as well.
 ///
-/// The transmittance of a segment is the product over its pieces, its reach need not be: a mixture of
-/// channels draws anew on each piece. A density is therefore that of a walk only if it is computed from the
-/// segments that the walk took, cut where the walk cut them.
+/// The transmittance of a segment is the product over its pieces; its probability to pass need not be, since a
+/// mixture of channels draws anew on each piece. A density is therefore that of a walk only if it is computed from
+/// the segments that the walk took, cut where the walk cut them.
 ///
 /// A medium that does not scatter is never sampled: its segments are passed with probability one and
 /// only attenuate. Coefficients and densities per length are in inverse scene units. Methods are called
@@ -32,20 +32,21 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 ///
 /// Source: `docs/theory.md`, sections 1.3 and 1.4.
 pub trait Medium: Send + Sync {
-    /// Whether light can be scattered in this medium. If not, no walk ever stops in it.
+    /// Whether the medium scatters light. If not, no walk ever stops in it.
     fn scatters(&self) -> bool;
 
-    /// Transmittance and densities of one segment.
+    /// Transmittance of one segment, and the densities of walks to pass it or to stop at its ends.
     fn segment(&self, segment: &RaySegment) -> SegmentDensity;
 
-    /// Distance from the ray's origin, in `[start, end)`, at which a walk from start to end stops; `None`
-    /// if it passes the segment.
+    /// Draws the distance from the ray's origin, in scene units and in `[start, end)`, at which a walk from start to
+    /// end stops; `None` if it passes the segment.
     ///
     /// `u_channel` and `u_distance` are uniform in `[0, 1)`. With `u_distance = 0` a walk may stop
     /// exactly at the start.
     ///
-    /// The end may be infinite, even in a medium that fills a finite body: the walks ask before they know where the body
-    /// ends. Up to rounding the distance must not depend on the end, but for the `None` of one that is not reached.
+    /// The end may be infinite, even in a medium that fills a finite body: the walks ask before they know
+    /// where the body ends. Up to rounding the distance must not depend on the end, but for the `None` of one
+    /// that is not reached.
     fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32>;
 
     /// Scattering coefficient at `position`, in inverse scene units.
@@ -62,7 +63,7 @@ pub trait Medium: Send + Sync {
         false
     }
 
-    /// Radiance that the segment sends from its inside back to `start`: `∫ T(start, t) σ_a L_e dt`, in
+    /// Radiance that the medium inside the segment emits towards `start`: `∫ T(start, t) σ_a L_e dt`, in
     /// W m⁻² sr⁻¹.
     fn emitted(&self, segment: &RaySegment) -> Spectrum {
         let _ = segment;
@@ -74,7 +75,7 @@ pub trait Medium: Send + Sync {
     /// Depends on the position alone, so that both directions of walking agree on it.
     fn continuation(&self, position: Vec3) -> f32;
 
-    /// One over the mean extinction, in scene units; infinite if there is none. A figure for heuristics:
-    /// it decides how much techniques count, not what they find on average.
+    /// One over the mean extinction, in scene units; infinite without extinction. For heuristics: it steers the
+    /// weights of techniques, never their sum.
     fn mean_free_path(&self) -> f32;
 }

@@ -1,24 +1,25 @@
-//! With which probability each colour channel chooses the distance in a chromatic medium.
+//! Probabilities with which the colour channels choose the distance in a chromatic medium.
 //!
-//! Under the per-segment mixture (`docs/theory.md`, section 1.4, policy B) every collision multiplies the throughput of channel
-//! `c` by `σ_s,c e^{−σ_c t} / p(t)`. Its second moment `M_c = ∫ (σ_s,c e^{−σ_c t})² / p dt` is the factor by which the variance of
-//! that channel grows from collision to collision, so the probabilities that make the largest `M_c` as small as
-//! possible suit long paths best. They are a function of the medium only, which lets the other walk compute them too.
+//! Under the per-segment mixture (`docs/theory.md`, section 1.4, policy B) every collision multiplies the
+//! throughput of channel `c` by `σ_s,c e^{−σ_c t} / p(t)`. Its second moment `M_c = ∫ (σ_s,c e^{−σ_c t})² / p
+//! dt` is the factor by which the variance of that channel grows from collision to collision, so the
+//! probabilities that make the largest `M_c` as small as possible suit long paths best. They are a function
+//! of the medium only, which lets the other walk compute them too.
 
 use crate::Spectrum;
 
-/// No channel is chosen much less often: its throughput on passing a segment is bounded by the inverse.
+/// Least probability of a channel, before normalisation: its inverse bounds the throughput of a passed segment.
 const FLOOR: f64 = 0.05;
 
-/// Points of the quadrature.
+/// Points of the quadrature over distances.
 const POINTS: u32 = 256;
 
-/// The probabilities of the channels; they sum to one.
+/// The probabilities of the channels, which sum to one, from the coefficients in inverse scene units.
 pub(crate) fn channel_probabilities(sigma_s: Spectrum, sigma_t: Spectrum) -> [f64; 3] {
     let mut alpha = [1.0 / 3.0; 3];
     for _ in 0..64 {
-        // A channel whose variance grows faster than others gets more of the samples: the fixed point has equal growth
-        // in all channels that are above the floor.
+        // A channel whose variance grows faster than others gets more of the samples: the fixed point has
+        // equal growth in all channels that are above the floor.
         let growth: [f64; 3] = std::array::from_fn(|c| growth(c, &alpha, sigma_s, sigma_t));
         let raised: [f64; 3] = std::array::from_fn(|c| alpha[c] * growth[c].sqrt());
         let sum: f64 = raised.iter().sum();
@@ -35,7 +36,7 @@ pub(crate) fn channel_probabilities(sigma_s: Spectrum, sigma_t: Spectrum) -> [f6
     [r, g, 1.0 - r - g]
 }
 
-/// `M_c`, with the distance substituted by `u = 1 − e^{−σ_c t}`.
+/// The second moment `M_c` of a channel, with the distance substituted by `u = 1 − e^{−σ_c t}`.
 fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum) -> f64 {
     let sigma = f64::from(sigma_t[channel]);
     let scattering = f64::from(sigma_s[channel]);

@@ -1,4 +1,4 @@
-//! Which bodies a point is inside of, and which medium that makes.
+//! The bodies that a point is inside of, and the medium that counts there.
 //!
 //! Bodies may overlap: a marble in a glass of milk, a glass whose water reaches into its wall. Where they
 //! do, the one with the highest priority wins, and among equals the one entered last. Every sub-path
@@ -7,11 +7,11 @@
 //! Source: `docs/theory.md`, section 1.7; priorities after Schmidt and Budge, "Simple Nested
 //! Dielectrics in Ray Traced Images", JGT 7(2), 2002.
 
-/// Number of a medium in its scene, below `u32::MAX`.
+/// Index of a medium in its scene, below `u32::MAX`.
 #[derive(Copy, Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MediumId(pub u32);
 
-/// Number of a closed body in its scene.
+/// Index of a closed body in its scene.
 #[derive(Copy, Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BodyId(pub u32);
 
@@ -20,15 +20,15 @@ pub struct BodyId(pub u32);
 pub struct Interior {
     /// The body.
     pub body: BodyId,
-    /// What fills it; `None` for vacuum.
+    /// The medium that fills the body; `None` for vacuum.
     pub medium: Option<MediumId>,
-    /// Which of several bodies counts where they overlap: the highest, among equals the last entered.
+    /// Rank where bodies overlap: the body of the highest priority counts, among equals the last entered.
     pub priority: i32,
     /// Index of refraction, relative to vacuum.
     pub ior: f32,
 }
 
-/// What became of crossing a boundary.
+/// The outcome of crossing a boundary.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum Crossing {
@@ -79,7 +79,7 @@ impl Entry {
 
 /// The bodies that a point is inside of, by ascending priority, among equals in order of entering.
 ///
-/// Any number of them. Rays that look ahead walk a copy: that of a few bodies takes a few vector instructions.
+/// The list has no limit. Rays that look ahead walk a copy: that of a few bodies takes a few vector instructions.
 pub struct MediumStack {
     /// The first `few` entries are in use, unless there are more bodies than entries.
     bodies: [Entry; Self::FEW],
@@ -90,10 +90,10 @@ pub struct MediumStack {
 }
 
 impl MediumStack {
-    /// So many bodies need no memory of their own.
+    /// Number of bodies that are stored without an allocation.
     const FEW: usize = 6;
 
-    /// A point outside all bodies, in the medium around everything (`None` for vacuum), of index 1.
+    /// The list of a point outside all bodies, in the medium `outside` (`None` for vacuum), of refractive index 1.
     #[inline]
     #[must_use]
     pub const fn new(outside: Option<MediumId>) -> Self {
@@ -112,7 +112,7 @@ impl MediumStack {
         self.entries().iter().map(|entry| entry.interior())
     }
 
-    /// The body that counts; `None` outside all bodies.
+    /// The body of the highest priority, whose medium counts; `None` outside all bodies.
     #[inline]
     #[must_use]
     pub fn top(&self) -> Option<Interior> {
@@ -133,21 +133,21 @@ impl MediumStack {
         self.entries().last().map_or(1.0, |entry| entry.ior)
     }
 
-    /// Priority of the body that counts; `i32::MIN` outside all bodies.
+    /// Priority of the topmost body; `i32::MIN` outside all bodies.
     #[inline]
     #[must_use]
     pub fn priority(&self) -> i32 {
         self.entries().last().map_or(i32::MIN, |entry| entry.priority)
     }
 
-    /// Whether the point is inside of `body`, whether or not it is the one that counts.
+    /// Whether the point is inside of `body`, on top or hidden.
     #[inline]
     #[must_use]
     pub fn contains(&self, body: BodyId) -> bool {
         self.entries().iter().any(|entry| entry.body == body)
     }
 
-    /// How many bodies the point is inside of.
+    /// The number of bodies that the point is inside of.
     #[inline]
     #[must_use]
     pub fn len(&self) -> usize {
@@ -161,7 +161,7 @@ impl MediumStack {
         self.entries().is_empty()
     }
 
-    /// Goes into a body: above all others of at most its priority.
+    /// Enters a body, above all others of at most its priority.
     #[inline]
     pub fn enter(&mut self, interior: Interior) -> Crossing {
         if self.contains(interior.body) {
@@ -184,7 +184,7 @@ impl MediumStack {
         Crossing::Done
     }
 
-    /// Goes out of a body, wherever in the list it is.
+    /// Leaves a body, wherever in the list it is.
     #[inline]
     pub fn leave(&mut self, body: BodyId) -> Crossing {
         let len = self.len();
@@ -212,7 +212,7 @@ impl MediumStack {
 }
 
 impl Clone for MediumStack {
-    /// Copies of a few bodies do not call anything.
+    /// Copies a few bodies without a call.
     #[inline]
     fn clone(&self) -> Self {
         let many = if self.many.is_empty() { Vec::new() } else { self.many.clone() };
@@ -229,7 +229,7 @@ impl Clone for MediumStack {
 }
 
 impl PartialEq for MediumStack {
-    /// The same bodies in the same order around the same outside; what unused slots hold is no matter.
+    /// Compares the bodies, their order and the medium outside; unused slots do not matter.
     fn eq(&self, other: &Self) -> bool {
         self.outside == other.outside && self.bodies().eq(other.bodies())
     }

@@ -1,4 +1,4 @@
-//! Stretches of a ray inside one medium, and what an edge accumulates from them.
+//! Stretches of a ray inside one medium, and the densities that an edge accumulates over its stretches.
 //!
 //! A walk that leaves a vertex passes segments until it stops inside one of them or reaches a surface.
 //! The combination of techniques asks for the density of that event in both directions of walking; both
@@ -17,7 +17,8 @@ pub struct RaySegment {
     pub origin: Vec3,
     /// Direction of the ray, a unit vector.
     pub direction: Vec3,
-    /// Distance from `origin` at which the segment begins, in scene units; −∞ for light that has come from infinity.
+    /// Distance from `origin` at which the segment begins, in scene units; −∞ for light that has come from
+    /// infinity.
     pub start: f32,
     /// Distance from `origin` at which the segment ends, in scene units; may be infinite.
     pub end: f32,
@@ -48,18 +49,18 @@ impl RaySegment {
     }
 }
 
-/// What one medium says of one segment, in both directions of walking.
+/// Transmittance and sampling densities of one segment, for both directions of walking.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub struct SegmentDensity {
     /// Transmittance `T` of the segment per channel, in `[0, 1]`.
     pub transmittance: Spectrum,
     /// Probability `S(ℓ)` that a walk passes the segment, in `[0, 1]`. The same in both directions.
     pub reach: f64,
-    /// Density per length of a walk from start to end to stop exactly at the end; zero in a medium that
-    /// does not scatter.
+    /// Density, per length, that a walk from start to end stops exactly at the end; zero in a medium that does not
+    /// scatter.
     pub stop_at_end: f64,
-    /// Density per length of a walk from end to start to stop exactly at the start; zero in a medium
-    /// that does not scatter.
+    /// Density, per length, that a walk from end to start stops exactly at the start; zero in a medium that does
+    /// not scatter.
     pub stop_at_start: f64,
 }
 
@@ -71,12 +72,20 @@ impl SegmentDensity {
     #[inline]
     #[must_use]
     pub const fn passing(transmittance: Spectrum) -> Self {
-        Self { transmittance, reach: 1.0, stop_at_end: 0.0, stop_at_start: 0.0 }
+        Self::symmetric(transmittance, 1.0, 0.0)
+    }
+
+    /// A segment that looks the same from both ends: a walk passes it with the probability `reach`, and stops at
+    /// its far end with the density `stop`, per length.
+    #[inline]
+    #[must_use]
+    pub const fn symmetric(transmittance: Spectrum, reach: f64, stop: f64) -> Self {
+        Self { transmittance, reach, stop_at_end: stop, stop_at_start: stop }
     }
 }
 
-/// Everything an edge between two vertices accumulates from its segments, pushed in the order in which
-/// the forward walk meets them.
+/// Transmittance and sampling densities of an edge between two vertices: the product over its segments, which are
+/// pushed in the order of the forward walk.
 ///
 /// With segments 1..m: `T = Π T_j`, `R = Π S_j`, `stop_at_end = (Π_{j<m} S_j) · p_m` and
 /// `stop_at_start = p_1 · Π_{j>1} S_j` (`docs/theory.md`, section 1.3).
@@ -86,9 +95,9 @@ pub struct EdgeDensity {
     pub transmittance: Spectrum,
     /// Probability `R` that a walk passes the whole edge, in `[0, 1]`. The same in both directions.
     pub reach: f64,
-    /// Density per length of the forward walk to stop exactly at the end.
+    /// Density, per length, that the forward walk stops exactly at the end.
     pub stop_at_end: f64,
-    /// Density per length of the backward walk to stop exactly at the start.
+    /// Density, per length, that the backward walk stops exactly at the start.
     pub stop_at_start: f64,
     /// Whether a segment was pushed: only the first sets `stop_at_start`.
     started: bool,
@@ -142,16 +151,16 @@ impl EdgeDensity {
         !self.started
     }
 
-    /// Distance-sampling density `t` of a walk from start to end that ends here: per length if the end
-    /// is a vertex in a medium (which then scatters), a probability if it is on a surface.
+    /// Distance-sampling density of the forward walk: per length if the end is a vertex in a medium (which then
+    /// scatters), the probability to pass if it is on a surface.
     #[inline]
     #[must_use]
     pub const fn forward(&self, end_in_medium: bool) -> f64 {
         if end_in_medium { self.stop_at_end } else { self.reach }
     }
 
-    /// Distance-sampling density `t` of a walk from end to start that ends there: per length if the
-    /// start is a vertex in a medium (which then scatters), a probability if it is on a surface.
+    /// Distance-sampling density of the backward walk: per length if the start is a vertex in a medium (which then
+    /// scatters), the probability to pass if it is on a surface.
     #[inline]
     #[must_use]
     pub const fn backward(&self, start_in_medium: bool) -> f64 {
@@ -191,7 +200,7 @@ mod tests {
         edge
     }
 
-    /// What a walk over the same pieces from the other end meets.
+    /// The pieces as a walk from the other end meets them.
     fn reversed(pieces: &[Piece]) -> Vec<Piece> {
         let swap = |density: SegmentDensity| SegmentDensity {
             stop_at_end: density.stop_at_start,

@@ -170,56 +170,44 @@ impl Index<usize> for Spectrum {
     }
 }
 
-impl Add for Spectrum {
-    type Output = Self;
+/// Implements operators channel by channel, and their forms that assign.
+macro_rules! operators {
+    ($($operator:ident<$other:ty>::$method:ident = |$a:ident, $b:ident| $result:expr;)*) => {$(
+        impl $operator<$other> for Spectrum {
+            type Output = Self;
 
-    #[inline]
-    fn add(self, other: Self) -> Self {
-        Self(self.0 + other.0)
-    }
+            #[inline]
+            fn $method(self, $b: $other) -> Self {
+                let $a = self;
+                Self($result)
+            }
+        }
+    )*};
+    (assign: $($operator:ident<$other:ty>::$method:ident = |$a:ident, $b:ident| $result:expr;)*) => {$(
+        impl $operator<$other> for Spectrum {
+            #[inline]
+            fn $method(&mut self, $b: $other) {
+                let $a = *self;
+                *self = $result;
+            }
+        }
+    )*};
 }
 
-impl AddAssign for Spectrum {
-    #[inline]
-    fn add_assign(&mut self, other: Self) {
-        self.0 += other.0;
-    }
+operators! {
+    Add<Self>::add = |a, b| a.0 + b.0;
+    Sub<Self>::sub = |a, b| a.0 - b.0;
+    Mul<Self>::mul = |a, b| a.0 * b.0;
+    Div<Self>::div = |a, b| a.0 / b.0;
+    Mul<f32>::mul = |a, b| a.0 * b;
+    Div<f32>::div = |a, b| a.0 / b;
 }
 
-impl Sub for Spectrum {
-    type Output = Self;
-
-    #[inline]
-    fn sub(self, other: Self) -> Self {
-        Self(self.0 - other.0)
-    }
-}
-
-impl Neg for Spectrum {
-    type Output = Self;
-
-    #[inline]
-    fn neg(self) -> Self {
-        Self(-self.0)
-    }
-}
-
-impl Mul for Spectrum {
-    type Output = Self;
-
-    #[inline]
-    fn mul(self, other: Self) -> Self {
-        Self(self.0 * other.0)
-    }
-}
-
-impl Mul<f32> for Spectrum {
-    type Output = Self;
-
-    #[inline]
-    fn mul(self, factor: f32) -> Self {
-        Self(self.0 * factor)
-    }
+operators! { assign:
+    AddAssign<Self>::add_assign = |a, b| a + b;
+    MulAssign<Self>::mul_assign = |a, b| a * b;
+    MulAssign<f32>::mul_assign = |a, b| a * b;
+    DivAssign<f32>::div_assign = |a, b| a / b;
 }
 
 impl Mul<Spectrum> for f32 {
@@ -231,42 +219,12 @@ impl Mul<Spectrum> for f32 {
     }
 }
 
-impl MulAssign for Spectrum {
-    #[inline]
-    fn mul_assign(&mut self, other: Self) {
-        self.0 *= other.0;
-    }
-}
-
-impl MulAssign<f32> for Spectrum {
-    #[inline]
-    fn mul_assign(&mut self, factor: f32) {
-        self.0 *= factor;
-    }
-}
-
-impl Div for Spectrum {
+impl Neg for Spectrum {
     type Output = Self;
 
     #[inline]
-    fn div(self, other: Self) -> Self {
-        Self(self.0 / other.0)
-    }
-}
-
-impl Div<f32> for Spectrum {
-    type Output = Self;
-
-    #[inline]
-    fn div(self, divisor: f32) -> Self {
-        Self(self.0 / divisor)
-    }
-}
-
-impl DivAssign<f32> for Spectrum {
-    #[inline]
-    fn div_assign(&mut self, divisor: f32) {
-        self.0 /= divisor;
+    fn neg(self) -> Self {
+        Self(-self.0)
     }
 }
 

@@ -1,4 +1,4 @@
-//! What the public interface promises to a host that brings a medium of its own, or boxes ours.
+//! The public interface as a host uses it that brings a medium of its own, or boxes one of this crate.
 
 use upbp_media::glam::Vec3;
 use upbp_media::{

@@ -92,7 +92,8 @@ fn sampled_distances_fit_the_density() {
 
 #[test]
 fn collisions_in_thin_media_are_as_rare_as_they_should_be() {
-    // Below the resolution of one random number. Pairs of the smallest numbers of a lattice: their part of all.
+    // Below the resolution of one random number. Pairs of the smallest numbers of a lattice: their part of
+    // all.
     let pairs = |medium: &Homogeneous, length: f32| {
         let steps = 256;
         let collides = |channel: u32, distance: u32| {

@@ -3,7 +3,7 @@
 use super::{Deflection, PhaseFunction};
 use crate::MediaError;
 
-/// The largest number below one.
+/// The largest single-precision number below one.
 const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// A weighted sum of phase functions, made by [`PhaseFunction::blend`]. The weights add up to one; no
@@ -56,7 +56,7 @@ impl Blend {
         self.parts.iter().map(|(weight, part)| weight * part.mean_cosine()).sum()
     }
 
-    /// Chooses a part by its weight, and returns what is left of the random number, again in `[0, 1)`.
+    /// Chooses a part by its weight; also returns the rest of the random number, again in `[0, 1)`.
     ///
     /// Takes the number of the azimuth: the bits that a part of small weight loses would coarsen a narrow
     /// peak, but the azimuth does not miss them.
@@ -65,7 +65,7 @@ impl Blend {
         let mut chosen = (1.0, &PhaseFunction::Isotropic);
         for (index, (weight, part)) in self.parts.iter().enumerate() {
             chosen = (*weight, part);
-            // The weights add up to one but for rounding: what is beyond all of them is the last part's.
+            // The weights add up to one but for rounding: a number beyond their sum chooses the last part.
             if rest < *weight || index + 1 == self.parts.len() {
                 break;
             }

@@ -1,4 +1,4 @@
-//! Phase functions: where a collision sends the light.
+//! Phase functions: the distribution of directions after a collision.
 //!
 //! All directions are directions of *propagation*, before and after the collision: equal vectors mean
 //! straight on. The value is normalised over the sphere, and it is also the density that
@@ -26,7 +26,7 @@ const UNIFORM: f32 = 0.25 * FRAC_1_PI;
 /// A phase function, symmetric about the direction of propagation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PhaseFunction {
-    /// The same in all directions.
+    /// Equal in all directions: `1 / 4π` per steradian.
     Isotropic,
     /// One lobe, forward for positive asymmetry and backward for negative.
     HenyeyGreenstein(Asymmetry),
@@ -121,15 +121,14 @@ impl PhaseFunction {
 
     /// The value per steradian at the cosine of the angle between the directions of propagation.
     ///
-    /// As good as the cosine: prefer [`eval`](Self::eval) for narrow peaks.
+    /// Only as exact as the cosine: prefer [`eval`](Self::eval) for narrow peaks.
     #[inline]
     #[must_use]
     pub fn eval_cosine(&self, cos_theta: f32) -> f32 {
         self.value(Deflection::from_cosine(cos_theta))
     }
 
-    /// Draws the direction after a collision, for a unit direction `before` and two uniform numbers in
-    /// `[0, 1)`.
+    /// Draws the direction after a collision, for a unit direction `before` and two uniform numbers in `[0, 1)`.
     #[inline]
     #[must_use]
     pub fn sample(&self, before: Vec3, u: [f32; 2]) -> PhaseSample {
@@ -174,7 +173,7 @@ impl PhaseFunction {
     }
 }
 
-/// Uniform in the cosine.
+/// The angle at the fraction `u` of the uniform distribution, counted from straight back.
 #[inline]
 fn isotropic_deflection(u: f32) -> Deflection<f64> {
     let one_plus_cos = 2.0 * f64::from(u);

@@ -93,7 +93,7 @@ fn distribution(phase: &PhaseFunction, (one_minus_cos, one_plus_cos): (f64, f64)
     }
 }
 
-/// How far a value may be from the reference, relative to it. Directions in single precision are unit
+/// Tolerance of a value, relative to the reference. Directions in single precision are unit
 /// vectors to about 1e-7, and two of them differ in length by up to 2e-7: the square of that counts, to the
 /// power 3/2, against the squared width of the peak, `(1 − |g|)²`.
 fn tolerance(phase: &PhaseFunction) -> f64 {
