@@ -30,6 +30,94 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 /// (policy C of `docs/theory.md`, section 1.4) therefore needs a method that returns the three lanes of a
 /// segment in double precision, with no change to those here.
 ///
+/// # Example
+///
+/// Ground fog, whose density falls exponentially with the height, in closed form. A host's own tests would
+/// call `upbp_estimators::check::check_medium` as well.
+///
+/// ```
+/// use upbp_media::glam::Vec3;
+/// use upbp_media::{Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
+///
+/// /// Grey fog of extinction `exp(-y)`, of which the share `albedo` is scattered.
+/// struct GroundFog {
+///     albedo: f32,
+/// }
+///
+/// impl GroundFog {
+///     fn extinction(position: Vec3) -> f64 {
+///         f64::from(-position.y).exp()
+///     }
+/// }
+///
+/// impl Medium for GroundFog {
+///     fn scatters(&self) -> bool {
+///         self.albedo > 0.0
+///     }
+///
+///     fn segment(&self, segment: &RaySegment) -> SegmentDensity {
+///         let slope = f64::from(segment.direction.y);
+///         let at_start = Self::extinction(segment.at(segment.start));
+///         let length = segment.length_f64();
+///         let depth = at_start * if slope == 0.0 { length } else { -(-slope * length).exp_m1() / slope };
+///         let passing = (-depth).exp();
+///         let transmittance = Spectrum::splat(passing as f32);
+///         if !self.scatters() {
+///             return SegmentDensity::passing(transmittance);
+///         }
+///         SegmentDensity {
+///             transmittance,
+///             reach: passing,
+///             stop_at_end: Self::extinction(segment.at(segment.end)) * passing,
+///             stop_at_start: at_start * passing,
+///         }
+///     }
+///
+///     fn sample_distance(&self, segment: &RaySegment, _channel: f32, u_distance: f32) -> Option<f32> {
+///         let slope = f64::from(segment.direction.y);
+///         let depth = -f64::ln_1p(-f64::from(u_distance)) / Self::extinction(segment.at(segment.start));
+///         // Not a number where the fog thins out before it is that deep.
+///         let length = if slope == 0.0 { depth } else { -f64::ln_1p(-slope * depth) / slope };
+///         let stop = (f64::from(segment.start) + length) as f32;
+///         (self.scatters() && stop < segment.end).then_some(stop)
+///     }
+///
+///     fn sigma_s(&self, position: Vec3) -> Spectrum {
+///         self.albedo * self.sigma_t(position)
+///     }
+///
+///     fn sigma_t(&self, position: Vec3) -> Spectrum {
+///         Spectrum::splat(Self::extinction(position) as f32)
+///     }
+///
+///     fn phase(&self) -> &PhaseFunction {
+///         &PhaseFunction::Isotropic
+///     }
+///
+///     fn continuation(&self, _position: Vec3) -> f32 {
+///         self.albedo
+///     }
+///
+///     fn mean_free_path(&self) -> f32 {
+///         1.0
+///     }
+/// }
+///
+/// let fog = GroundFog { albedo: 0.9 };
+/// let up = RaySegment { origin: Vec3::ZERO, direction: Vec3::new(0.6, 0.8, 0.0), start: 0.0, end: 2.0 };
+/// // A walk stops somewhere or passes: the density of stopping and the probability to pass add up to one.
+/// let stops: f64 = (0..1000)
+///     .map(|i| fog.segment(&RaySegment { end: 0.002 * (i as f32 + 0.5), ..up }).stop_at_end * 0.002)
+///     .sum();
+/// assert!((stops + fog.segment(&up).reach - 1.0).abs() < 1e-6);
+/// // Half of the walks stop before the median distance.
+/// let median = fog.sample_distance(&up, 0.0, 0.5).expect("less than half of the walks pass");
+/// assert!((fog.segment(&RaySegment { end: median, ..up }).reach - 0.5).abs() < 1e-6);
+/// // Walks in the other direction start in thinner fog.
+/// let density = fog.segment(&up);
+/// assert!(density.stop_at_start > density.stop_at_end);
+/// ```
+///
 /// Source: `docs/theory.md`, sections 1.3 and 1.4.
 pub trait Medium: Send + Sync {
     /// Whether the medium scatters light. If not, no walk ever stops in it.

@@ -87,7 +87,58 @@ impl Default for Settings {
     }
 }
 
-/// Settings that passed [`Settings::validate`].
+/// Settings that passed [`Settings::validate`], which alone makes them.
+///
+/// A renderer takes no others:
+///
+/// ```
+/// use upbp_core::scene::Scene;
+/// use upbp_core::{RenderError, Renderer, Settings};
+///
+/// fn renderer<S: Scene>(scene: &S, settings: Settings) -> Result<Renderer<'_>, RenderError> {
+///     Renderer::new(scene, settings.validate()?)
+/// }
+/// ```
+///
+/// ```compile_fail,E0308
+/// use upbp_core::scene::Scene;
+/// use upbp_core::{RenderError, Renderer, Settings};
+///
+/// fn renderer<S: Scene>(scene: &S, settings: Settings) -> Result<Renderer<'_>, RenderError> {
+///     Renderer::new(scene, settings)
+/// }
+/// ```
+///
+/// They are read like [`Settings`], and changed before they are checked:
+///
+/// ```
+/// use upbp_core::{CheckedSettings, Settings, SettingsError};
+///
+/// fn with_seed(mut settings: Settings) -> Result<CheckedSettings, SettingsError> {
+///     settings.seed = 7;
+///     settings.validate()
+/// }
+/// assert_eq!(with_seed(Settings::default())?.seed, 7);
+/// # Ok::<(), SettingsError>(())
+/// ```
+///
+/// ```compile_fail,E0594
+/// use upbp_core::{CheckedSettings, Settings, SettingsError};
+///
+/// fn with_seed(mut settings: CheckedSettings) -> Result<CheckedSettings, SettingsError> {
+///     settings.seed = 7;
+///     Ok(settings)
+/// }
+/// ```
+///
+/// ```compile_fail,E0423
+/// use upbp_core::{CheckedSettings, Settings, SettingsError};
+///
+/// fn with_seed(mut settings: Settings) -> Result<CheckedSettings, SettingsError> {
+///     settings.seed = 7;
+///     Ok(CheckedSettings(settings))
+/// }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckedSettings(Settings);
 
