@@ -74,9 +74,9 @@ fn path(length: usize) -> Path {
     let vertices: Vec<PathVertex> = vertices.collect();
     let edges = (0..length).map(|i| {
         let distance = vary(i, 0.9);
-        let reach = (-0.5 * distance).exp();
-        let stop = |vertex| if in_medium(vertex) { 0.5 * reach } else { reach };
-        PathEdge { distance, t_light: stop(&vertices[i + 1]), t_camera: stop(&vertices[i]), reach }
+        let pass_probability = (-0.5 * distance).exp();
+        let stop = |vertex| if in_medium(vertex) { 0.5 * pass_probability } else { pass_probability };
+        PathEdge { distance, t_light: stop(&vertices[i + 1]), t_camera: stop(&vertices[i]), pass_probability }
     });
     let edges = edges.collect();
     Path { vertices, edges, pdf_position: 0.5, pdf_incident: 0.4, hittable: true }
@@ -180,7 +180,7 @@ impl<'a> Ends<'a> {
             cos_in,
             forward,
             backward,
-            reach: edge.reach,
+            pass_probability: edge.pass_probability,
             ends_in_medium: in_medium(vertex),
         };
         pending.arrive(plan, walk, &edge, connections)
@@ -207,7 +207,8 @@ impl<'a> Ends<'a> {
         let light = Self::arrive(plan, path, Walk::Light, &self.light[1], middle - 1);
         let camera = Self::arrive(plan, path, Walk::Camera, &self.camera, middle);
         let square = edge.distance * edge.distance;
-        let opposite = |walk, vertex, t| plan.distance_factor(walk, in_medium(vertex), edge.reach, t);
+        let opposite =
+            |walk, vertex, t| plan.distance_factor(walk, in_medium(vertex), edge.pass_probability, t);
         let light_end =
             light.end(plan, Walk::Light, site(a), opposite(Walk::Camera, a, edge.t_camera), a.rho_camera);
         let camera_end =

@@ -91,7 +91,7 @@ impl<'a, S: Scene> World<'a, S> {
             emission,
             next_event,
             environments,
-            passes_from_infinity: from_infinity.reach,
+            passes_from_infinity: from_infinity.pass_probability,
             camera_stack,
             emitting_media,
             dense_media,

@@ -67,7 +67,7 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 ///         }
 ///         SegmentDensity {
 ///             transmittance,
-///             reach: passing,
+///             pass_probability: passing,
 ///             stop_at_end: Self::extinction(segment.at(segment.end)) * passing,
 ///             stop_at_start: at_start * passing,
 ///         }
@@ -109,10 +109,10 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 /// let stops: f64 = (0..1000)
 ///     .map(|i| fog.segment(&RaySegment { end: 0.002 * (i as f32 + 0.5), ..up }).stop_at_end * 0.002)
 ///     .sum();
-/// assert!((stops + fog.segment(&up).reach - 1.0).abs() < 1e-6);
+/// assert!((stops + fog.segment(&up).pass_probability - 1.0).abs() < 1e-6);
 /// // Half of the walks stop before the median distance.
 /// let median = fog.sample_distance(&up, 0.0, 0.5).expect("less than half of the walks pass");
-/// assert!((fog.segment(&RaySegment { end: median, ..up }).reach - 0.5).abs() < 1e-6);
+/// assert!((fog.segment(&RaySegment { end: median, ..up }).pass_probability - 0.5).abs() < 1e-6);
 /// // Walks in the other direction start in thinner fog.
 /// let density = fog.segment(&up);
 /// assert!(density.stop_at_start > density.stop_at_end);

@@ -55,12 +55,12 @@ pub struct SegmentDensity {
     /// Transmittance `T` of the segment per channel, in `[0, 1]`.
     pub transmittance: Spectrum,
     /// Probability `S(ℓ)` that a walk passes the segment, in `[0, 1]`. The same in both directions.
-    pub reach: f64,
-    /// Density, per length, that a walk from start to end stops exactly at the end; zero in a medium that does not
-    /// scatter.
+    pub pass_probability: f64,
+    /// Density, per length, that a walk from start to end stops exactly at the end; zero in a medium that
+    /// does not scatter.
     pub stop_at_end: f64,
-    /// Density, per length, that a walk from end to start stops exactly at the start; zero in a medium that does
-    /// not scatter.
+    /// Density, per length, that a walk from end to start stops exactly at the start; zero in a medium that
+    /// does not scatter.
     pub stop_at_start: f64,
 }
 
@@ -75,17 +75,17 @@ impl SegmentDensity {
         Self::symmetric(transmittance, 1.0, 0.0)
     }
 
-    /// A segment that looks the same from both ends: a walk passes it with the probability `reach`, and stops at
-    /// its far end with the density `stop`, per length.
+    /// A segment that looks the same from both ends: a walk passes it with the probability
+    /// `pass_probability`, and stops at its far end with the density `stop`, per length.
     #[inline]
     #[must_use]
-    pub const fn symmetric(transmittance: Spectrum, reach: f64, stop: f64) -> Self {
-        Self { transmittance, reach, stop_at_end: stop, stop_at_start: stop }
+    pub const fn symmetric(transmittance: Spectrum, pass_probability: f64, stop: f64) -> Self {
+        Self { transmittance, pass_probability, stop_at_end: stop, stop_at_start: stop }
     }
 }
 
-/// Transmittance and sampling densities of an edge between two vertices: the product over its segments, which are
-/// pushed in the order of the forward walk.
+/// Transmittance and sampling densities of an edge between two vertices: the product over its segments, which
+/// are pushed in the order of the forward walk.
 ///
 /// With segments 1..m: `T = Π T_j`, `R = Π S_j`, `stop_at_end = (Π_{j<m} S_j) · p_m` and
 /// `stop_at_start = p_1 · Π_{j>1} S_j` (`docs/theory.md`, section 1.3).
@@ -94,7 +94,7 @@ pub struct EdgeDensity {
     /// Transmittance of the edge per channel, in `[0, 1]`.
     pub transmittance: Spectrum,
     /// Probability `R` that a walk passes the whole edge, in `[0, 1]`. The same in both directions.
-    pub reach: f64,
+    pub pass_probability: f64,
     /// Density, per length, that the forward walk stops exactly at the end.
     pub stop_at_end: f64,
     /// Density, per length, that the backward walk stops exactly at the start.
@@ -107,7 +107,7 @@ impl EdgeDensity {
     /// An edge without segments: everything passes, nothing stops.
     pub const EMPTY: Self = Self {
         transmittance: Spectrum::ONE,
-        reach: 1.0,
+        pass_probability: 1.0,
         stop_at_end: 0.0,
         stop_at_start: 0.0,
         started: false,
@@ -116,10 +116,10 @@ impl EdgeDensity {
     /// Appends the next segment of the forward walk.
     #[inline]
     pub fn push(&mut self, segment: &SegmentDensity) {
-        self.stop_at_end = self.reach * segment.stop_at_end;
+        self.stop_at_end = self.pass_probability * segment.stop_at_end;
         self.stop_at_start =
-            if self.started { self.stop_at_start * segment.reach } else { segment.stop_at_start };
-        self.reach *= segment.reach;
+            if self.started { self.stop_at_start * segment.pass_probability } else { segment.stop_at_start };
+        self.pass_probability *= segment.pass_probability;
         self.transmittance *= segment.transmittance;
         self.started = true;
     }
@@ -151,20 +151,20 @@ impl EdgeDensity {
         !self.started
     }
 
-    /// Distance-sampling density of the forward walk: per length if the end is a vertex in a medium (which then
-    /// scatters), the probability to pass if it is on a surface.
+    /// Distance-sampling density of the forward walk: per length if the end is a vertex in a medium (which
+    /// then scatters), the probability to pass if it is on a surface.
     #[inline]
     #[must_use]
     pub const fn forward(&self, end_in_medium: bool) -> f64 {
-        if end_in_medium { self.stop_at_end } else { self.reach }
+        if end_in_medium { self.stop_at_end } else { self.pass_probability }
     }
 
-    /// Distance-sampling density of the backward walk: per length if the start is a vertex in a medium (which then
-    /// scatters), the probability to pass if it is on a surface.
+    /// Distance-sampling density of the backward walk: per length if the start is a vertex in a medium (which
+    /// then scatters), the probability to pass if it is on a surface.
     #[inline]
     #[must_use]
     pub const fn backward(&self, start_in_medium: bool) -> f64 {
-        if start_in_medium { self.stop_at_start } else { self.reach }
+        if start_in_medium { self.stop_at_start } else { self.pass_probability }
     }
 }
 
@@ -213,9 +213,9 @@ mod tests {
     fn pieces() -> impl Strategy<Value = Vec<Piece>> {
         // Densities at the two ends differ, as they do in media that vary along the ray.
         let density = (0.01_f32..1.0, 0.01_f64..1.0, 0.0_f64..5.0, 0.0_f64..5.0).prop_map(
-            |(transmittance, reach, stop_at_end, stop_at_start)| SegmentDensity {
+            |(transmittance, pass_probability, stop_at_end, stop_at_start)| SegmentDensity {
                 transmittance: Spectrum::new(transmittance, 1.0, 0.5 * transmittance),
-                reach,
+                pass_probability,
                 stop_at_end,
                 stop_at_start,
             },
@@ -230,14 +230,14 @@ mod tests {
             let densities: Vec<_> =
                 pieces.iter().map(|piece| piece.unwrap_or(SegmentDensity::VACUUM)).collect();
             let (first, last) = (densities[0], densities[densities.len() - 1]);
-            let reach = |range: &[SegmentDensity]| range.iter().map(|s| s.reach).product::<f64>();
-            let end = reach(&densities[..densities.len() - 1]) * last.stop_at_end;
-            let start = first.stop_at_start * reach(&densities[1..]);
-            prop_assert!(apart(edge.reach, reach(&densities)) < 1e-14);
+            let pass_probability = |range: &[SegmentDensity]| range.iter().map(|s| s.pass_probability).product::<f64>();
+            let end = pass_probability(&densities[..densities.len() - 1]) * last.stop_at_end;
+            let start = first.stop_at_start * pass_probability(&densities[1..]);
+            prop_assert!(apart(edge.pass_probability, pass_probability(&densities)) < 1e-14);
             prop_assert!(apart(edge.forward(true), end) < 1e-14);
             prop_assert!(apart(edge.backward(true), start) < 1e-14);
-            prop_assert_eq!(edge.forward(false), edge.reach);
-            prop_assert_eq!(edge.backward(false), edge.reach);
+            prop_assert_eq!(edge.forward(false), edge.pass_probability);
+            prop_assert_eq!(edge.backward(false), edge.pass_probability);
             for channel in 0..3 {
                 let product: f64 =
                     densities.iter().map(|s| f64::from(s.transmittance[channel])).product();
@@ -250,7 +250,7 @@ mod tests {
             let (there, back) = (edge(&pieces), edge(&reversed(&pieces)));
             prop_assert!(apart(there.stop_at_end, back.stop_at_start) < 1e-14);
             prop_assert!(apart(there.stop_at_start, back.stop_at_end) < 1e-14);
-            prop_assert!(apart(there.reach, back.reach) < 1e-14);
+            prop_assert!(apart(there.pass_probability, back.pass_probability) < 1e-14);
         }
 
         #[test]
@@ -271,9 +271,9 @@ mod tests {
                 if first_sigma == 0.0 { first_sigma = last_sigma; }
             }
             let (short_light, short_camera) =
-                (edge.reach / edge.forward(true), edge.reach / edge.backward(true));
-            prop_assert!(apart(short_light * edge.forward(true), edge.reach) < 1e-14);
-            prop_assert!(apart(short_camera * edge.backward(true), edge.reach) < 1e-14);
+                (edge.pass_probability / edge.forward(true), edge.pass_probability / edge.backward(true));
+            prop_assert!(apart(short_light * edge.forward(true), edge.pass_probability) < 1e-14);
+            prop_assert!(apart(short_camera * edge.backward(true), edge.pass_probability) < 1e-14);
             // One channel: the factor is 1/σ at the end that stops the walk, whatever lies between.
             prop_assert!(apart(short_light * last_sigma, 1.0) < 1e-14);
             prop_assert!(apart(short_camera * first_sigma, 1.0) < 1e-14);
@@ -284,7 +284,7 @@ mod tests {
     fn an_edge_without_segments_passes() {
         let edge = EdgeDensity::default();
         assert!(edge.is_empty());
-        assert_eq!((edge.reach, edge.transmittance), (1.0, Spectrum::ONE));
+        assert_eq!((edge.pass_probability, edge.transmittance), (1.0, Spectrum::ONE));
         assert_eq!((edge.forward(true), edge.backward(true)), (0.0, 0.0));
     }
 
@@ -292,27 +292,27 @@ mod tests {
     fn one_segment_gives_both_densities() {
         let density = SegmentDensity {
             transmittance: Spectrum::splat(0.5),
-            reach: 0.25,
+            pass_probability: 0.25,
             stop_at_end: 3.0,
             stop_at_start: 7.0,
         };
         let edge = EdgeDensity::EMPTY.with(&density);
         assert!(!edge.is_empty());
-        assert_eq!((edge.forward(true), edge.backward(true), edge.reach), (3.0, 7.0, 0.25));
+        assert_eq!((edge.forward(true), edge.backward(true), edge.pass_probability), (3.0, 7.0, 0.25));
     }
 
     #[test]
     fn vacuum_at_an_end_forbids_stopping_there() {
         let density = SegmentDensity {
             transmittance: Spectrum::ONE,
-            reach: 0.25,
+            pass_probability: 0.25,
             stop_at_end: 3.0,
             stop_at_start: 7.0,
         };
         let after = edge(&[Some(density), None]);
-        assert_eq!((after.forward(true), after.backward(true), after.reach), (0.0, 7.0, 0.25));
+        assert_eq!((after.forward(true), after.backward(true), after.pass_probability), (0.0, 7.0, 0.25));
         let before = edge(&[None, Some(density)]);
-        assert_eq!((before.forward(true), before.backward(true), before.reach), (3.0, 0.0, 0.25));
+        assert_eq!((before.forward(true), before.backward(true), before.pass_probability), (3.0, 0.0, 0.25));
     }
 
     #[test]

@@ -15,7 +15,7 @@ impl Medium for Halfway {
     }
 
     fn segment(&self, _segment: &RaySegment) -> SegmentDensity {
-        SegmentDensity { reach: 0.0, ..SegmentDensity::VACUUM }
+        SegmentDensity { pass_probability: 0.0, ..SegmentDensity::VACUUM }
     }
 
     fn sample_distance(&self, segment: &RaySegment, _channel: f32, _distance: f32) -> Option<f32> {
@@ -51,17 +51,17 @@ fn segment() -> RaySegment {
 fn media_mix_behind_a_trait_object_and_across_threads() -> Result<(), MediaError> {
     let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), PhaseFunction::Isotropic)?;
     let media: [Box<dyn Medium>; 2] = [Box::new(fog), Box::new(Halfway)];
-    let reach = std::thread::scope(|scope| {
+    let pass_probability = std::thread::scope(|scope| {
         let walk = || {
             let mut edge = EdgeDensity::EMPTY;
             for medium in &media {
                 edge.push(&medium.segment(&segment()));
             }
-            edge.reach
+            edge.pass_probability
         };
         scope.spawn(walk).join().expect("a walk does not panic")
     });
-    assert_eq!(reach, 0.0);
+    assert_eq!(pass_probability, 0.0);
     Ok(())
 }
 

@@ -58,7 +58,7 @@ pub(crate) enum Doubt {
 
 /// Density of a walk's distances: probability to pass, and to stop at either end.
 struct Passed {
-    reach: f64,
+    pass_probability: f64,
     stop_at_end: f64,
     stop_at_start: f64,
     first: Option<MediumId>,
@@ -102,12 +102,12 @@ fn pass(scene: &ClosedForm, from: DVec3, to: DVec3) -> Result<Passed, Doubt> {
     let of = |(medium, length): &(Option<MediumId>, f64)| {
         medium.map_or((1.0, 0.0), |id| stretch(&scene.media[id.0 as usize], *length))
     };
-    let reach = |stretches: &[_]| stretches.iter().map(|s| of(s).0).product::<f64>();
+    let pass_probability = |stretches: &[_]| stretches.iter().map(|s| of(s).0).product::<f64>();
     let (first, last) = (stretches[0], stretches[stretches.len() - 1]);
     Ok(Passed {
-        reach: reach(&stretches),
-        stop_at_end: reach(&stretches[..stretches.len() - 1]) * of(&last).1,
-        stop_at_start: of(&first).1 * reach(&stretches[1..]),
+        pass_probability: pass_probability(&stretches),
+        stop_at_end: pass_probability(&stretches[..stretches.len() - 1]) * of(&last).1,
+        stop_at_start: of(&first).1 * pass_probability(&stretches[1..]),
         first: first.0,
         last: last.0,
     })
@@ -300,9 +300,9 @@ impl Trace {
         let stops = |i: usize| i >= 1 && i < k && self.interior[i - 1].in_medium;
         let edges = passed.iter().enumerate().map(|(i, passed)| PathEdge {
             distance: if infinite && i == 0 { f64::INFINITY } else { (ends[i] - starts[i]).length() },
-            t_light: if stops(i + 1) { passed.stop_at_end } else { passed.reach },
-            t_camera: if stops(i) { passed.stop_at_start } else { passed.reach },
-            reach: passed.reach,
+            t_light: if stops(i + 1) { passed.stop_at_end } else { passed.pass_probability },
+            t_camera: if stops(i) { passed.stop_at_start } else { passed.pass_probability },
+            pass_probability: passed.pass_probability,
         });
         let incident = light.source.pdf_incident(start, outwards, receiver);
         Ok(Path {

@@ -61,7 +61,7 @@ fn distances() {
         let segment = RaySegment { origin: Vec3::ZERO, direction: Vec3::X, start, end };
         for medium in &media {
             let passed = medium.segment(&segment);
-            assert!((0.0..=1.0).contains(&passed.reach), "{medium:?} {segment:?}: {passed:?}");
+            assert!((0.0..=1.0).contains(&passed.pass_probability), "{medium:?} {segment:?}: {passed:?}");
             assert!(passed.transmittance.is_finite(), "{medium:?} {segment:?}: {passed:?}");
             for u in pairs() {
                 let Some(t) = medium.sample_distance(&segment, u[0], u[1]) else { continue };

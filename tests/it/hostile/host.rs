@@ -265,7 +265,7 @@ impl Medium for HostileMedium {
         let mut density = self.0.segment(segment);
         match self.1 {
             F::Transmittance(t) => density.transmittance = Spectrum::splat(t),
-            F::Reach(reach) => density.reach = reach,
+            F::Reach(value) => density.pass_probability = value,
             F::Stop(stop) => (density.stop_at_start, density.stop_at_end) = (stop, stop),
             _ => {}
         }

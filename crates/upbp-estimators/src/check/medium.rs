@@ -54,12 +54,12 @@ fn density(medium: &impl Medium, segment: &RaySegment) -> Result<SegmentDensity,
     let fraction = |x: f64| (0.0..=1.0).contains(&x);
     let transmits = density.transmittance.to_array().iter().all(|&t| fraction(t.into()));
     require(transmits, "transmittance is in [0, 1]", case)?;
-    require(fraction(density.reach), "reach is in [0, 1]", case)?;
+    require(fraction(density.pass_probability), "the probability to pass is in [0, 1]", case)?;
     let stops = [density.stop_at_start, density.stop_at_end];
     require(stops.iter().all(|p| p.is_finite() && *p >= 0.0), "densities are finite and not negative", case)?;
     let passes = !medium.scatters();
     require(
-        !passes || (density.reach == 1.0 && stops == [0.0; 2]),
+        !passes || (density.pass_probability == 1.0 && stops == [0.0; 2]),
         "nothing stops a walk that is never scattered",
         case,
     )?;
@@ -101,8 +101,12 @@ fn check_distances(medium: &impl Medium, segment: &RaySegment, random: &mut Rand
         total += expected;
         require(agree(count, expected), "distances follow the density", (segment, cell, count, expected))?;
     }
-    let reach = density(medium, segment)?.reach;
-    require((total + reach - 1.0).abs() < 0.01, "a walk stops somewhere or passes", (segment, total, reach))
+    let pass_probability = density(medium, segment)?.pass_probability;
+    require(
+        (total + pass_probability - 1.0).abs() < 0.01,
+        "a walk stops somewhere or passes",
+        (segment, total, pass_probability),
+    )
 }
 
 /// Whether so many of the draws fit a probability: within five standard errors and one per cent of quadrature.

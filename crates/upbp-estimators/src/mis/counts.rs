@@ -60,8 +60,8 @@ pub enum MergeSite {
 
 /// Sample counts and kernel volumes of one iteration.
 ///
-/// Counts are relative to one camera sub-path. A technique that does not run has count zero. The same predicate that
-/// zeroes a count must decide whether the technique runs, else weights do not sum to one.
+/// Counts are relative to one camera sub-path. A technique that does not run has count zero. The same
+/// predicate that zeroes a count must decide whether the technique runs, else weights do not sum to one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MisPlan {
     /// Balance or power heuristic.
@@ -119,15 +119,15 @@ impl MisPlan {
         }
     }
 
-    /// The distance factor of a vertex, from the edge by which `walk` arrives there: `R/t` for short beams, `1/t` for
-    /// long ones, where the walk passes the edge with probability `reach` and stops at its end with density `t`
-    /// (section 1.3). 0 on surfaces.
+    /// The distance factor of a vertex, from the edge by which `walk` arrives there: `R/t` for short beams,
+    /// `1/t` for long ones, where the walk passes the edge with probability `pass_probability` and stops at
+    /// its end with density `t` (section 1.3). 0 on surfaces.
     #[inline]
     #[must_use]
-    pub fn distance_factor(&self, walk: Walk, in_medium: bool, reach: f64, t: f64) -> f64 {
+    pub fn distance_factor(&self, walk: Walk, in_medium: bool, pass_probability: f64, t: f64) -> f64 {
         match self.extent(walk) {
             _ if !in_medium => 0.0,
-            BeamExtent::Short => reach / t,
+            BeamExtent::Short => pass_probability / t,
             BeamExtent::Long => 1.0 / t,
         }
     }
@@ -139,8 +139,8 @@ impl MisPlan {
         self.pow(self.surf)
     }
 
-    /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1), from the distance factors of the
-    /// light and the camera sub-path.
+    /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1), from the distance
+    /// factors of the light and the camera sub-path.
     #[inline]
     #[must_use]
     pub fn volume_factors(
@@ -160,7 +160,8 @@ impl MisPlan {
         }
     }
 
-    /// `F_i`: the sum of the merge factors at a vertex, from the distance factors of the two sub-paths (section 4.1).
+    /// `F_i`: the sum of the merge factors at a vertex, from the distance factors of the two sub-paths
+    /// (section 4.1).
     #[inline]
     #[must_use]
     pub fn merge_sum<D: Densities>(&self, site: MergeSite, c_light: f64, c_camera: f64) -> D {

@@ -48,7 +48,7 @@ pub struct PathEdge {
     /// `tC_i`: density of the camera walk stopping at the light-side vertex.
     pub t_camera: f64,
     /// Probability to pass the edge.
-    pub reach: f64,
+    pub pass_probability: f64,
 }
 
 /// A whole path with `edges.len() + 1` vertices.
@@ -158,13 +158,17 @@ impl Path {
                 }
                 VertexKind::Medium(medium) => {
                     let v = plan.merges_in(medium);
-                    let factor = |extent, reach: f64, t: f64| match extent {
-                        BeamExtent::Short => reach / t,
+                    let factor = |extent, pass_probability: f64, t: f64| match extent {
+                        BeamExtent::Short => pass_probability / t,
                         BeamExtent::Long => 1.0 / t,
                     };
-                    let c_light =
-                        factor(plan.photon_beams, self.edges[i - 1].reach, self.edges[i - 1].t_light);
-                    let c_camera = factor(plan.query_beams, self.edges[i].reach, self.edges[i].t_camera);
+                    let c_light = factor(
+                        plan.photon_beams,
+                        self.edges[i - 1].pass_probability,
+                        self.edges[i - 1].t_light,
+                    );
+                    let c_camera =
+                        factor(plan.query_beams, self.edges[i].pass_probability, self.edges[i].t_camera);
                     let sin = self.vertices[i].sin_theta;
                     let sin = if sin * sin < PARALLEL_SIN2 { 0.0 } else { sin };
                     push(Strategy::Pp3d(i), v.pp3d, both);

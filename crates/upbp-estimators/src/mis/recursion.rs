@@ -143,7 +143,8 @@ impl<D: Densities> Pending<D> {
     pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: D) -> Tip<D> {
         let inverse = 1.0 / (self.rho * edge.cos_in * edge.forward);
         let below = if edge.backward > 0.0 {
-            let opposite = plan.distance_factor(walk.other(), self.in_medium, edge.reach, edge.backward);
+            let opposite =
+                plan.distance_factor(walk.other(), self.in_medium, edge.pass_probability, edge.backward);
             let merges: D = merges(plan, walk, self.site, self.distance_factor, opposite);
             (merges + self.before) * plan.pow(inverse * self.cos_out * edge.backward)
         } else {
@@ -154,7 +155,8 @@ impl<D: Densities> Pending<D> {
         } else {
             D::ZERO
         };
-        let distance_factor = plan.distance_factor(walk, edge.ends_in_medium, edge.reach, edge.forward);
+        let distance_factor =
+            plan.distance_factor(walk, edge.ends_in_medium, edge.pass_probability, edge.forward);
         Tip { connect, below, distance_factor }
     }
 }
@@ -171,7 +173,7 @@ pub struct Edge {
     /// Distance density `t′` of the other walk, which stops at the first.
     pub backward: f64,
     /// Probability `R` that a walk passes the whole edge; the same in both directions.
-    pub reach: f64,
+    pub pass_probability: f64,
     /// Whether the second vertex lies in a medium.
     pub ends_in_medium: bool,
 }
@@ -192,7 +194,7 @@ impl Edge {
             cos_in,
             forward: density.forward(ends_in_medium),
             backward: density.backward(starts_in_medium),
-            reach: density.reach,
+            pass_probability: density.pass_probability,
             ends_in_medium,
         }
     }
@@ -203,9 +205,9 @@ impl BeamExtent {
     /// The divisor of the transmittance: the probability that the beam gets there at all.
     #[inline]
     #[must_use]
-    pub const fn normalisation(self, reach: f64) -> f64 {
+    pub const fn normalisation(self, pass_probability: f64) -> f64 {
         match self {
-            Self::Short => reach,
+            Self::Short => pass_probability,
             Self::Long => 1.0,
         }
     }

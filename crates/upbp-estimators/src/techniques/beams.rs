@@ -89,7 +89,7 @@ pub(crate) fn beam_tip<S: Scene, D: Densities>(
 
 /// The throughput of a beam inside it: `T/R` of a short one, `T` of a long one.
 fn transmitted(density: &EdgeDensity, extent: BeamExtent) -> Spectrum {
-    density.transmittance / extent.normalisation(density.reach) as f32
+    density.transmittance / extent.normalisation(density.pass_probability) as f32
 }
 
 /// A query beam in one medium.

@@ -91,7 +91,7 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     // C_{s-1} and L_s: what each walk would have sampled instead of this connection.
     let light_density = camera_side.rho_own * light_side.cos / distance2 * density.forward(far);
     let camera_density = light_side.rho_own * camera_side.cos / distance2 * density.backward(near);
-    let factor_of = |walk, in_medium, t| mis.distance_factor(walk, in_medium, density.reach, t);
+    let factor_of = |walk, in_medium, t| mis.distance_factor(walk, in_medium, density.pass_probability, t);
     let camera_end = vertex.tip.end(
         mis,
         Walk::Camera,

@@ -74,7 +74,7 @@ pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let density = passage.density(world.scene);
-    let throughput = edge.throughput * density.transmittance / density.reach as f32;
+    let throughput = edge.throughput * density.transmittance / density.pass_probability as f32;
     if throughput.is_black() || !throughput.is_finite() {
         return;
     }

@@ -55,7 +55,8 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let ray_pdf = f64::from(view.pdf) * scattering.cos / distance2;
     let light_density = ray_pdf * density.backward(in_medium);
     let mis = &plan.mis;
-    let opposite = mis.distance_factor(Walk::Camera, in_medium, density.reach, density.backward(in_medium));
+    let opposite =
+        mis.distance_factor(Walk::Camera, in_medium, density.pass_probability, density.backward(in_medium));
     let site = vertex.site.merge_site(scattering.sin_theta);
     let end = vertex.tip.end(mis, Walk::Light, site, opposite, scattering.rho_opposite);
     let weight = mis.light_tracing_weight(end, light_density);

@@ -83,7 +83,8 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     };
     let camera_density =
         f64::from(incident.pdf_direction) * scattering.cos / distance2 * density.backward(in_medium);
-    let opposite = mis.distance_factor(Walk::Light, in_medium, density.reach, density.backward(in_medium));
+    let opposite =
+        mis.distance_factor(Walk::Light, in_medium, density.pass_probability, density.backward(in_medium));
     let site = vertex.site.merge_site(scattering.sin_theta);
     let end = vertex.tip.end(mis, Walk::Camera, site, opposite, scattering.rho_opposite);
     let weight = mis.nee_weight(pdf, pdf_position, hit_density, end, camera_density);

@@ -44,10 +44,10 @@ fn stops_somewhere_or_passes() {
                 _ => chromatic_density(&alpha(&medium), medium.sigma_t, length),
             };
             let stops = integrate(|t| density(t).stop_at_end, 0.0, length, 2000);
-            let total = stops + density(length).reach;
+            let total = stops + density(length).pass_probability;
             assert!((total - 1.0).abs() < 1e-12, "{medium:?}, {length}: {total}");
             let public = medium.segment(&segment(3.0, 3.0 + length as f32));
-            assert!((public.reach - density(length).reach).abs() < 1e-4);
+            assert!((public.pass_probability - density(length).pass_probability).abs() < 1e-4);
             assert_eq!(public.stop_at_start, public.stop_at_end);
         }
     }
@@ -57,7 +57,7 @@ fn stops_somewhere_or_passes() {
 fn public_densities_integrate_to_one() {
     for medium in scattering_media() {
         let at = |t: f64| medium.segment(&segment(0.0, t as f32));
-        let total = integrate(|t| at(t).stop_at_end, 0.0, 4.0, 500) + at(4.0).reach;
+        let total = integrate(|t| at(t).stop_at_end, 0.0, 4.0, 500) + at(4.0).pass_probability;
         assert!((total - 1.0).abs() < 1e-6, "{medium:?}: {total}");
     }
 }
@@ -81,11 +81,12 @@ fn sampled_distances_fit_the_density() {
                 }
             }
         }
-        let reach = |t: f32| medium.segment(&segment(start, t)).reach;
+        let pass_probability = |t: f32| medium.segment(&segment(start, t)).pass_probability;
         let border = |i: usize| start + (end - start) * i as f32 / CELLS as f32;
-        let mut expected: Vec<f64> =
-            (0..CELLS).map(|i| f64::from(SAMPLES) * (reach(border(i)) - reach(border(i + 1)))).collect();
-        expected.push(f64::from(SAMPLES) * reach(end));
+        let mut expected: Vec<f64> = (0..CELLS)
+            .map(|i| f64::from(SAMPLES) * (pass_probability(border(i)) - pass_probability(border(i + 1))))
+            .collect();
+        expected.push(f64::from(SAMPLES) * pass_probability(end));
         assert_fits(&observed, &expected, &format!("{medium:?}"));
     }
 }
@@ -106,7 +107,7 @@ fn collisions_in_thin_media_are_as_rare_as_they_should_be() {
     };
     for medium in [medium([0.1; 3], [0.9; 3]), medium([0.1; 3], [0.9, 0.8, 0.7])] {
         for length in [1e-6, 1e-7, 3e-8] {
-            let expected = 1.0 - medium.segment(&segment(0.0, length)).reach;
+            let expected = 1.0 - medium.segment(&segment(0.0, length)).pass_probability;
             let found = pairs(&medium, length);
             assert!((found / expected - 1.0).abs() < 0.02, "{length}: {found} of {expected}");
         }
@@ -136,7 +137,7 @@ fn grey_equals_the_mixture_of_three_equal_channels() {
             let segment = segment(0.0, optical_depth / sigma);
             let (one, other) = (grey.segment(&segment), mixed.segment(&segment));
             assert_eq!(one.transmittance, other.transmittance);
-            assert!((one.reach / other.reach - 1.0).abs() < 1e-15);
+            assert!((one.pass_probability / other.pass_probability - 1.0).abs() < 1e-15);
             assert!((one.stop_at_end / other.stop_at_end - 1.0).abs() < 1e-15);
             assert!((one.stop_at_start / other.stop_at_start - 1.0).abs() < 1e-15);
             for _ in 0..100 {
@@ -159,7 +160,7 @@ fn a_channel_without_extinction_passes_an_infinite_segment() {
     let density = medium.segment(&segment(0.0, f32::INFINITY));
     assert_eq!(density.transmittance, Spectrum::new(0.0, 1.0, 0.0));
     let [first, clear, _] = alpha(&medium);
-    assert_eq!((density.reach, density.stop_at_end, density.stop_at_start), (clear, 0.0, 0.0));
+    assert_eq!((density.pass_probability, density.stop_at_end, density.stop_at_start), (clear, 0.0, 0.0));
     let in_clear = (first + 0.5 * clear) as f32;
     for u_distance in [0.0, 0.5, LARGEST_BELOW_ONE] {
         assert_eq!(medium.sample_distance(&segment(0.0, f32::INFINITY), in_clear, u_distance), None);
@@ -171,7 +172,7 @@ fn a_channel_without_extinction_passes_an_infinite_segment() {
 fn an_infinite_segment_of_scattering_medium_is_never_passed() {
     let density = medium([0.0; 3], [0.5; 3]).segment(&segment(5.0, f32::INFINITY));
     assert_eq!(density.transmittance, Spectrum::ZERO);
-    assert_eq!((density.reach, density.stop_at_end, density.stop_at_start), (0.0, 0.0, 0.0));
+    assert_eq!((density.pass_probability, density.stop_at_end, density.stop_at_start), (0.0, 0.0, 0.0));
 }
 
 #[test]
@@ -181,7 +182,7 @@ fn a_segment_without_length_is_passed() {
             let density = medium.segment(&segment(start, end));
             let sigmas = medium.sigma_t.to_array().map(f64::from);
             let mean: f64 = alpha(&medium).iter().zip(sigmas).map(|(a, sigma)| a * sigma).sum();
-            assert_eq!((density.transmittance, density.reach), (Spectrum::ONE, 1.0));
+            assert_eq!((density.transmittance, density.pass_probability), (Spectrum::ONE, 1.0));
             assert!((density.stop_at_end / mean - 1.0).abs() < 1e-14);
             assert_eq!(density.stop_at_end, density.stop_at_start);
             assert_eq!(medium.sample_distance(&segment(start, end), 0.9, 0.0), None);
@@ -194,7 +195,7 @@ fn a_medium_that_only_absorbs_is_never_sampled() {
     let medium = medium([0.5, 0.0, 1.0], [0.0; 3]);
     assert!(!medium.scatters());
     let density = medium.segment(&segment(1.0, 3.0));
-    assert_eq!((density.reach, density.stop_at_end, density.stop_at_start), (1.0, 0.0, 0.0));
+    assert_eq!((density.pass_probability, density.stop_at_end, density.stop_at_start), (1.0, 0.0, 0.0));
     for (channel, expected) in [(-1.0_f32).exp(), 1.0, (-2.0_f32).exp()].into_iter().enumerate() {
         assert!((density.transmittance[channel] / expected - 1.0).abs() < 1e-6);
     }
@@ -215,7 +216,7 @@ fn thin_and_thick_media_keep_their_digits() {
                 let expected = share * f64::from(sigma) * (-depth).exp();
                 assert!((density.stop_at_end - expected).abs() <= 1e-14 * expected);
                 assert!(density.transmittance.is_finite() && density.transmittance.is_non_negative());
-                assert!((density.reach - (1.0 - share) - share * (-depth).exp()).abs() < 1e-15);
+                assert!((density.pass_probability - (1.0 - share) - share * (-depth).exp()).abs() < 1e-15);
             }
         }
     }
@@ -224,8 +225,9 @@ fn thin_and_thick_media_keep_their_digits() {
 #[test]
 fn a_split_segment_attenuates_like_the_whole() {
     let (borders, grey) = ([0.0, 0.37, 1.1, 1.100_001, 7.3], medium([0.1; 3], [0.4; 3]));
-    let product: f64 = borders.windows(2).map(|w| grey.segment(&segment(w[0], w[1])).reach).product();
-    let whole = grey.segment(&segment(0.0, 7.3)).reach;
+    let product: f64 =
+        borders.windows(2).map(|w| grey.segment(&segment(w[0], w[1])).pass_probability).product();
+    let whole = grey.segment(&segment(0.0, 7.3)).pass_probability;
     assert!((product / whole - 1.0).abs() < 1e-14);
 }
 
@@ -236,7 +238,7 @@ fn the_throughput_of_a_segment_is_bounded_by_the_mixture() {
             let density = medium.segment(&segment(0.0, (exponent as f32).exp2()));
             let rarest = alpha(&medium).into_iter().fold(1.0, f64::min);
             let bound = (1.0 + 1e-6) / rarest;
-            assert!(f64::from(density.transmittance.max_component()) <= bound * density.reach);
+            assert!(f64::from(density.transmittance.max_component()) <= bound * density.pass_probability);
             let collision = medium.sigma_t * density.transmittance;
             assert!(f64::from(collision.max_component()) <= bound * density.stop_at_end);
         }
@@ -256,7 +258,7 @@ fn a_stop_is_inside_even_where_the_segment_is_a_few_roundings_long() {
         }
     }
     // Expected 1 − e^{−0.61}, give or take five standard deviations of 70.
-    let expected = 20_000.0 * (1.0 - medium.segment(&segment(start, end)).reach);
+    let expected = 20_000.0 * (1.0 - medium.segment(&segment(start, end)).pass_probability);
     assert!((f64::from(stops) - expected).abs() < 350.0, "{stops} of {expected}");
 }
 
@@ -359,7 +361,7 @@ proptest! {
         let medium = medium(sigma_a, sigma_s).with_emission(Spectrum::splat(2.0)).unwrap();
         let segment = segment(start, start + length);
         let density = medium.segment(&segment);
-        prop_assert!((0.0..=1.0).contains(&density.reach));
+        prop_assert!((0.0..=1.0).contains(&density.pass_probability));
         prop_assert!(density.stop_at_end.is_finite() && density.stop_at_end >= 0.0);
         prop_assert_eq!(density.stop_at_start, density.stop_at_end);
         for channel in 0..3 {

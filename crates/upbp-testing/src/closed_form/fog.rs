@@ -49,7 +49,12 @@ impl Medium for Fog {
         }
         let mean = |f: [f64; 3]| f.iter().zip(Self::ALPHA).map(|(f, alpha)| f * alpha).sum::<f64>();
         let stop = mean([0, 1, 2].map(|channel| sigma[channel] * passing[channel]));
-        SegmentDensity { transmittance, reach: mean(passing), stop_at_end: stop, stop_at_start: stop }
+        SegmentDensity {
+            transmittance,
+            pass_probability: mean(passing),
+            stop_at_end: stop,
+            stop_at_start: stop,
+        }
     }
 
     fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32> {

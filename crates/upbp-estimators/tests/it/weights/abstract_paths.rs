@@ -52,10 +52,11 @@ fn vertex(spread: f64) -> impl Strategy<Value = PathVertex> {
     )
 }
 
-/// Distance, reach, and the densities of stopping at either end, should it be in a medium.
+/// Distance, probability to pass, and the densities of stopping at either end, should it be in a medium.
 fn edge(spread: f64) -> impl Strategy<Value = [f64; 4]> {
-    let reach = prop_oneof![3 => 1e-6..1.0, 1 => Just(1.0)];
-    (around_one(spread), reach, around_one(spread), around_one(spread)).prop_map(|(d, r, a, b)| [d, r, a, b])
+    let pass_probability = prop_oneof![3 => 1e-6..1.0, 1 => Just(1.0)];
+    (around_one(spread), pass_probability, around_one(spread), around_one(spread))
+        .prop_map(|(d, r, a, b)| [d, r, a, b])
 }
 
 /// What a path starts on.
@@ -93,18 +94,18 @@ pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
         vertices.extend(steps.iter().map(|step| step.0));
         vertices.push(end);
         let mut edges: Vec<PathEdge> = Vec::new();
-        for (i, [distance, reach, at_camera_side, at_light_side]) in
+        for (i, [distance, pass_probability, at_camera_side, at_light_side]) in
             steps.iter().map(|step| step.1).chain([last]).enumerate()
         {
             let t = |vertex: &PathVertex, stop| match vertex.kind {
                 VertexKind::Medium(_) => stop,
-                _ => reach,
+                _ => pass_probability,
             };
             edges.push(PathEdge {
                 distance,
                 t_light: t(&vertices[i + 1], at_camera_side),
                 t_camera: t(&vertices[i], at_light_side),
-                reach,
+                pass_probability,
             });
         }
         if matches!(light, Light::Directional | Light::Environment) {

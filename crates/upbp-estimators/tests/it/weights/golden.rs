@@ -18,7 +18,12 @@ fn golden_path() -> Path {
         cos_camera: 1.0,
         sin_theta: 0.0,
     };
-    let edge = |distance, t_light, t_camera, reach| PathEdge { distance, t_light, t_camera, reach };
+    let edge = |distance, t_light, t_camera, pass_probability| PathEdge {
+        distance,
+        t_light,
+        t_camera,
+        pass_probability,
+    };
     let (first, second) = ((-0.6_f64).exp(), (-0.75_f64).exp());
     Path {
         vertices: vec![

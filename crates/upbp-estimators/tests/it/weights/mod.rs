@@ -195,7 +195,7 @@ fn reversed(path: &Path) -> Path {
         distance: e.distance,
         t_light: e.t_camera,
         t_camera: e.t_light,
-        reach: e.reach,
+        pass_probability: e.pass_probability,
     });
     Path { vertices: vertices.collect(), edges: edges.collect(), ..path.clone() }
 }

@@ -71,7 +71,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
                 cos_in: v[i].cos_light,
                 forward: e.t_light,
                 backward: e.t_camera,
-                reach: e.reach,
+                pass_probability: e.pass_probability,
                 ends_in_medium: in_medium(&v[i]),
             };
             let connections = if !is_ok(&v[i]) {
@@ -94,7 +94,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
                 cos_in: v[i].cos_camera,
                 forward: e.t_camera,
                 backward: e.t_light,
-                reach: e.reach,
+                pass_probability: e.pass_probability,
                 ends_in_medium: in_medium(&v[i]),
             };
             if i == 0 {
@@ -118,14 +118,16 @@ impl<'a, D: Densities> Recursion<'a, D> {
     /// The end of the light sub-path at vertex `i`, with the edge that the camera's side would arrive by.
     fn light_end(&self, i: usize) -> End<D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i]);
-        let opposite = self.plan.distance_factor(Walk::Camera, in_medium(vertex), edge.reach, edge.t_camera);
+        let opposite =
+            self.plan.distance_factor(Walk::Camera, in_medium(vertex), edge.pass_probability, edge.t_camera);
         self.light[i].end(self.plan, Walk::Light, site(vertex), opposite, vertex.rho_camera)
     }
 
     /// The end of the camera sub-path at vertex `i`, with the edge that the light's side would arrive by.
     fn camera_end(&self, i: usize) -> End<D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i - 1]);
-        let opposite = self.plan.distance_factor(Walk::Light, in_medium(vertex), edge.reach, edge.t_light);
+        let opposite =
+            self.plan.distance_factor(Walk::Light, in_medium(vertex), edge.pass_probability, edge.t_light);
         self.camera[i].end(self.plan, Walk::Camera, site(vertex), opposite, vertex.rho_light)
     }
 
