@@ -102,6 +102,83 @@ pub struct HitDensities {
 ///
 /// Emitters are chosen in proportion to [`power`](Self::power); the walks multiply that probability in. The radiance of an
 /// emitter that is given here and the one that [`hit`](Self::hit) returns must be the same function.
+///
+/// # Example
+///
+/// A point light:
+///
+/// ```
+/// use std::f32::consts::{FRAC_1_PI, PI, TAU};
+///
+/// use glam::Vec3;
+/// use upbp_estimators::Spectrum;
+/// use upbp_estimators::check::check_emitter;
+/// use upbp_estimators::scene::{
+///     BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+/// };
+///
+/// /// A point that shines in all directions.
+/// struct Bulb {
+///     position: Vec3,
+///     /// Radiant intensity, W sr⁻¹.
+///     intensity: Spectrum,
+/// }
+///
+/// /// Density of a uniform direction, sr⁻¹.
+/// const UNIFORM: f32 = 0.25 * FRAC_1_PI;
+///
+/// impl Bulb {
+///     fn point(&self) -> EmitterPoint {
+///         EmitterPoint { position: self.position, normal: Vec3::Z }
+///     }
+/// }
+///
+/// impl Emitter for Bulb {
+///     fn kind(&self) -> EmitterKind {
+///         EmitterKind::Point
+///     }
+///
+///     fn power(&self, _: &BoundingSphere) -> f32 {
+///         4.0 * PI * self.intensity.luminance()
+///     }
+///
+///     fn sample_emission(&self, _: &BoundingSphere, _: [f32; 2], [u, v]: [f32; 2]) -> Option<Emission> {
+///         let z = 1.0 - 2.0 * u;
+///         let (sin, cos) = (TAU * v).sin_cos();
+///         let across = (1.0 - z * z).sqrt();
+///         Some(Emission {
+///             point: self.point(),
+///             direction: Vec3::new(across * cos, across * sin, z),
+///             radiance: self.intensity,
+///             pdf_position: 1.0,
+///             pdf_direction: UNIFORM,
+///         })
+///     }
+///
+///     fn sample_incident(&self, _: &BoundingSphere, receiver: Vec3, _: [f32; 2]) -> Option<Incident> {
+///         let distance = receiver.distance(self.position);
+///         Some(Incident {
+///             point: self.point(),
+///             towards_light: (self.position - receiver) / distance,
+///             distance,
+///             radiance: self.intensity,
+///             pdf: 1.0,
+///             pdf_position: 1.0,
+///             pdf_direction: UNIFORM,
+///         })
+///     }
+///
+///     // No path ends in a point by chance.
+///     fn hit(&self, _: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> {
+///         None
+///     }
+/// }
+///
+/// let bulb = Bulb { position: Vec3::new(0.0, 2.0, 0.0), intensity: Spectrum::splat(5.0) };
+/// let bounds = BoundingSphere { centre: Vec3::ZERO, radius: 3.0 };
+/// check_emitter(&bulb, &bounds, &[Vec3::ZERO, Vec3::X])?;
+/// # Ok::<(), upbp_estimators::check::ContractViolation>(())
+/// ```
 pub trait Emitter: Send + Sync {
     /// What kind of light this is.
     fn kind(&self) -> EmitterKind;

@@ -28,6 +28,113 @@ pub use hit::{Crossing, EmitterId, Hit};
 /// Required is the nearest hit; what is derived from it may be overridden where the host has something faster or
 /// more exact. Whether two surfaces coincide, where a ray starts inside a body, and so on is the host's to answer
 /// consistently: the walks of both sides rely on it.
+///
+/// # Example
+///
+/// A ball in fog, with the types of the examples of [`Bsdf`], [`Emitter`] and [`Camera`]:
+///
+/// ```
+/// # use glam::{Vec2, Vec3};
+/// # use upbp_estimators::Spectrum;
+/// # use upbp_estimators::scene::{
+/// #     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
+/// #     EmitterPoint, HitDensities, Incident, Interface, Walk,
+/// # };
+/// # #[derive(Clone, Copy)]
+/// # struct Matt(Spectrum);
+/// # impl Bsdf for Matt {
+/// #     fn eval(&self, _: Vec3, _: Vec3, _: Interface) -> Spectrum { todo!() }
+/// #     fn pdf(&self, _: Vec3, _: Vec3, _: Interface) -> f32 { todo!() }
+/// #     fn sample(&self, _: Vec3, _: Walk, _: Interface, _: f32, _: [f32; 2]) -> Option<BsdfSample> { None }
+/// #     fn is_connectible(&self) -> bool { true }
+/// # }
+/// # struct Bulb { position: Vec3, intensity: Spectrum }
+/// # impl Emitter for Bulb {
+/// #     fn kind(&self) -> EmitterKind { EmitterKind::Point }
+/// #     fn power(&self, _: &BoundingSphere) -> f32 { self.intensity.luminance() }
+/// #     fn sample_emission(&self, _: &BoundingSphere, _: [f32; 2], _: [f32; 2]) -> Option<Emission> { None }
+/// #     fn sample_incident(&self, _: &BoundingSphere, _: Vec3, _: [f32; 2]) -> Option<Incident> { None }
+/// #     fn hit(&self, _: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> { None }
+/// # }
+/// # struct Pinhole { position: Vec3, size: u32 }
+/// # impl Camera for Pinhole {
+/// #     fn resolution(&self) -> (u32, u32) { (self.size, self.size) }
+/// #     fn ray(&self, _: Vec2, _: [f32; 2]) -> Option<CameraRay> { None }
+/// #     fn connect(&self, _: Vec3, _: [f32; 2]) -> Option<CameraConnection> { None }
+/// #     fn is_pinhole(&self) -> bool { true }
+/// # }
+/// use upbp_estimators::check::check_scene;
+/// use upbp_estimators::scene::{Hit, Scene};
+/// use upbp_estimators::{MediumId, Ray};
+/// use upbp_media::{Homogeneous, PhaseFunction};
+///
+/// /// A matt ball of radius 1 in fog that fills all space.
+/// struct BallInFog {
+///     clay: Matt,
+///     bulbs: [Bulb; 1],
+///     media: [Homogeneous; 1],
+///     camera: Pinhole,
+/// }
+///
+/// impl Scene for BallInFog {
+///     type Bsdf = Matt;
+///     type Emitter = Bulb;
+///     type Medium = Homogeneous;
+///     type Camera = Pinhole;
+///
+///     fn intersect(&self, ray: &Ray) -> Option<Hit<Matt>> {
+///         let middle = -ray.origin.dot(ray.direction);
+///         // Not a number where the ray passes by.
+///         let half = (1.0 - ray.at(middle).length_squared()).sqrt();
+///         let t = [middle - half, middle + half].into_iter().find(|t| *t > ray.t_min && *t < ray.t_max)?;
+///         let normal = ray.at(t).normalize();
+///         Some(Hit {
+///             t,
+///             position: normal,
+///             geometric_normal: normal,
+///             shading_normal: normal,
+///             bsdf: Some(self.clay),
+///             interior: None,
+///             emitter: None,
+///         })
+///     }
+///
+///     fn bounds(&self) -> BoundingSphere {
+///         BoundingSphere { centre: Vec3::ZERO, radius: 3.0 }
+///     }
+///
+///     fn emitters(&self) -> &[Bulb] {
+///         &self.bulbs
+///     }
+///
+///     fn media(&self) -> &[Homogeneous] {
+///         &self.media
+///     }
+///
+///     fn camera(&self) -> &Pinhole {
+///         &self.camera
+///     }
+///
+///     fn outside(&self) -> Option<MediumId> {
+///         Some(MediumId(0))
+///     }
+///
+///     fn has_specular_surfaces(&self) -> bool {
+///         false
+///     }
+/// }
+///
+/// let scene = BallInFog {
+///     clay: Matt(Spectrum::new(0.6, 0.4, 0.3)),
+///     bulbs: [Bulb { position: Vec3::new(0.0, 2.0, 0.0), intensity: Spectrum::splat(5.0) }],
+///     media: [Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), PhaseFunction::Isotropic)?],
+///     camera: Pinhole { position: Vec3::new(0.0, 0.0, 3.0), size: 64 },
+/// };
+/// check_scene(&scene)?;
+/// let hit = scene.intersect(&Ray::new(Vec3::new(0.0, 0.0, 3.0), -Vec3::Z)).expect("the ball");
+/// assert_eq!(hit.position, Vec3::Z);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Scene: Sync {
     /// Scattering of the host's surfaces.
     type Bsdf: Bsdf;
