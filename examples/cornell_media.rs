@@ -11,7 +11,8 @@ use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use upbp_core::{
-    Content, Metadata, Output, Settings, Stop, check_outputs, check_writable, write_exr, write_png,
+    Content, Metadata, Output, Settings, Stop, ToneMapping, check_outputs, check_writable, write_exr,
+    write_png,
 };
 use upbp_scene::ReadyScene;
 
@@ -72,7 +73,7 @@ fn render(path: &Path, exr: &Path) -> Result<(), Box<dyn Error>> {
     let report = renderer.report();
     let metadata = Metadata { scene: &path.display().to_string(), settings: &settings, report: &report };
     write_exr(exr, renderer.film(), &metadata)?;
-    write_png(&png, &renderer.film().image(), 1.0)?;
+    write_png(&png, &renderer.film().image(), ToneMapping::default())?;
     println!("{report}wrote {} and {}", exr.display(), png.display());
     Ok(())
 }

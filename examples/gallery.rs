@@ -8,7 +8,7 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use upbp_core::{Settings, Stop, write_png};
+use upbp_core::{Settings, Stop, ToneMapping, write_png};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
 
@@ -40,11 +40,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut renderer = scene.renderer(settings.validate()?)?;
         renderer.render(&stop, |_| ControlFlow::Continue(()));
         println!("{name}\n{}", renderer.report());
-        write_png(&folder.join(format!("{name}.png")), &renderer.film().image(), 1.0)?;
+        write_png(&folder.join(format!("{name}.png")), &renderer.film().image(), ToneMapping::default())?;
         if name == "all" {
             for layer in renderer.film().layers() {
                 if let Some(image) = renderer.film().layer(layer) {
-                    write_png(&folder.join(format!("layer_{}.png", layer.name())), &image, 1.0)?;
+                    let name = format!("layer_{}.png", layer.name());
+                    write_png(&folder.join(name), &image, ToneMapping::default())?;
                 }
             }
         }

@@ -10,7 +10,7 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use upbp_core::{Metadata, Renderer, Settings, Stop, write_exr, write_png};
+use upbp_core::{Metadata, Renderer, Settings, Stop, ToneMapping, write_exr, write_png};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let room = scene::Room::new(256)?;
@@ -25,6 +25,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{report}");
     let metadata = Metadata { scene: "host room", settings: &settings, report: &report };
     write_exr(Path::new("host_renderer.exr"), renderer.film(), &metadata)?;
-    write_png(Path::new("host_renderer.png"), &renderer.film().image(), 1.0)?;
+    write_png(Path::new("host_renderer.png"), &renderer.film().image(), ToneMapping::default())?;
     Ok(())
 }

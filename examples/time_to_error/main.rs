@@ -23,8 +23,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use upbp_core::{
-    Content, ErrorPoint, Output, OutputError, Settings, TechniqueSet, check_outputs, check_writable,
-    write_png, write_text,
+    Content, ErrorPoint, Output, OutputError, Settings, TechniqueSet, ToneMapping, check_outputs,
+    check_writable, write_png, write_text,
 };
 
 use analysis::Curve;
@@ -169,5 +169,5 @@ fn plot(subject: &Subject, curves: &[Curve], folder: &Path) -> Result<(), Output
     let drawing = plot::chart(&subject.name, curves, subject.floor.rmse);
     let [svg, png] = plots(subject, folder);
     write_text(&svg, &plot::svg(&drawing))?;
-    write_png(&png, &plot::rasterise(&drawing, PIXELS_PER_UNIT), 1.0)
+    write_png(&png, &plot::rasterise(&drawing, PIXELS_PER_UNIT), ToneMapping::default())
 }

@@ -1,12 +1,13 @@
-//! How the program ends: messages and exit codes.
+//! Ends of the program: messages and exit codes.
 
 use std::error::Error;
-use std::io::{self, Write};
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use upbp_core::OutputError;
 
-/// Why a program did not do what it was asked for.
+/// A reason for not doing what the command line asks for.
 pub(crate) enum Failure {
     /// Scene, settings, options or a state that cannot be used. Nothing was rendered, no file was written.
     Input(String),
@@ -16,28 +17,69 @@ pub(crate) enum Failure {
     Interrupted(String),
 }
 
-impl Failure {
-    /// The code of `sysexits.h` where there is one. 75 says to a queue: try again.
-    fn code(&self) -> u8 {
-        match self {
-            Self::Input(_) => 2,
-            Self::Output(_) => 74,
-            Self::Interrupted(_) => 75,
-        }
-    }
+// Those of `sysexits.h` where there is one; 75 says to a queue: try again.
+const INPUT: u8 = 2;
+const OUTPUT: u8 = 74;
+const INTERRUPTED: u8 = 75;
+/// As shells have it for SIGINT.
+pub(crate) const AT_ONCE: u8 = 130;
 
+impl Failure {
+    /// Makes a failure of an error in what the program reads.
     pub(crate) fn input(error: impl Into<Box<dyn Error>>) -> Self {
         Self::Input(describe(&*error.into()))
     }
 
-    /// One failure of all that could not be written.
+    /// Makes one failure of all files that could not be written, if there are any.
     pub(crate) fn all(failures: &[OutputError]) -> Result<(), Self> {
         let messages: Vec<_> = failures.iter().map(|error| describe(error)).collect();
         if messages.is_empty() { Ok(()) } else { Err(Self::Output(messages.join("\nerror: "))) }
     }
 }
 
-/// An error with all its causes.
+/// All exit codes, for the help.
+pub(crate) fn codes() -> String {
+    let codes = [
+        (0, "done"),
+        (
+            INPUT,
+            "bad input: options, scene, settings, a state or an image that cannot be used, an output that cannot be \
+             written from the start or would destroy a file; nothing was rendered, no file was written",
+        ),
+        (
+            OUTPUT,
+            "a file or the standard output failed later: a disk is full, a folder has gone; everything else was \
+             written, the state first",
+        ),
+        (INTERRUPTED, "interrupted by a signal; what was done is in the --state, if there is one: try again"),
+        (AT_ONCE, "ended at once by a second signal"),
+    ];
+    list("Exit codes", &codes.map(|(code, meaning)| (code.to_string(), meaning)))
+}
+
+/// A list for the help, 80 columns wide.
+pub(crate) fn list(title: &str, rows: &[(impl AsRef<str>, &str)]) -> String {
+    let indent = rows.iter().map(|(name, _)| name.as_ref().len()).max().unwrap_or_default() + 4;
+    let mut text = format!("{title}:");
+    for (name, meaning) in rows {
+        let _ = write!(text, "\n  {:indent$}", name.as_ref(), indent = indent - 2);
+        let mut column = indent;
+        for (n, word) in meaning.split(' ').enumerate() {
+            if n > 0 && column + 1 + word.len() > 80 {
+                let _ = write!(text, "\n{:indent$}", "");
+                column = indent;
+            } else if n > 0 {
+                text.push(' ');
+                column += 1;
+            }
+            text.push_str(word);
+            column += word.len();
+        }
+    }
+    text
+}
+
+/// Describes an error with all its causes.
 pub(crate) fn describe(error: &dyn Error) -> String {
     match error.source() {
         Some(cause) => format!("{error}\n  because: {}", describe(cause)),
@@ -48,11 +90,13 @@ pub(crate) fn describe(error: &dyn Error) -> String {
 /// Prints a failure, and gives the exit code.
 pub(crate) fn finish(result: Result<(), Failure>) -> ExitCode {
     let Err(failure) = result else { return ExitCode::SUCCESS };
-    match &failure {
-        Failure::Input(message) | Failure::Output(message) => complain(&format!("error: {message}")),
-        Failure::Interrupted(message) => complain(message),
-    }
-    ExitCode::from(failure.code())
+    let (code, message) = match failure {
+        Failure::Input(message) => (INPUT, format!("error: {message}")),
+        Failure::Output(message) => (OUTPUT, format!("error: {message}")),
+        Failure::Interrupted(message) => (INTERRUPTED, message),
+    };
+    complain(&message);
+    ExitCode::from(code)
 }
 
 /// Prints to the standard error; if nobody reads it, nothing can be done.
@@ -60,10 +104,15 @@ pub(crate) fn complain(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// Prints to the standard output.
+/// Prints a line to the standard output.
 pub(crate) fn say(text: &str) -> Result<(), Failure> {
+    say_bytes(format!("{text}\n").as_bytes())
+}
+
+/// Prints to the standard output.
+pub(crate) fn say_bytes(text: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout();
-    writeln!(out, "{text}")
+    out.write_all(text)
         .and_then(|()| out.flush())
         .map_err(|error| Failure::Output(format!("cannot write to the standard output: {error}")))
 }

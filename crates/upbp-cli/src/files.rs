@@ -1,9 +1,13 @@
-//! The files that come of a render.
+//! Files that commands write, and the options that name them.
 
 use std::path::{Path, PathBuf};
 
-use clap::builder::{PathBufValueParser, TypedValueParser};
-use upbp_core::{Content, Metadata, Output, OutputError, Report, State, write_exr, write_png, write_text};
+use clap::Args;
+use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
+use upbp_core::{
+    Content, Image, Metadata, Output, OutputError, Report, State, ToneCurve, ToneMapping, write_exr,
+    write_image, write_png, write_text,
+};
 
 /// Where images go: an OpenEXR image and a PNG beside it, or a PNG alone.
 #[derive(Clone, Debug)]
@@ -13,7 +17,7 @@ pub(crate) struct Images {
 }
 
 impl Images {
-    /// By the ending of a name.
+    /// Chooses the files by the ending of a name.
     pub(crate) fn named(path: PathBuf) -> Result<Self, String> {
         match ending(&path).as_deref() {
             Some("exr") => Ok(Self { png: path.with_extension("png"), exr: Some(path) }),
@@ -25,23 +29,78 @@ impl Images {
         }
     }
 
+    /// Images for a scene without other names: the scene's, in the current folder.
+    pub(crate) fn of_scene(scene: &Path) -> Self {
+        let name = Path::new(scene.file_name().unwrap_or_default());
+        Self { exr: Some(name.with_extension("exr")), png: name.with_extension("png") }
+    }
+
+    /// The files, for checks.
     pub(crate) fn outputs(&self) -> impl Iterator<Item = Output<'_>> {
         let exr = self.exr.as_deref().map(|path| Output { role: "the image", path, content: Content::Exr });
         let role = if exr.is_some() { "the PNG beside the image" } else { "the image" };
         exr.into_iter().chain([Output { role, path: &self.png, content: Content::Png }])
     }
 
-    pub(crate) fn write(&self, state: &State, report: &Report) -> Result<(), OutputError> {
+    /// Writes a render with all its layers.
+    pub(crate) fn write_render(
+        &self,
+        state: &State,
+        report: &Report,
+        tones: ToneMapping,
+    ) -> Result<(), OutputError> {
         if let Some(path) = &self.exr {
             let identity = state.identity();
             let metadata = Metadata { scene: &identity.scene, settings: &identity.settings, report };
             write_exr(path, state.film(), &metadata)?;
         }
-        write_png(&self.png, &state.film().image(), 1.0)
+        write_png(&self.png, &state.film().image(), tones)
+    }
+
+    /// Writes an image, and another one to look at.
+    pub(crate) fn write(&self, image: &Image, shown: &Image) -> Result<(), OutputError> {
+        if let Some(path) = &self.exr {
+            write_image(path, image)?;
+        }
+        write_png(&self.png, shown, ToneMapping::default())
+    }
+
+    /// The names of the files, for messages.
+    pub(crate) fn names(&self) -> String {
+        self.outputs().map(|file| file.path.display().to_string()).collect::<Vec<_>>().join(" and ")
     }
 }
 
-/// Reads a path of the command line.
+/// Options for the look of a PNG.
+#[derive(Debug, Args)]
+pub(crate) struct Look {
+    /// Exposure of the PNG in stops, -20 to 20: each doubles the brightness
+    #[arg(long, value_name = "STOPS", value_parser = stops, default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f32,
+    /// Tone curve of the PNG: `plain` clips what is brighter than white, `filmic` rolls highlights off
+    #[arg(long, value_name = "CURVE", value_parser = curves(), default_value = "plain")]
+    tone: ToneCurve,
+}
+
+impl Look {
+    pub(crate) const fn tones(&self) -> ToneMapping {
+        ToneMapping { exposure: self.exposure, curve: self.tone }
+    }
+}
+
+fn curves() -> impl TypedValueParser<Value = ToneCurve> {
+    PossibleValuesParser::new(ToneCurve::ALL.map(ToneCurve::name)).try_map(|name| name.parse::<ToneCurve>())
+}
+
+/// Reads an exposure of the command line.
+pub(crate) fn stops(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(stops) if (-20.0..=20.0).contains(&stops) => Ok(stops),
+        _ => Err("expected a number of stops from -20 to 20".to_owned()),
+    }
+}
+
+/// Parser of a path whose name says what the file is.
 pub(crate) fn path<T: Clone + Send + Sync + 'static>(
     read: fn(PathBuf) -> Result<T, String>,
 ) -> impl TypedValueParser<Value = T> {
@@ -58,9 +117,14 @@ pub(crate) fn state(path: PathBuf) -> Result<PathBuf, String> {
     ends_in(path, &["state"])
 }
 
-/// Content goes with the ending of a name, so that nobody takes it for something else. A name may have none,
-/// as those of devices.
-pub(crate) fn ends_in(path: PathBuf, endings: &[&str]) -> Result<PathBuf, String> {
+/// A plan to write: `.ron`, `.plan`, or no ending.
+pub(crate) fn plan(path: PathBuf) -> Result<PathBuf, String> {
+    ends_in(path, &["ron", "plan"])
+}
+
+/// Refuses a name with another ending, since people take a file for what its name says. Devices have no
+/// ending.
+fn ends_in(path: PathBuf, endings: &[&str]) -> Result<PathBuf, String> {
     match ending(&path) {
         Some(ending) if !endings.contains(&ending.as_str()) => {
             Err(format!("expected a name that ends in .{}, or has no ending", endings.join(" or .")))
@@ -69,7 +133,7 @@ pub(crate) fn ends_in(path: PathBuf, endings: &[&str]) -> Result<PathBuf, String
     }
 }
 
-/// What follows the last dot of a name, in small letters.
+/// The ending of a name, after its last dot, in small letters.
 fn ending(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
 }

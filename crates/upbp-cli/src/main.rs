@@ -1,18 +1,23 @@
-//! The program `upbp`: renders scene files, and puts slices of a render together.
+//! The program `upbp`: renders scene files, puts slices of a render together, and compares images.
 
+mod compare;
 mod exit;
 mod files;
 mod merge;
+#[cfg(test)]
+mod reference;
 mod render;
-mod threads;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
+use clap_complete::Shell;
 
-/// Renders light in participating media: photon points, photon beams and bidirectional paths in one estimate.
+use exit::{Failure, finish, say_bytes};
+
+/// Renders light in participating media: photon points, photon beams and bidirectional paths in one estimate
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(name = "upbp", version, arg_required_else_help = true, after_help = exit::codes())]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -20,13 +25,50 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Render(render::Options),
+    /// Render a scene file
+    ///
+    /// Renders until the first limit is reached; a signal ends the render in good order. No output overwrites
+    /// a file that the render reads, another output, or a file of another kind.
+    #[command(after_long_help = render::names())]
+    Render(Box<render::Options>),
+    /// Check the scene and all options of a render, and render nothing
+    ///
+    /// Takes the options of `upbp render` and reads and checks all that they name, so that a command line is
+    /// checked by replacing one word.
+    #[command(after_long_help = render::names())]
+    Check(Box<render::Options>),
+    /// Put slices of a render together
+    ///
+    /// Merges states of one render with disjoint iterations, in any order, to the bits of a single run.
+    /// Without an output it says what the states hold.
     Merge(merge::Options),
+    /// Compare an image with a reference
+    ///
+    /// Reads any OpenEXR images with the channels R, G, B, and prints the means of both and how far they are
+    /// apart: pixel by pixel, and in blocks of 8 x 8 pixels, where noise is averaged out and what is too
+    /// bright or too dark everywhere remains. Pixels that are not finite in both are left out and counted.
+    Compare(compare::Options),
+    /// Print the completions of a shell
+    ///
+    /// For bash: `upbp completions bash > ~/.local/share/bash-completion/completions/upbp`.
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
 }
 
 fn main() -> ExitCode {
-    exit::finish(match &Cli::parse().command {
+    finish(match &Cli::parse().command {
         Command::Render(options) => render::run(options),
+        Command::Check(options) => render::check(options),
         Command::Merge(options) => merge::run(options),
+        Command::Compare(options) => compare::run(options),
+        Command::Completions { shell } => completions(*shell),
     })
+}
+
+fn completions(shell: Shell) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "upbp", &mut script);
+    say_bytes(&script)
 }

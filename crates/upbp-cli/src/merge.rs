@@ -5,30 +5,38 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use upbp_core::{Content, Output, OutputError, State, check_outputs, check_writable};
 
 use crate::exit::{Failure, say};
-use crate::files::{self, Images};
+use crate::files::{self, Images, Look};
 
-/// Merges states of one render with disjoint iterations, in any order, to the bits of a single run.
 #[derive(Debug, Args)]
 pub(crate) struct Options {
     /// State files, of the same scene and settings
-    #[arg(required = true, value_name = "STATE")]
+    #[arg(required = true, value_name = "STATE", value_hint = ValueHint::FilePath)]
     states: Vec<PathBuf>,
     /// Where to save the merged state: it can be merged again, and resumed
-    #[arg(long, value_name = "FILE.state", value_parser = files::path(files::state))]
+    #[arg(long, value_name = "FILE.state", value_parser = files::path(files::state), value_hint = ValueHint::FilePath)]
     state: Option<PathBuf>,
-    /// Image to write: OpenEXR, and a PNG of the same name beside it; or OUT.png, a PNG alone
-    #[arg(short, long, value_name = "OUT.exr", value_parser = files::path(Images::named))]
-    output: Option<Images>,
     /// Write the report as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = files::path(files::report))]
+    #[arg(long, value_name = "FILE.json", value_parser = files::path(files::report), value_hint = ValueHint::FilePath)]
     report: Option<PathBuf>,
     /// Print nothing but errors
     #[arg(long)]
     quiet: bool,
+    #[command(flatten)]
+    image: ImageOptions,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Image")]
+struct ImageOptions {
+    /// Image to write: OpenEXR, and a PNG of the same name beside it; or OUT.png, a PNG alone
+    #[arg(short, long, value_name = "OUT.exr", value_parser = files::path(Images::named), value_hint = ValueHint::FilePath)]
+    output: Option<Images>,
+    #[command(flatten)]
+    look: Look,
 }
 
 impl Options {
@@ -39,7 +47,7 @@ impl Options {
         let others = others
             .into_iter()
             .filter_map(|(role, path, content)| Some(Output { role, path: path.as_deref()?, content }));
-        self.output.iter().flat_map(Images::outputs).chain(others).collect()
+        self.image.output.iter().flat_map(Images::outputs).chain(others).collect()
     }
 }
 
@@ -57,8 +65,8 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     if let Some(path) = &options.state {
         attempt(merged.save(path));
     }
-    if let Some(images) = &options.output {
-        attempt(images.write(&merged, &report));
+    if let Some(images) = &options.image.output {
+        attempt(images.write_render(&merged, &report, options.image.look.tones()));
     }
     if let Some(path) = &options.report {
         attempt(files::write_report(&report, path));

@@ -25,7 +25,7 @@ pub use files::{
     write_text,
 };
 pub use film::{Doubt, ErrorEstimate, ErrorMap, Film, HalfImage, Image, IterationSet, MAX_ITERATIONS, Pixel};
-pub use output::{Metadata, read_exr, write_exr, write_png};
+pub use output::{Metadata, ToneCurve, ToneMapping, read_exr, write_exr, write_image, write_png};
 pub use plan::{RenderPlan, Stage};
 pub use radius::{Radii, Radius, RadiusSchedule};
 pub use render::{Outcome, Preparing, Progress, Renderer, Start, Stop, StopReason};

@@ -6,17 +6,17 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// What is left of a line after the bar is for the message, which is cut there.
+/// Template of a line: the message takes what the bar leaves of it and is cut at the end.
 const LINE: &str = "{elapsed_precise} {bar:20} {percent:>3} %  {wide_msg}";
 
-/// Shows where a render is: a bar, or lines now and then where there is no terminal.
+/// A progress bar on a terminal; elsewhere, lines now and then.
 pub(crate) struct Bar {
     bar: ProgressBar,
     lines: bool,
 }
 
 impl Bar {
-    /// On the standard error.
+    /// Makes a bar on the standard error; a quiet one shows nothing.
     pub(crate) fn on_stderr(quiet: bool) -> Self {
         let bar = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = Self { bar: Self::on(bar), lines: !quiet && !std::io::stderr().is_terminal() };
@@ -26,7 +26,7 @@ impl Bar {
     }
 
     fn on(target: ProgressDrawTarget) -> ProgressBar {
-        // In percent, of which none is shown before it is done.
+        // A length of 100, so that no percent is shown before it is done.
         let bar = ProgressBar::with_draw_target(Some(100), target);
         if let Ok(style) = ProgressStyle::with_template(LINE) {
             bar.set_style(style);
@@ -34,12 +34,12 @@ impl Bar {
         bar
     }
 
-    /// Before a step of the preparation.
+    /// Shows which step of the preparation begins.
     pub(crate) fn prepare(&self, step: &'static str) {
         self.bar.set_message(step);
     }
 
-    /// After an iteration, with the part of the work that is done.
+    /// Shows how many iterations and which fraction of the work are done.
     pub(crate) fn show(&self, iterations: u64, fraction: f64, message: String) {
         let percent = (100.0 * fraction) as u64;
         if self.lines && iterations.is_power_of_two() {
@@ -49,7 +49,7 @@ impl Bar {
         self.bar.set_message(message);
     }
 
-    /// At the end, which may not be that of the work.
+    /// Ends the bar: at 100 %, or where a render was stopped.
     pub(crate) fn end(self, is_done: bool) {
         if is_done {
             self.bar.finish();

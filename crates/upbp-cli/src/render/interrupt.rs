@@ -2,17 +2,16 @@
 
 use upbp_core::Canceller;
 
-/// The exit code of a program that a signal ended, as shells have it for SIGINT.
-const AT_ONCE: i32 = 130;
+use crate::exit::AT_ONCE;
 
-/// Catches signals from now on: the first uses the canceller.
+/// Catches signals from now on and returns the canceller that the first one uses.
 pub(crate) fn install() -> Result<Canceller, ctrlc::Error> {
     let canceller = Canceller::default();
     let render = canceller.clone();
     ctrlc::set_handler(move || {
         if render.is_cancelled() {
-            // Whatever file is being written is written beside its place: nothing is lost but this.
-            std::process::exit(AT_ONCE);
+            // A file in hand is written beside its place: the file that was there stays whole.
+            std::process::exit(AT_ONCE.into());
         }
         render.cancel();
     })?;

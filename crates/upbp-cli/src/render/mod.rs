@@ -1,94 +1,132 @@
-//! `upbp render`: renders a scene file.
+//! `upbp render` and `upbp check`: a scene and its options are read; what follows is a render, or nothing.
 
 mod bar;
 mod interrupt;
 mod options;
 mod progress;
 
-use std::error::Error;
-use std::num::NonZeroUsize;
 use std::path::Path;
 
 use upbp_core::{
-    OutputError, Preparing, RenderError, RenderPlan, Renderer, Settings, Start, State, StateError,
-    StopReason, check_outputs, check_writable, read_exr, read_text, remove_leftovers, write_text,
+    Canceller, CheckedSettings, Image, OutputError, Preparing, RenderError, RenderPlan, Renderer, Start,
+    State, StateError, StopReason, check_outputs, check_writable, read_exr, read_text, remove_leftovers,
+    write_text,
 };
-use upbp_scene::ReadyScene;
+use upbp_scene::{ReadyScene, SceneError};
 
 use crate::exit::{Failure, complain, say};
 use crate::files;
 use bar::Bar;
-pub(crate) use options::Options;
+pub(crate) use options::{Options, names};
 use progress::{Beside, render};
 
+/// Renders a scene file: `upbp render`.
 pub(crate) fn run(options: &Options) -> Result<(), Failure> {
-    // A pool of its own: reading the scene works in parallel too.
-    let threads = options.threads.map_or(0, NonZeroUsize::get);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::input)?;
-    pool.install(|| run_in_pool(options))
-}
-
-fn run_in_pool(options: &Options) -> Result<(), Failure> {
-    let canceller = interrupt::install().map_err(Failure::input)?;
-    let path = options.scene.clone();
-    let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
-    let scene = load(&path, options).map_err(Failure::input)?;
-    let outputs = options.outputs();
-    let read = scene.files().iter().map(|file| ("a mesh or an image of the scene", file.as_path()));
-    let inputs: Vec<_> =
-        [("the scene", path.as_path())].into_iter().chain(options.inputs()).chain(read).collect();
-    check_outputs(&outputs, &inputs).map_err(Failure::input)?;
-    if !options.check {
+    in_pool(options, || {
+        let canceller = interrupt::install().map_err(Failure::input)?;
+        let job = Job::read(options)?;
         // Before the work, not after it.
-        for output in outputs {
+        for output in options.outputs(&options.images()) {
             check_writable(output.path).map_err(Failure::input)?;
             remove_leftovers(output.path);
         }
-    }
-    let reference = options.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
-    let plan = options.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
-    let bar = Bar::on_stderr(options.quiet || options.check);
-    let mut show = |now: Preparing| bar.prepare(now.step);
-    let start = Start { plan, canceller, seconds: options.stop().seconds, progress: Some(&mut show) };
-    let mut renderer = scene.start_renderer(settings, start).map_err(|error| match error {
-        RenderError::Cancelled => Failure::Interrupted(format!("interrupted: {error}")),
-        error => Failure::input(error),
-    })?;
-    renderer
-        .identify_scene(&format!("{} ({:016x})", path.display(), scene.hash()), &scene.hash().to_le_bytes());
-    let rect = renderer.film().rect();
-    if let (Some(reference), Some(name)) = (&reference, &options.reference)
-        && (reference.width, reference.height) != (rect.width, rect.height)
-    {
-        return Err(Failure::Input(format!(
-            "{}: expected a reference of {} x {} pixels, found {} x {}",
-            name.display(),
-            rect.width,
-            rect.height,
-            reference.width,
-            reference.height
-        )));
-    }
-    if let Some(state) = &options.state {
-        resume(&mut renderer, state).map_err(Failure::input)?;
-    }
-    if let Some(range) = options.range() {
-        renderer.set_range(range);
-    }
-    if options.check {
-        return say(&format!("{}: no problems; {}", path.display(), renderer.census()));
-    }
-    if options.is_lost_share() && !options.quiet {
-        complain("note: without --state these iterations cannot be merged with others");
+        let bar = Bar::on_stderr(options.messages.quiet);
+        let mut renderer = job.start(options, canceller, &bar)?;
+        if options.is_lost_share() && !options.messages.quiet {
+            complain("note: without --state these iterations cannot be merged with others");
+        }
+        let beside = Beside {
+            reference: job.reference.as_ref(),
+            state: options.saving.state.as_deref().map(|path| (path, options.save_every())),
+            bar,
+        };
+        let reason = render(&mut renderer, &options.stop(), beside);
+        write(renderer.state(), reason, options)
+    })
+}
+
+/// Does everything that comes before the first iteration: `upbp check`.
+pub(crate) fn check(options: &Options) -> Result<(), Failure> {
+    in_pool(options, || {
+        let canceller = interrupt::install().map_err(Failure::input)?;
+        let job = Job::read(options)?;
+        let renderer = job.start(options, canceller, &Bar::on_stderr(true))?;
+        say(&format!("{}: no problems; {}", options.scene.display(), renderer.census()))
+    })
+}
+
+/// Runs `work` in a pool of the threads that were asked for: reading the scene works in parallel too.
+fn in_pool(options: &Options, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads()).build();
+    pool.map_err(Failure::input)?.install(work)
+}
+
+/// Everything that a render reads, except the state.
+struct Job {
+    scene: ReadyScene,
+    settings: CheckedSettings,
+    reference: Option<Image>,
+    plan: Option<RenderPlan>,
+}
+
+impl Job {
+    /// Reads all files, and checks that no output would destroy one.
+    fn read(options: &Options) -> Result<Self, Failure> {
+        let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
+        let scene = load(options).map_err(Failure::input)?;
+        let images = options.images();
+        let files = scene.files().iter().map(|file| ("a mesh or an image of the scene", file.as_path()));
+        let inputs: Vec<_> = options.inputs().chain(files).collect();
+        check_outputs(&options.outputs(&images), &inputs).map_err(Failure::input)?;
+        let reference =
+            options.messages.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
+        let plan = options.method.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
+        Ok(Self { scene, settings, reference, plan })
     }
 
-    let beside = Beside {
-        reference: reference.as_ref(),
-        state: options.state.as_deref().map(|path| (path, options.save_every())),
-        bar,
-    };
-    let reason = render(&mut renderer, &options.stop(), beside);
-    write(renderer.state(), reason, options)
+    /// Prepares the render, and goes on from its state if there is one.
+    fn start(&self, options: &Options, canceller: Canceller, bar: &Bar) -> Result<Renderer<'_>, Failure> {
+        let mut show = |now: Preparing| bar.prepare(now.step);
+        let seconds = options.stop().seconds;
+        let start = Start { plan: self.plan.clone(), canceller, seconds, progress: Some(&mut show) };
+        let renderer = self.scene.start_renderer(self.settings.clone(), start);
+        let mut renderer = renderer.map_err(|error| match error {
+            RenderError::Cancelled => Failure::Interrupted(format!("interrupted: {error}")),
+            error => Failure::input(error),
+        })?;
+        let hash = self.scene.hash();
+        renderer.identify_scene(&format!("{} ({hash:016x})", options.scene.display()), &hash.to_le_bytes());
+        let rect = renderer.film().rect();
+        if let (Some(reference), Some(name)) = (&self.reference, &options.messages.reference)
+            && (reference.width, reference.height) != (rect.width, rect.height)
+        {
+            return Err(Failure::Input(format!(
+                "{}: expected a reference of {} x {} pixels, found {} x {}",
+                name.display(),
+                rect.width,
+                rect.height,
+                reference.width,
+                reference.height
+            )));
+        }
+        if let Some(state) = &options.saving.state {
+            resume(&mut renderer, state).map_err(Failure::input)?;
+        }
+        if let Some(range) = options.range() {
+            renderer.set_range(range);
+        }
+        Ok(renderer)
+    }
+}
+
+fn load(options: &Options) -> Result<ReadyScene, SceneError> {
+    ReadyScene::load_with(&options.scene, |description| {
+        if let Some([width, height]) = options.image.size {
+            description.film.width = width;
+            description.film.height = height;
+            description.film.crop = None;
+        }
+    })
 }
 
 fn read_plan(path: &Path) -> Result<RenderPlan, String> {
@@ -111,31 +149,30 @@ fn resume(renderer: &mut Renderer<'_>, path: &Path) -> Result<(), OutputError> {
     }
 }
 
-/// Writes everything that was asked for, the state first. What fails does not keep the rest from being written.
+/// Writes everything that was asked for, the state first. What fails does not keep the rest from being
+/// written.
 fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Failure> {
     let mut failures = Vec::new();
     let mut attempt = |written: Result<(), OutputError>| failures.extend(written.err());
-    if let Some(path) = &options.state {
+    if let Some(path) = &options.saving.state {
         attempt(state.save(path));
     }
-    if let Some(path) = &options.save_plan {
+    if let Some(path) = &options.method.save_plan {
         attempt(write_text(path, &state.identity().plan.to_string()));
     }
-    let report = state.report();
+    let (report, images) = (state.report(), options.images());
     // Before the first pixels there is no picture.
     let rendered = !state.film().is_empty();
     if rendered {
-        attempt(options.output.write(state, &report));
+        attempt(images.write_render(state, &report, options.image.look.tones()));
     }
-    if let Some(path) = &options.report {
+    if let Some(path) = &options.messages.report {
         attempt(files::write_report(&report, path));
     }
     Failure::all(&failures)?;
-    if !options.quiet {
+    if !options.messages.quiet {
         let wrote = if rendered {
-            let names: Vec<_> =
-                options.output.outputs().map(|file| file.path.display().to_string()).collect();
-            format!("wrote {}", names.join(" and "))
+            format!("wrote {}", images.names())
         } else {
             "nothing was rendered: the light sub-paths of the first iteration were not done (--time, --light-paths)"
                 .to_owned()
@@ -143,7 +180,7 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
         say(&format!("{report}{wrote}"))?;
     }
     if reason == StopReason::Cancelled {
-        let kept = match &options.state {
+        let kept = match &options.saving.state {
             Some(path) => format!("the state is in {}", path.display()),
             None => "without --state there is nothing to go on from".to_owned(),
         };
@@ -153,30 +190,4 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
         )));
     }
     Ok(())
-}
-
-fn load(path: &Path, options: &Options) -> Result<ReadyScene, upbp_scene::SceneError> {
-    ReadyScene::load_with(path, |description| {
-        if let Some([width, height]) = options.size {
-            description.film.width = width;
-            description.film.height = height;
-            description.film.crop = None;
-        }
-    })
-}
-
-impl Options {
-    /// The settings file, if any, with what the command line says on top.
-    fn settings(&self) -> Result<Settings, Box<dyn Error>> {
-        let mut settings = match &self.settings {
-            None => Settings::default(),
-            Some(path) => {
-                let text =
-                    read_text(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-                Settings::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))?
-            }
-        };
-        self.apply(&mut settings);
-        Ok(settings)
-    }
 }

@@ -1,173 +1,261 @@
-//! The command line.
+//! The options of `upbp render` and `upbp check`, in the groups in which the help shows them.
 
+use std::error::Error;
 use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::Args;
-use upbp_core::{Content, LightPaths, MAX_ITERATIONS, Output, Settings, Stop, Techniques};
+use clap::{Args, ValueHint};
+use upbp_core::{Content, LightPaths, MAX_ITERATIONS, Output, Settings, Stop, Techniques, read_text};
 use upbp_scene::description::Count;
 
-use crate::files::{self, Images};
-use crate::threads::threads;
+use crate::exit;
+use crate::files::{self, Images, Look};
 
 /// Seconds of rendering if nothing else says when to stop.
 const DEFAULT_SECONDS: f64 = 60.0;
+/// The most threads per core. More only wait for each other, and each takes memory.
+const THREADS_PER_CORE: usize = 16;
 
-/// Renders a scene file.
 #[derive(Debug, Args)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct Options {
     /// Scene file (RON)
-    #[arg(value_name = "SCENE.ron")]
+    #[arg(value_name = "SCENE.ron", value_hint = ValueHint::FilePath)]
     pub(crate) scene: PathBuf,
-    /// Image to write: OpenEXR, and a PNG of the same name beside it; or OUT.png, a PNG alone
-    #[arg(short, long, value_name = "OUT.exr", default_value = "render.exr", value_parser = files::path(Images::named))]
-    pub(crate) output: Images,
-    /// Size of the film in pixels instead of the scene's, such as 640x360
+    #[command(flatten)]
+    pub(crate) image: ImageOptions,
+    #[command(flatten)]
+    pub(crate) limits: Limits,
+    #[command(flatten)]
+    pub(crate) method: Method,
+    #[command(flatten)]
+    pub(crate) saving: Saving,
+    #[command(flatten)]
+    pub(crate) resources: Resources,
+    #[command(flatten)]
+    pub(crate) messages: Messages,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Image")]
+pub(crate) struct ImageOptions {
+    /// Image to write: OpenEXR, and a PNG of the same name beside it; or OUT.png, a PNG alone [default: the
+    /// scene's name, in the current folder]
+    #[arg(short, long, value_name = "OUT.exr", value_parser = files::path(Images::named), value_hint = ValueHint::FilePath)]
+    output: Option<Images>,
+    /// Size of the film in pixels, such as 640x360; drops the scene's crop [default: the scene's]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<[Count; 2]>,
+    #[command(flatten)]
+    pub(crate) look: Look,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "When to stop (what is reached first)")]
+pub(crate) struct Limits {
     /// Render iterations 0..N, or A..B as a share of a render that others work on too
     #[arg(long, value_name = "N|A..B", value_parser = iterations)]
     iterations: Option<Iterations>,
-    /// Stop after this many seconds of rendering, resumed ones included [default: 60 if no other limit is given]
+    /// Stop after this many seconds of rendering: preparation and resumed ones included, in the middle of an
+    /// iteration if need be [default: 60 if no other limit is given]
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     time: Option<f64>,
-    /// Stop when the estimated relMSE is below this
+    /// Stop when the estimated relMSE is below this with its whole interval, without the bias of kernels
     #[arg(long, value_name = "E", value_parser = positive)]
     target_error: Option<f64>,
-    /// Techniques: auto [default, those that pay in the scene], or names joined by `+` out of bpt, pt, hit, nee, connect, lt, surf, pp3d, pb2d, bp2d, bb1d, all
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "How to render")]
+pub(crate) struct Method {
+    /// Techniques: `auto`, those that pay in the scene, or names joined by `+` [default: auto]
     #[arg(long, value_name = "LIST")]
     techniques: Option<Techniques>,
-    /// Choose techniques by a model of costs instead of measured time: every run chooses the same. Goes without saying for A..B
+    /// Choose techniques by a model of costs instead of measured time: every run chooses the same. Goes
+    /// without saying for A..B
     #[arg(long)]
     deterministic: bool,
     /// Run what a plan says that another render has saved
-    #[arg(long, value_name = "FILE.ron")]
+    #[arg(long, value_name = "FILE.ron", value_hint = ValueHint::FilePath)]
     pub(crate) plan: Option<PathBuf>,
-    /// Save the plan: what iterations run, as far as it was decided
-    #[arg(long, value_name = "FILE.ron", value_parser = files::path(plan))]
+    /// Save the plan: what iterations run, as far as it was decided; `.ron` or `.plan`
+    #[arg(long, value_name = "FILE.ron", value_parser = files::path(files::plan), value_hint = ValueHint::FilePath)]
     pub(crate) save_plan: Option<PathBuf>,
-    /// Most edges of a path between light and camera
+    /// Most edges of a path between light and camera [default: 1000]
     #[arg(long, value_name = "K")]
     max_length: Option<u32>,
-    /// Seed of all random numbers
-    #[arg(long, value_name = "S")]
-    seed: Option<u64>,
-    /// Threads [default: one per core; at most 16 per core]; the image does not depend on it
-    #[arg(long, value_name = "T", value_parser = threads)]
-    pub(crate) threads: Option<NonZeroUsize>,
-    /// Light sub-paths per iteration [default: one per pixel]
+    /// Light sub-paths per iteration [default: at most one per pixel, as pays]
     #[arg(long, value_name = "N")]
     light_paths: Option<u32>,
-    /// Light sub-paths that leave photon beams, per iteration [default: a few per query beam]
+    /// Light sub-paths that leave photon beams, per iteration [default: a few per query beam, as pays]
     #[arg(long, value_name = "N")]
     beams: Option<u32>,
-    /// Keep the first radii instead of shrinking them
+    /// Keep the first radii of kernels instead of shrinking them
     #[arg(long)]
     fixed_radius: bool,
-    /// Settings file (RON); the options above override it
-    #[arg(long, value_name = "FILE")]
-    pub(crate) settings: Option<PathBuf>,
-    /// Image to compare with after every iteration; the series of errors goes to the report
-    #[arg(long, value_name = "REF.exr")]
-    pub(crate) reference: Option<PathBuf>,
-    /// Write the report as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = files::path(files::report))]
-    pub(crate) report: Option<PathBuf>,
+    /// Seed of all random numbers [default: 0]
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+    /// Settings file (RON) for these and rarer choices; options override it
+    ///
+    /// It names what differs from the defaults: ( techniques: "all", heuristic: Power, radii: (pb2d:
+    /// Scene(0.001)) ).
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    settings: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Saving and resuming")]
+pub(crate) struct Saving {
     /// File to go on from if it is there, and to save to: now and then, at the end, and when interrupted
-    #[arg(long, value_name = "FILE.state", value_parser = files::path(files::state))]
+    #[arg(long, value_name = "FILE.state", value_parser = files::path(files::state), value_hint = ValueHint::FilePath)]
     pub(crate) state: Option<PathBuf>,
     /// Time between two savings of the state; what is lost in a crash is no more than this and an iteration
-    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, requires = "state")]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value = "60", requires = "state")]
     save_every: f64,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Resources")]
+pub(crate) struct Resources {
+    /// Threads, at most 16 per core; the image does not depend on it [default: one per core]
+    #[arg(long, value_name = "T", value_parser = threads)]
+    threads: Option<NonZeroUsize>,
     /// Memory for film, light vertices, photon beams and their look-ups, MiB [default: half of what is free]
     #[arg(long, value_name = "MIB")]
     memory: Option<u32>,
-    /// Check scene and settings, render nothing
-    #[arg(long)]
-    pub(crate) check: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Reports")]
+pub(crate) struct Messages {
+    /// Write the report as JSON
+    #[arg(long, value_name = "FILE.json", value_parser = files::path(files::report), value_hint = ValueHint::FilePath)]
+    pub(crate) report: Option<PathBuf>,
+    /// Image to compare with after every iteration; the series of errors goes to the report
+    #[arg(long, value_name = "REF.exr", value_hint = ValueHint::FilePath)]
+    pub(crate) reference: Option<PathBuf>,
     /// Print nothing but errors
     #[arg(long)]
     pub(crate) quiet: bool,
 }
 
 impl Options {
-    /// When to stop.
+    /// The images to write.
+    pub(crate) fn images(&self) -> Images {
+        self.image.output.clone().unwrap_or_else(|| Images::of_scene(&self.scene))
+    }
+    /// The rules that stop the render.
     pub(crate) fn stop(&self) -> Stop {
-        let unlimited = self.iterations.is_none() && self.target_error.is_none();
+        let Limits { iterations, time, target_error } = &self.limits;
+        let unlimited = iterations.is_none() && target_error.is_none();
         Stop {
             iterations: None,
-            seconds: self.time.or(unlimited.then_some(DEFAULT_SECONDS)),
-            error: self.target_error,
+            seconds: time.or(unlimited.then_some(DEFAULT_SECONDS)),
+            error: *target_error,
         }
-    }
-
-    /// Time between two savings.
-    pub(crate) fn save_every(&self) -> Duration {
-        Duration::try_from_secs_f64(self.save_every).unwrap_or(Duration::MAX)
-    }
-
-    /// All files that are written. The state, which is read too if it is there, is one of them.
-    pub(crate) fn outputs(&self) -> Vec<Output<'_>> {
-        let others = [
-            ("the report", &self.report, Content::Report),
-            ("the state", &self.state, Content::State),
-            ("the plan to save", &self.save_plan, Content::Plan),
-        ];
-        let others = others
-            .into_iter()
-            .filter_map(|(role, path, content)| Some(Output { role, path: path.as_deref()?, content }));
-        self.output.outputs().chain(others).collect()
-    }
-
-    /// The files that are only read, as far as the command line tells.
-    pub(crate) fn inputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
-        [("the settings", &self.settings), ("the plan", &self.plan), ("the reference", &self.reference)]
-            .into_iter()
-            .filter_map(|(role, path)| Some((role, path.as_deref()?)))
-    }
-
-    /// Whether others render the rest, and what is rendered here cannot be put together with it.
-    pub(crate) fn is_lost_share(&self) -> bool {
-        self.state.is_none() && self.iterations.as_ref().is_some_and(|iterations| iterations.is_share)
     }
 
     /// The iterations to render, if not all.
     pub(crate) fn range(&self) -> Option<Range<u64>> {
-        self.iterations.as_ref().map(|iterations| iterations.range.clone())
+        self.limits.iterations.as_ref().map(|iterations| iterations.range.clone())
     }
 
-    /// Overrides settings by what was given on the command line.
-    pub(crate) fn apply(&self, settings: &mut Settings) {
-        if let Some(techniques) = self.techniques {
-            settings.techniques = techniques;
-        }
-        settings.deterministic |= self.deterministic || self.iterations.as_ref().is_some_and(|i| i.is_share);
-        if let Some(length) = self.max_length {
-            settings.max_length = length;
-        }
-        if let Some(seed) = self.seed {
-            settings.seed = seed;
-        }
-        if let Some(count) = self.light_paths {
-            settings.light_paths = LightPaths::Count(count);
-        }
-        if self.beams.is_some() {
-            settings.beams = self.beams;
-        }
-        if self.memory.is_some() {
-            settings.memory = self.memory;
-        }
-        if self.fixed_radius {
-            settings.progressive = false;
-        }
+    /// Whether others render the rest.
+    fn is_share(&self) -> bool {
+        self.limits.iterations.as_ref().is_some_and(|iterations| iterations.is_share)
+    }
+
+    /// Whether others render the rest, without a state here that could be merged with theirs.
+    pub(crate) fn is_lost_share(&self) -> bool {
+        self.saving.state.is_none() && self.is_share()
+    }
+
+    /// Time between two savings.
+    pub(crate) fn save_every(&self) -> Duration {
+        Duration::try_from_secs_f64(self.saving.save_every).unwrap_or(Duration::MAX)
+    }
+
+    /// The number of threads, 0 for one per core.
+    pub(crate) fn threads(&self) -> usize {
+        self.resources.threads.map_or(0, NonZeroUsize::get)
+    }
+
+    /// All files that are written, `images` included. The state, which is read too if it is there, is one.
+    pub(crate) fn outputs<'a>(&'a self, images: &'a Images) -> Vec<Output<'a>> {
+        let others = [
+            ("the report", &self.messages.report, Content::Report),
+            ("the state", &self.saving.state, Content::State),
+            ("the plan to save", &self.method.save_plan, Content::Plan),
+        ];
+        let others = others
+            .into_iter()
+            .filter_map(|(role, path, content)| Some(Output { role, path: path.as_deref()?, content }));
+        images.outputs().chain(others).collect()
+    }
+
+    /// All files that the command line names and that are only read.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        [
+            ("the scene", Some(self.scene.as_path())),
+            ("the settings", self.method.settings.as_deref()),
+            ("the plan", self.method.plan.as_deref()),
+            ("the reference", self.messages.reference.as_deref()),
+        ]
+        .into_iter()
+        .filter_map(|(role, path)| Some((role, path?)))
+    }
+
+    /// The settings: those of the file, if any, overridden by the command line.
+    pub(crate) fn settings(&self) -> Result<Settings, Box<dyn Error>> {
+        let mut settings = match &self.method.settings {
+            None => Settings::default(),
+            Some(path) => {
+                let text =
+                    read_text(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+                Settings::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))?
+            }
+        };
+        let Method { techniques, deterministic, max_length, light_paths, beams, fixed_radius, seed, .. } =
+            self.method;
+        settings.techniques = techniques.unwrap_or(settings.techniques);
+        settings.deterministic |= deterministic || self.is_share();
+        settings.max_length = max_length.unwrap_or(settings.max_length);
+        settings.light_paths = light_paths.map_or(settings.light_paths, LightPaths::Count);
+        settings.beams = beams.or(settings.beams);
+        settings.progressive &= !fixed_radius;
+        settings.seed = seed.unwrap_or(settings.seed);
+        settings.memory = self.resources.memory.or(settings.memory);
+        Ok(settings)
     }
 }
 
-fn plan(path: PathBuf) -> Result<PathBuf, String> {
-    files::ends_in(path, &["ron", "plan"])
+/// Names of techniques and of layers, for the help.
+pub(crate) fn names() -> String {
+    let techniques = [
+        ("hit", "the camera sub-path meets a light, an environment or an emitting medium"),
+        ("nee", "next event estimation"),
+        ("connect", "connecting a camera vertex to light vertices"),
+        ("lt", "light tracing: connecting a light vertex to the camera"),
+        ("surf", "merging with photons on surfaces"),
+        ("pp3d", "photon points around points in media"),
+        ("pb2d", "photon points around query beams"),
+        ("bp2d", "photon beams around points; not among those that `auto` chooses from"),
+        ("bb1d", "photon beams around query beams"),
+        ("pt", "path tracing: hit+nee"),
+        ("bpt", "bidirectional path tracing: hit+nee+connect+lt"),
+        ("all", "all nine"),
+        ("auto", "those that pay in the scene, with the numbers of sub-paths that go with them"),
+    ];
+    let layers = [
+        ("R, G, B", "the picture"),
+        ("bpt, surf, ...", "what each technique adds to it, weighted; of all that ran"),
+        ("variance", "variance of the mean, by the spread of the iterations"),
+        ("half0, half1", "two independent halves of the render, for denoisers"),
+        ("error", "estimated squared error of each pixel, relative to the converged value"),
+    ];
+    [exit::list("Techniques", &techniques), exit::list("Layers of OUT.exr", &layers)].join("\n\n")
 }
 
 fn size(text: &str) -> Result<[Count; 2], String> {
@@ -178,7 +266,7 @@ fn size(text: &str) -> Result<[Count; 2], String> {
     }
 }
 
-/// Iterations to render.
+/// A range of iterations.
 #[derive(Clone, Debug)]
 struct Iterations {
     range: Range<u64>,
@@ -203,5 +291,15 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("expected a positive number".to_owned()),
+    }
+}
+
+/// Parser of a number of threads that makes sense on this machine.
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let most = THREADS_PER_CORE.saturating_mul(cores);
+    match text.parse::<NonZeroUsize>() {
+        Ok(threads) if threads.get() <= most => Ok(threads),
+        _ => Err(format!("expected a number from 1 to {most}, {THREADS_PER_CORE} per core")),
     }
 }

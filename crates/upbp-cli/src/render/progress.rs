@@ -1,4 +1,4 @@
-//! The render: progress, errors against a reference, the state on the disk.
+//! A render with all that goes on beside it: progress, errors against a reference, the state on the disk.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -9,15 +9,16 @@ use upbp_core::{ErrorPoint, ErrorSeries, Image, Progress, Renderer, State, Stop,
 use super::bar::Bar;
 use crate::exit::{complain, describe};
 
-/// What is done besides rendering.
+/// Work to be done after each iteration.
 pub(crate) struct Beside<'a> {
+    /// An image to compare with.
     pub(crate) reference: Option<&'a Image>,
-    /// Where the state goes, and how often.
+    /// File for the state, and the time between two savings.
     pub(crate) state: Option<(&'a Path, Duration)>,
     pub(crate) bar: Bar,
 }
 
-/// Renders until a rule of `stop` holds.
+/// Renders until a rule of `stop` holds, and says which.
 pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: Beside<'_>) -> StopReason {
     let Beside { reference, state, bar } = beside;
     let mut errors = ErrorSeries::default();
@@ -48,14 +49,14 @@ pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: Beside<'_
     outcome.reason
 }
 
-/// Saves, or says that it was not possible: a disk that is full now need not be so at the end.
+/// Saves the state, or warns: a disk that is full now need not be so at the end.
 fn save(state: &State, path: &Path) {
     if let Err(error) = state.save(path) {
         complain(&format!("warning: {}\n  the render goes on", describe(&error)));
     }
 }
 
-/// Iterations, time left, and the error so far.
+/// The message of the progress bar: iterations, time left, and the error so far.
 fn status(now: &Progress<'_>) -> String {
     let left = if now.fraction > 0.0 { now.seconds * (1.0 / now.fraction - 1.0) } else { f64::INFINITY };
     let (error, doubt) = (now.estimated_error, if now.estimated_error.doubt.is_some() { ">" } else { "" });

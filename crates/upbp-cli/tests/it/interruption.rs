@@ -1,5 +1,5 @@
-//! Renders as processes that are killed, interrupted, out of disk or without a reader: what was saved stays good, and the end
-//! result is the same to the bit.
+//! Renders as processes that are killed, interrupted, out of disk or without a reader: what was saved stays
+//! good, and the end result is the same to the bit.
 //!
 //! `UPBP_KILLS=200` sets how often a render is killed; a few times by default.
 
@@ -49,8 +49,8 @@ fn used(child: &Child) -> f64 {
     processor::seconds(Path::new(&format!("/proc/{}", child.id()))).unwrap_or(0.0)
 }
 
-/// Looks at a program again and again until something holds. Fails when it ends before, or has used too much processor time
-/// for it ever to hold.
+/// Looks at a program again and again until something holds. Fails when it ends before, or has used too much
+/// processor time for it ever to hold.
 fn wait_until(child: &mut Child, what: &str, mut holds: impl FnMut(&Child) -> bool) {
     const HUNG: f64 = 60.0;
     while !holds(child) {
@@ -83,7 +83,8 @@ fn unfinished(folder: &Path) -> usize {
 
 #[test]
 fn killed_at_random_moments_it_loses_no_more_than_since_the_last_saving() {
-    /// Processor seconds between savings: the time that is asked for, and what an iteration and a saving take.
+    /// Processor seconds between savings: the time that is asked for, and what an iteration and a saving
+    /// take.
     const BETWEEN: f64 = 0.02 + 1.0;
     /// Enough that no run ends by itself.
     const MANY: &str = "200000000";
@@ -97,7 +98,8 @@ fn killed_at_random_moments_it_loses_no_more_than_since_the_last_saving() {
             .args(["--iterations", MANY])
             .spawn()
             .expect("the program runs");
-        // A low-discrepancy sequence: moments from the start of the process to some savings later, every other one after two.
+        // A low-discrepancy sequence: moments from the start of the process to some savings later, every
+        // other one after two.
         let mut wait = (100.0 * (f64::from(kill) * 0.618_034).fract()) as u32;
         let mut wanted = 2 * (kill % 2);
         let (mut last, mut last_used) = (written(&state), None);

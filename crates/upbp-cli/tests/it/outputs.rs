@@ -142,7 +142,6 @@ fn an_output_that_would_destroy_a_file_is_refused() {
         ),
         (&["--save-plan", "plan.ron", "--plan", "plan.ron"], &["the plan to save", "the plan,", "plan.ron"]),
         (&["--save-plan", "sub/plan.plan", "--plan", "plan.ron"], &["sub/plan.plan", "plan.ron"]),
-        (&["--save-plan", "plan.ron", "--plan", "plan.ron", "--check"], &["the plan to save", "the plan,"]),
         // What is written twice.
         (&["--state", "new", "--report", "new"], &["the state", "the report", "new"]),
         (&["--state", "new", "--save-plan", "sub/../new"], &["the state", "the plan to save", "sub/../new"]),
@@ -153,14 +152,20 @@ fn an_output_that_would_destroy_a_file_is_refused() {
         (&["--save-plan", "settings.ron"], &["settings.ron", "not a plan"]),
         (&["--report", "notes"], &["the report", "notes", "not a report"]),
         (&["--state", "notes"], &["the state", "notes", "not a state"]),
-        // What is protected, and what leads nowhere.
-        (&["-o", "kept.exr"], &["kept.exr", "read-only"]),
+        // What leads nowhere.
         (&["--report", "loop"], &["loop"]),
-        (&["--report", "sub"], &["sub", "directory"]),
     ];
+    let whole =
+        |arguments: &[&'static str]| [&["scene.ron", "--iterations", "1"], &LITTLE[..], arguments].concat();
     for (arguments, words) in cases {
-        let arguments = [&["scene.ron", "--iterations", "1"], &LITTLE[..], arguments].concat();
-        refused("render", &folder, &arguments, words, &before);
+        refused("render", &folder, &whole(arguments), words, &before);
+        refused("check", &folder, &whole(arguments), words, &before);
+    }
+    // What cannot be written is seen by whoever tries.
+    let cases: &[(&[&str], &[&str])] =
+        &[(&["-o", "kept.exr"], &["kept.exr", "read-only"]), (&["--report", "sub"], &["sub", "directory"])];
+    for (arguments, words) in cases {
+        refused("render", &folder, &whole(arguments), words, &before);
     }
     let (to, from) = ("the state, ", "a state to merge, ");
     let cases: &[(&[&str], &[&str])] = &[
@@ -172,6 +177,16 @@ fn an_output_that_would_destroy_a_file_is_refused() {
     ];
     for (arguments, words) in cases {
         refused("merge", &folder, &[&["a.state", "b.state"], *arguments].concat(), words, &before);
+    }
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["-o", "ref.exr"], &["the image, ref.exr", "the image to compare", "ref.exr"]),
+        (&["-o", "sub/../sky.exr"], &["the image, sub/../sky.exr", "the reference", "sky.png"]),
+        (&["-o", "kept.exr"], &["kept.exr", "read-only"]),
+        (&["-o", "o.tif"], &["o.tif", ".exr", ".png"]),
+        (&["-o", "none/o.exr"], &["none/o.exr"]),
+    ];
+    for (arguments, words) in cases {
+        refused("compare", &folder, &[&["ref.exr", "sky.png"], *arguments].concat(), words, &before);
     }
 }
 
@@ -203,11 +218,12 @@ fn slices_that_cannot_be_merged_are_mentioned() {
     for arguments in [
         &["--iterations", "3..4", "--quiet"][..],
         &["--iterations", "3..4", "--state", "new"],
-        &["--iterations", "3..4", "--check"],
         &["--iterations", "1"],
     ] {
         assert!(!render(arguments).contains(note), "{arguments:?}");
     }
+    let (code, text) = run("check", &folder, &[&["scene.ron", "--iterations", "3..4"], &LITTLE[..]].concat());
+    assert!(code == Some(0) && !text.contains(note), "{text}");
 }
 
 /// What a file holds, by its content.
@@ -271,7 +287,7 @@ fn option(option: &'static str, good: &'static [&'static str]) -> impl Strategy<
     prop_oneof![1 => Just(Vec::new()), 1 => value.prop_map(move |value| vec![option, value])]
 }
 
-/// The program, and its options with their values. No option comes twice.
+/// The command, and its options with their values. No option comes twice.
 fn commands() -> impl Strategy<Value = (&'static str, Vec<Words>)> {
     let scenes =
         prop_oneof![8 => Just("scene.ron"), 1 => select(&["other.ron", "hard"][..]), 1 => select(&NAMES[..])];
@@ -290,27 +306,31 @@ fn commands() -> impl Strategy<Value = (&'static str, Vec<Words>)> {
     );
     let files = files.prop_map(|(a, b, c, d, e, f, g, h)| vec![a, b, c, d, e, f, g, h]);
     let rest = (
-        flag(vec!["--check"]),
         flag(vec!["--quiet"]),
+        flag(vec!["--tone", "filmic"]),
         flag(vec!["--size", "1x1"]),
         flag(vec!["--fixed-radius"]),
         select(&["1", "2", "0..1", "4..5"][..]).prop_map(|n| vec!["--iterations", n]),
     );
     let rest = rest.prop_map(|(a, b, c, d, e)| vec![a, b, c, d, e]);
-    let renders = (files, rest).prop_map(|(files, rest)| ("render", [files, rest].concat()));
+    let names = prop_oneof![4 => Just("render"), 1 => Just("check")];
+    let renders = (names, files, rest).prop_map(|(name, files, rest)| (name, [files, rest].concat()));
     let states = prop::collection::vec(
         prop_oneof![8 => select(&["a.state", "b.state"][..]), 1 => select(&NAMES[..])],
         1..3,
     );
     let merges = (states, images(), reports(), option("--state", &["new.state", "new", "sub/hard.state"]));
     let merges = merges.prop_map(|(states, a, b, c)| ("merge", vec![states, a, b, c]));
-    prop_oneof![4 => renders, 1 => merges]
+    let image = || prop_oneof![8 => select(&["ref.exr", "kept.exr"][..]), 1 => select(&NAMES[..])];
+    let compares = (image(), image(), images())
+        .prop_map(|(image, reference, output)| ("compare", vec![vec![image, reference], output]));
+    prop_oneof![8 => renders, 2 => merges, 1 => compares]
 }
 
 /// The files that a command reads and does not write on purpose.
 fn read<'a>(program: &str, words: &'a [Words]) -> Vec<&'a str> {
     let (mut files, options) = (words[0].clone(), &words[1..]);
-    if program == "render" {
+    if matches!(program, "render" | "check") {
         files.extend(["floor.obj", "sky.png"]);
     }
     for option in options {
@@ -322,12 +342,12 @@ fn read<'a>(program: &str, words: &'a [Words]) -> Vec<&'a str> {
 }
 
 /// What a command that has ended well has written, and the kinds of that.
-fn written(words: &[Words]) -> Vec<(PathBuf, &'static str)> {
+fn written(command: &str, words: &[Words]) -> Vec<(PathBuf, &'static str)> {
     let mut files = Vec::new();
+    if command == "check" {
+        return files;
+    }
     for option in words {
-        if option[..] == ["--check"] {
-            return Vec::new();
-        }
         let &[name, file] = &option[..] else { continue };
         let file = PathBuf::from(file);
         match name {
@@ -356,7 +376,7 @@ fn random_commands_keep_what_they_read() {
     let config = Config { cases: count, failure_persistence: None, ..Config::default() };
     let judged = TestRunner::new(config).run(&commands(), |(program, words)| {
         let mut arguments = words.concat();
-        if program == "render" {
+        if matches!(program, "render" | "check") {
             arguments.extend(LITTLE);
         }
         let (code, text) = run(program, &folder, &arguments);
@@ -366,8 +386,9 @@ fn random_commands_keep_what_they_read() {
         let new: Vec<_> = after.keys().filter(|path| !before.contains_key(*path)).collect();
         let read: Vec<_> =
             read(program, &words).iter().filter_map(|name| folder.join(name).canonicalize().ok()).collect();
-        let written =
-            written(&words).into_iter().map(|(file, kind)| (folder.join(file).canonicalize().ok(), kind));
+        let written = written(program, &words)
+            .into_iter()
+            .map(|(file, kind)| (folder.join(file).canonicalize().ok(), kind));
         let written: Vec<_> = written.collect();
         if after != before {
             prepared("commands");

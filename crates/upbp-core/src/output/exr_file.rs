@@ -1,8 +1,8 @@
-//! One OpenEXR file with everything: the picture as `R`, `G`, `B`, layers as `bpt.R` and so on, the variance, two independent halves,
-//! the estimated error.
+//! One OpenEXR file with everything: the picture as `R`, `G`, `B`, layers as `bpt.R` and so on, the variance,
+//! two independent halves, the estimated error.
 //!
-//! One part with dotted channel names is what every viewer reads; all metadata is in one text attribute, because the
-//! encoder writes several in random order.
+//! One part with dotted channel names is what every viewer reads; all metadata is in one text attribute,
+//! because the encoder writes several in random order.
 
 use std::path::Path;
 
@@ -26,7 +26,8 @@ pub struct Metadata<'a> {
     pub report: &'a Report,
 }
 
-/// Writes the mean of a film, its layers, variance, halves and estimated error, as far as there are such: float32.
+/// Writes the mean of a film, its layers, variance, halves and estimated error, as far as there are such:
+/// float32.
 ///
 /// # Errors
 /// What the file system or the encoder says.
@@ -52,18 +53,40 @@ pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::resu
         push(&mut channels, "error.", &Picture { width, height, pixels: error.relative });
     }
 
-    let size = (film.rect().width as usize, film.rect().height as usize);
     let mut attributes = LayerAttributes::default();
     let text = ron::to_string(metadata).map_err(|error| fail(error.to_string()))?;
     attributes.other.insert(Text::from("upbp"), AttributeValue::Text(Text::from(text.as_str())));
+    encode(path, film.rect().width, film.rect().height, attributes, channels)
+}
+
+/// Writes an image as `R`, `G`, `B`, with nothing besides: float32.
+///
+/// # Errors
+/// What the file system or the encoder says.
+pub fn write_image(path: &Path, image: &Picture) -> std::result::Result<(), OutputError> {
+    let mut channels = SmallVec::new();
+    push(&mut channels, "", image);
+    encode(path, image.width, image.height, LayerAttributes::default(), channels)
+}
+
+fn encode(
+    path: &Path,
+    width: u32,
+    height: u32,
+    attributes: LayerAttributes,
+    channels: SmallVec<[AnyChannel<FlatSamples>; 4]>,
+) -> std::result::Result<(), OutputError> {
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
+    let layer =
+        Layer::new((width as usize, height as usize), attributes, encoding, AnyChannels::sort(channels));
     let file = Image::from_layer(layer);
-    write_whole(path, |writer| file.write().to_buffered(writer).map_err(|error| fail(error.to_string())))
+    let fail =
+        |error: exr::error::Error| OutputError::Encode { path: path.to_owned(), reason: error.to_string() };
+    write_whole(path, |writer| file.write().to_buffered(writer).map_err(fail))
 }
 
 fn push(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, prefix: &str, image: &Picture) {

@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
+use super::tone::ToneMapping;
 use crate::error::OutputError;
 use crate::files::write_whole;
 use crate::film::Image;
 
-/// Writes `image` times `exposure`, clipped to `[0, 1]`, with the sRGB transfer curve, 8 bits per channel.
+/// Writes `image` as `tones` has it, with the sRGB transfer curve, 8 bits per channel; NaN becomes black.
 ///
 /// # Errors
 /// What the file system or the encoder says.
-pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<(), OutputError> {
-    let bytes: Vec<u8> = image.pixels.iter().flatten().map(|value| quantise(value * exposure)).collect();
+pub fn write_png(path: &Path, image: &Image, tones: ToneMapping) -> Result<(), OutputError> {
+    let bytes: Vec<u8> = image.pixels.iter().flat_map(|pixel| tones.apply(*pixel)).map(quantise).collect();
     write_whole(path, |writer| {
         let fail = |error: png::EncodingError| OutputError::Encode {
             path: path.to_owned(),
@@ -28,7 +29,6 @@ pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<(), Output
 }
 
 fn quantise(linear: f32) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
     let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0 + 0.5) as u8
 }
@@ -39,6 +39,7 @@ mod tests {
 
     #[test]
     fn the_curve_is_srgb() {
-        assert_eq!([0.0, 0.5, 1.0, 9.0, f32::NAN].map(quantise), [0, 188, 255, 255, 0]);
+        let plain = |value| quantise(ToneMapping::default().apply([value; 3])[0]);
+        assert_eq!([0.0, 0.5, 1.0, 9.0, f32::NAN].map(plain), [0, 188, 255, 255, 0]);
     }
 }

@@ -87,11 +87,6 @@ impl State {
     /// # Errors
     /// What `to` says; a set of iterations with millions of gaps.
     pub fn write(&self, mut to: impl Write) -> io::Result<()> {
-        self.write_blocks(&mut to)
-    }
-
-    /// Compiled once, and not in each crate that writes a state.
-    fn write_blocks(&self, to: &mut dyn Write) -> io::Result<()> {
         let header = Header {
             identity: self.identity.clone(),
             iterations: self.film.iteration_set().clone(),
@@ -105,11 +100,11 @@ impl State {
         to.write_all(&MAGIC)?;
         to.write_all(&VERSION.to_le_bytes())?;
         let mut checksum = Checksum::new();
-        write_block(to, &mut checksum, text.as_bytes())?;
+        write_block(&mut to, &mut checksum, text.as_bytes())?;
         let mut bytes = Vec::new();
         for row in 0..self.identity.rect().height as usize {
             self.film.encode_row(row, &mut bytes);
-            write_block(to, &mut checksum, &bytes)?;
+            write_block(&mut to, &mut checksum, &bytes)?;
         }
         to.flush()
     }
@@ -119,13 +114,9 @@ impl State {
     /// # Errors
     /// What `from` says; bytes that are not a state, or not a whole one, or not what was written.
     pub fn read(from: impl Read) -> Result<Self, StateError> {
-        Self::read_blocks(&mut io::BufReader::with_capacity(1 << 16, from))
-    }
-
-    /// Compiled once, and not in each crate that reads a state.
-    fn read_blocks(from: &mut dyn Read) -> Result<Self, StateError> {
+        let mut from = io::BufReader::with_capacity(1 << 16, from);
         let mut mark = [0; 12];
-        if !fills(from, &mut mark)? || mark[..8] != MAGIC {
+        if !fills(&mut from, &mut mark)? || mark[..8] != MAGIC {
             return Err(StateError::NotAState);
         }
         let version = u32::from_le_bytes([mark[8], mark[9], mark[10], mark[11]]);
@@ -133,7 +124,7 @@ impl State {
             return Err(StateError::Version { expected: VERSION, found: version });
         }
         let mut checksum = Checksum::new();
-        let header = read_block(from, &mut checksum, MAX_HEADER, "header")?;
+        let header = read_block(&mut from, &mut checksum, MAX_HEADER, "header")?;
         let text = str::from_utf8(&header).map_err(|error| damaged("header", &error))?;
         let Header { identity, iterations, parts, record } =
             ron::from_str(text).map_err(|error| damaged("header", &error))?;
@@ -156,7 +147,7 @@ impl State {
         let longest = u64::from(rect.width) * (film.all_mut().count() * MAX_ENCODED) as u64;
         for row in 0..rect.height {
             let what = || format!("row {row} of {}", rect.height);
-            let block = read_block(from, &mut checksum, longest, &what())?;
+            let block = read_block(&mut from, &mut checksum, longest, &what())?;
             let mut bytes = block.as_slice();
             for sums in film.all_mut() {
                 decode(&mut bytes, rect.width as usize, numbers, sums)
@@ -166,7 +157,7 @@ impl State {
                 return Err(damaged(&what(), &"too long"));
             }
         }
-        if fills(from, &mut [0])? {
+        if fills(&mut from, &mut [0])? {
             return Err(damaged("end", &"bytes follow"));
         }
         Ok(Self { identity, record, film })
@@ -183,7 +174,7 @@ fn decode(bytes: &mut &[u8], count: usize, numbers: u64, sums: &mut Vec<Sum3>) -
     Some(())
 }
 
-fn write_block(to: &mut dyn Write, checksum: &mut Checksum, bytes: &[u8]) -> io::Result<()> {
+fn write_block(to: &mut impl Write, checksum: &mut Checksum, bytes: &[u8]) -> io::Result<()> {
     let length = u32::try_from(bytes.len()).map_err(io::Error::other)?;
     checksum.add(bytes);
     to.write_all(&length.to_le_bytes())?;
@@ -192,7 +183,7 @@ fn write_block(to: &mut dyn Write, checksum: &mut Checksum, bytes: &[u8]) -> io:
 }
 
 fn read_block(
-    from: &mut dyn Read,
+    from: &mut impl Read,
     checksum: &mut Checksum,
     longest: u64,
     what: &str,
@@ -221,7 +212,7 @@ fn read_block(
 }
 
 /// Fills the buffer; `false` if there is not enough.
-fn fills(from: &mut dyn Read, buffer: &mut [u8]) -> io::Result<bool> {
+fn fills(from: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
     match from.read_exact(buffer) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),

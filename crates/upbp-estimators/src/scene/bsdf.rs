@@ -67,64 +67,6 @@ pub struct BsdfSample {
 /// Contract, checked by [`check_bsdf`](crate::check::check_bsdf): values and densities are finite and
 /// not negative; `pdf` is the density of `sample` and integrates to at most one over the sphere of directions;
 /// `sample` agrees with `eval` and `pdf`; nothing depends on which thread asks.
-///
-/// # Example
-///
-/// A matt surface:
-///
-/// ```
-/// use std::f32::consts::{FRAC_1_PI, TAU};
-///
-/// use glam::Vec3;
-/// use upbp_estimators::Spectrum;
-/// use upbp_estimators::check::check_bsdf;
-/// use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
-///
-/// /// Reflects light of one side to all directions of that side.
-/// #[derive(Clone, Copy)]
-/// struct Matt(Spectrum);
-///
-/// impl Bsdf for Matt {
-///     fn eval(&self, towards_light: Vec3, towards_camera: Vec3, _: Interface) -> Spectrum {
-///         if towards_light.z * towards_camera.z > 0.0 { self.0 * FRAC_1_PI } else { Spectrum::ZERO }
-///     }
-///
-///     fn pdf(&self, from: Vec3, to: Vec3, _: Interface) -> f32 {
-///         if from.z * to.z > 0.0 { to.z.abs() * FRAC_1_PI } else { 0.0 }
-///     }
-///
-///     fn sample(
-///         &self,
-///         from: Vec3,
-///         _: Walk,
-///         interface: Interface,
-///         _: f32,
-///         [u, v]: [f32; 2],
-///     ) -> Option<BsdfSample> {
-///         let (sin, cos) = (TAU * v).sin_cos();
-///         let to = Vec3::new(u.sqrt() * cos, u.sqrt() * sin, (1.0 - u).sqrt() * from.z.signum());
-///         Some(BsdfSample {
-///             to,
-///             weight: self.0,
-///             pdf: self.pdf(from, to, interface),
-///             pdf_reverse: self.pdf(to, from, interface),
-///             delta: false,
-///         })
-///     }
-///
-///     fn is_connectible(&self) -> bool {
-///         true
-///     }
-///
-///     fn continuation(&self, _: Vec3) -> f32 {
-///         self.0.max_component()
-///     }
-/// }
-///
-/// let clay = Matt(Spectrum::new(0.6, 0.4, 0.3));
-/// check_bsdf(&clay, Interface::MATCHED)?;
-/// # Ok::<(), upbp_estimators::check::ContractViolation>(())
-/// ```
 pub trait Bsdf: Copy + Send + Sync {
     /// Value of the smooth lobes, sr⁻¹, without a cosine: radiance scattered `towards_camera` per irradiance
     /// that arrives from `towards_light`. Includes the compression of radiance at a rough refraction, hence is

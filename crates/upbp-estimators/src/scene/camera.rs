@@ -40,68 +40,6 @@ pub struct PixelRect {
 }
 
 /// A camera with an ideal lens: the value of a pixel is the mean radiance over its square and the lens.
-///
-/// # Example
-///
-/// A pinhole:
-///
-/// ```
-/// use glam::{Vec2, Vec3};
-/// use upbp_estimators::check::check_camera;
-/// use upbp_estimators::scene::{Camera, CameraConnection, CameraRay};
-///
-/// /// A pinhole that looks along −z, with a field of view of 90 degrees.
-/// struct Pinhole {
-///     position: Vec3,
-///     /// Pixels per side of the film.
-///     size: u32,
-/// }
-///
-/// impl Pinhole {
-///     /// Distance of a film on which a pixel has unit area, which is half as many pixels wide.
-///     fn film_distance(&self) -> f32 {
-///         0.5 * self.size as f32
-///     }
-///
-///     fn pdf(&self, direction: Vec3) -> f32 {
-///         let cos = -direction.z;
-///         (self.film_distance() / cos).powi(2) / cos
-///     }
-/// }
-///
-/// impl Camera for Pinhole {
-///     fn resolution(&self) -> (u32, u32) {
-///         (self.size, self.size)
-///     }
-///
-///     fn ray(&self, film: Vec2, _: [f32; 2]) -> Option<CameraRay> {
-///         let half = self.film_distance();
-///         let direction = Vec3::new(film.x - half, half - film.y, -half).normalize();
-///         Some(CameraRay { origin: self.position, direction, pdf: self.pdf(direction) })
-///     }
-///
-///     fn connect(&self, point: Vec3, _: [f32; 2]) -> Option<CameraConnection> {
-///         let (half, between) = (self.film_distance(), point - self.position);
-///         let film = half + Vec2::new(between.x, -between.y) * (half / -between.z);
-///         let inside = film.cmpge(Vec2::ZERO).all() && film.cmplt(Vec2::splat(2.0 * half)).all();
-///         (between.z < 0.0 && inside).then(|| CameraConnection {
-///             lens: self.position,
-///             film,
-///             pdf: self.pdf(between.normalize()),
-///         })
-///     }
-///
-///     fn is_pinhole(&self) -> bool {
-///         true
-///     }
-/// }
-///
-/// let camera = Pinhole { position: Vec3::new(0.0, 0.0, 3.0), size: 64 };
-/// check_camera(&camera)?;
-/// let centre = camera.connect(Vec3::ZERO, [0.5; 2]).expect("in the middle of the film");
-/// assert_eq!(centre.film, Vec2::splat(32.0));
-/// # Ok::<(), upbp_estimators::check::ContractViolation>(())
-/// ```
 pub trait Camera: Send + Sync {
     /// Width and height of the film in pixels.
     fn resolution(&self) -> (u32, u32);
