@@ -29,7 +29,7 @@ deny:
 
 # What a version number has to say about the changes since BASE
 semver BASE:
-    cargo semver-checks --workspace --exclude upbp --baseline-rev {{BASE}}
+    cargo semver-checks --workspace --exclude upbp --exclude upbp-testing --baseline-rev {{BASE}}
 
 # Renders the shipped scene: cornell_media.exr and cornell_media.png
 render:

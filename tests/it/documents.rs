@@ -1,8 +1,14 @@
-//! The documents: links lead somewhere, and cited sections of the theory exist.
+//! The documents: links lead somewhere; sections, tests and names that they cite exist; the scene and the host of the
+//! README work.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+
+use upbp_core::scene::Scene;
+use upbp_core::{Renderer, Settings, Stop};
+use upbp_scene::ReadyScene;
 
 /// Folders that hold neither documents nor sources.
 const SKIPPED: [&str; 4] = [".git", "target", "corpus", "artifacts"];
@@ -69,6 +75,11 @@ fn targets(line: &str) -> Vec<&str> {
     found
 }
 
+/// The spans between pairs of backticks.
+fn code_spans(line: &str) -> impl Iterator<Item = &str> {
+    line.split('`').skip(1).step_by(2)
+}
+
 #[test]
 fn links_lead_to_files_and_headings() {
     let texts: BTreeMap<PathBuf, String> = files(".md")
@@ -127,4 +138,112 @@ fn cited_sections_of_the_theory_exist() {
     }
     assert!(citations > 30, "{citations} citations");
     assert!(missing.is_empty(), "{missing:#?}");
+}
+
+/// The second column of the table of invariants names files, folders and functions, in backticks.
+#[test]
+fn tests_of_the_invariants_exist() {
+    let text = fs::read_to_string(root().join("CONTRIBUTING.md")).unwrap();
+    let (_, table) = text.split_once("## Invariants").unwrap();
+    let sources: Vec<String> = files(".rs").iter().map(|file| fs::read_to_string(file).unwrap()).collect();
+    let paths: Vec<PathBuf> = files(".rs");
+    let exists = |name: &str| {
+        let is_path = paths.iter().any(|path| {
+            path.ends_with(name)
+                || path.ancestors().any(|folder| folder.ends_with(name.trim_end_matches('/')))
+        });
+        is_path || sources.iter().any(|source| source.contains(&format!("fn {name}(")))
+    };
+    let mut missing = Vec::new();
+    let mut names = 0;
+    for line in table.lines().take_while(|line| !line.starts_with("## ")) {
+        let Some(test) = line.strip_prefix('|').and_then(|row| row.split('|').nth(1)) else { continue };
+        for name in code_spans(test) {
+            names += 1;
+            if !exists(name) {
+                missing.push(name.to_owned());
+            }
+        }
+    }
+    assert!(names > 30, "{names} names");
+    assert!(missing.is_empty(), "{missing:#?}");
+}
+
+/// Names of types and functions, in backticks: what is written `like_this`, `LikeThis` or with a path.
+#[test]
+fn names_in_documents_exist() {
+    let sources: Vec<String> = files(".rs").iter().map(|file| fs::read_to_string(file).unwrap()).collect();
+    let words: BTreeSet<&str> = sources
+        .iter()
+        .flat_map(|source| source.split(|c: char| !c.is_ascii_alphanumeric() && c != '_'))
+        .collect();
+    let mut missing = Vec::new();
+    let mut names = 0;
+    for document in ["docs/design.md", "docs/theory.md", "docs/reliability.md"] {
+        let text = fs::read_to_string(root().join(document)).unwrap();
+        for span in prose(&text).flat_map(code_spans) {
+            let is_name = span.chars().all(|c| c.is_ascii_alphanumeric() || "_:".contains(c))
+                && span.chars().any(|c| c.is_ascii_lowercase());
+            // Shorter words may be symbols of a formula.
+            let is_name = is_name
+                && (span.contains("::")
+                    || span.len() > 3 && span.starts_with(|c: char| c.is_ascii_uppercase())
+                    || span.len() > 13 && span.contains('_'));
+            if !is_name {
+                continue;
+            }
+            names += 1;
+            let is_known = span.split("::").all(|word| words.contains(word));
+            if !is_known {
+                missing.push(format!("{document}: {span}"));
+            }
+        }
+    }
+    assert!(names > 40, "{names} names");
+    assert!(missing.is_empty(), "{missing:#?}");
+}
+
+/// The first block of code in a language.
+fn block<'a>(text: &'a str, language: &str) -> &'a str {
+    let (_, rest) = text.split_once(&format!("```{language}\n")).unwrap();
+    rest.split_once("```").unwrap().0
+}
+
+#[test]
+fn the_scene_of_the_readme_renders() {
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let text = block(&readme, "ron");
+    let small = text.replace("width: 640, height: 480", "width: 16, height: 12");
+    assert_ne!(small, text);
+    let scene = ReadyScene::from_ron_str(&small, ".").unwrap();
+    let mut renderer = scene.renderer(Settings::default().validate().unwrap()).unwrap();
+    assert!(renderer.iterate());
+}
+
+#[test]
+fn the_host_of_the_readme_is_compiled_below() {
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let compiled = include_str!("documents.rs");
+    for line in block(&readme, "rust,ignore").lines() {
+        assert!(compiled.contains(line.trim()), "{line}");
+    }
+}
+
+/// The lines that the README shows.
+#[expect(dead_code, reason = "compiled, not run: a host is needed")]
+fn host<S: Scene>(my_scene: &S, my_window: &Window) -> Result<(), Box<dyn std::error::Error>> {
+    let settings = Settings::default();
+    let mut renderer = Renderer::new(my_scene, settings.validate()?)?;
+    renderer.render(&Stop { seconds: Some(60.0), ..Stop::default() }, |progress| {
+        my_window.show(&progress.film.image());
+        ControlFlow::Continue(())
+    });
+    Ok(())
+}
+
+/// Whatever a host shows pictures with.
+struct Window;
+
+impl Window {
+    fn show(&self, _: &upbp_core::Image) {}
 }

@@ -5,7 +5,7 @@
 //! * [`plans`]: the choice of techniques.
 //! * [`runs`]: renders that are repeated, split, resumed, stopped, or very long; their memory.
 //! * [`hostile`]: hosts, numbers, files and scenes at the ends of what is possible, and beyond.
-//! * [`documents`]: links, and what documents and comments cite.
+//! * [`documents`]: links, citations and examples of the documents.
 
 mod agreement;
 mod documents;
