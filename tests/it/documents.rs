@@ -1,5 +1,5 @@
-//! The documents: links lead somewhere; sections, tests and names that they cite exist; the scene and the host of the
-//! README work.
+//! The documents: links lead somewhere; sections, tests and names that they cite exist; the scene and the
+//! host of the README work.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,4 +1,5 @@
-//! Tests of the crates together, in one program: to link everything once takes less time than to do so for each file.
+//! Tests of the crates together, in one program: to link everything once takes less time than to do so for
+//! each file.
 //!
 //! * [`known_answers`]: closed forms, tables of transport theory, images of an independent renderer.
 //! * [`agreement`]: different ways to compute a picture give the same picture.

@@ -40,7 +40,7 @@ impl Case {
         self.inputs[name].as_str().unwrap_or_else(|| panic!("{}: no text `{name}`", self.id))
     }
 
-    /// What is expected, by its path of names.
+    /// An expected value, by its path of names.
     pub fn expected(&self, path: &[&str]) -> f64 {
         let value = path.iter().fold(&self.expected, |value, name| &value[*name]);
         value.as_f64().unwrap_or_else(|| panic!("{}: nothing expected of {path:?}", self.id))
@@ -72,8 +72,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// A result with its standard error. `slack` is what it may differ without being wrong: accuracy of the expected
-    /// value, finite geometry, kernel bias.
+    /// A result with its standard error. `slack` is what it may differ without being wrong: accuracy of the
+    /// expected value, finite geometry, kernel bias.
     pub fn check(&mut self, name: &str, result: Estimate, expected: f64, slack: f64) {
         let difference = result.mean - expected;
         // Below single precision an error means nothing.
@@ -111,7 +111,7 @@ pub fn scene(parts: &str) -> ReadyScene {
     }
 }
 
-/// A camera whose film of `size` squared pixels covers so little that all of them see the same.
+/// A camera whose film of `size` squared pixels covers so little that all pixels see the same.
 pub fn narrow_camera(origin: [f64; 3], target: [f64; 3], size: u32) -> String {
     let along = [0, 1, 2].map(|i| target[i] - origin[i]);
     // Upright along the axis that the view is farthest from.

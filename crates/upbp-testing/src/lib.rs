@@ -1,4 +1,5 @@
-//! Hosts, scenes, statistics and the stress grid that the tests, examples, benches and fuzz targets of the workspace share.
+//! Hosts, scenes, statistics and the stress grid that the tests, examples, benches and fuzz targets of the
+//! workspace share.
 //!
 //! * [`Estimate`], [`render`], [`render_channels`]: short renders as means with standard errors.
 //! * [`analytic`]: the table of exact values of transport theory.

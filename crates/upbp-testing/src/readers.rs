@@ -1,5 +1,5 @@
-//! Everything that reads files, and what becomes of a file that is accepted: an error or a result, never a panic. For
-//! `tests/it/hostile/parsers.rs` and the targets in `fuzz/`.
+//! Everything that reads files, and what becomes of a file that is accepted: an error or a result, never a
+//! panic. For `tests/it/hostile/parsers.rs` and the targets in `fuzz/`.
 
 use std::path::Path;
 
@@ -81,7 +81,7 @@ pub fn read_state(bytes: &[u8]) {
     }
 }
 
-/// What lies between the first `start` and the next `end` is replaced.
+/// Replaces the bytes between the first `start` and the next `end`.
 fn replace_between(bytes: &[u8], start: &[u8], end: &[u8], new: &[u8]) -> Vec<u8> {
     let find = |part: &[u8], from: usize| {
         bytes[from..].windows(part.len()).position(|window| window == part).map(|at| from + at)
@@ -93,7 +93,8 @@ fn replace_between(bytes: &[u8], start: &[u8], end: &[u8], new: &[u8]) -> Vec<u8
     }
 }
 
-/// A changed state file with a good beginning, lengths and checksums: else nothing behind them would ever be reached.
+/// A changed state file with a good beginning, lengths and checksums: else nothing behind them would ever be
+/// reached.
 pub fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut sealed = b"UPBPSTAT\x02\0\0\0".to_vec();
     let mut checksum = 0xcbf2_9ce4_8422_2325_u64;

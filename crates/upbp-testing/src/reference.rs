@@ -72,7 +72,8 @@ impl Reference {
 fn sigmas(render: &Estimate, reference: &Estimate) -> f64 {
     let difference = render.mean - reference.mean;
     // What was the same in every iteration, such as an environment that is seen directly, is exact only up to
-    // rounding and to what is too rare to have happened, such as the corner of a body in the corner of a pixel.
+    // rounding and to what is too rare to have happened, such as the corner of a body in the corner of a
+    // pixel.
     let unseen = 1e-4 * reference.mean.abs();
     difference / render.error.max(unseen).hypot(reference.error).max(f64::MIN_POSITIVE)
 }

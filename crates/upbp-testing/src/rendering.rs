@@ -39,7 +39,8 @@ fn iterate_by(mut renderer: Renderer<'_>, iterations: u64) -> (Vec<[f64; 3]>, Im
     (means, renderer.film().image())
 }
 
-/// Renders `iterations` iterations and returns the estimate of the image mean over the channels, and the image.
+/// Renders `iterations` iterations and returns the estimate of the image mean over the channels, and the
+/// image.
 pub fn render(scene: &ReadyScene, settings: &Settings, iterations: u64) -> (Estimate, Image) {
     render_by(renderer(scene, settings.clone()), iterations)
 }

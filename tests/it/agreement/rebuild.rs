@@ -20,9 +20,9 @@ const TINY: f64 = 3e-6;
 /// An interior vertex as it was observed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Vertex {
-    /// Where the light sub-path has it.
+    /// Place by the light sub-path.
     pub(crate) light: DVec3,
-    /// Where the camera sub-path has it; differs from `light` at a merge.
+    /// Place by the camera sub-path; differs from `light` at a merge.
     pub(crate) camera: DVec3,
     pub(crate) in_medium: bool,
     /// Whether it scattered by a Dirac lobe.
@@ -47,7 +47,7 @@ pub(crate) struct Trace {
     pub(crate) lens: Vec3,
 }
 
-/// Why a path cannot be rebuilt.
+/// A reason why a path cannot be rebuilt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Doubt {
     /// A vertex is within rounding of a boundary of media.
@@ -76,7 +76,7 @@ fn stretch(medium: &Fog, length: f64) -> (f64, f64) {
     (mean(&|s| (-s * length).exp()), mean(&|s| s * (-s * length).exp()))
 }
 
-/// What lies between two points: the media by containment at the middle of each stretch.
+/// Density of passing from one point to another: the media by containment at the middle of each stretch.
 fn pass(scene: &ClosedForm, from: DVec3, to: DVec3) -> Result<Passed, Doubt> {
     let length = (to - from).length();
     if length < TINY {
@@ -195,7 +195,7 @@ fn in_medium(
     }
 }
 
-/// What rays start off their surfaces by, 32 roundings of coordinates up to 2.
+/// Distance of the starts of rays from their surfaces: 32 roundings of coordinates up to 2.
 const OFFSET: f64 = 8e-6;
 
 impl Trace {
@@ -204,9 +204,9 @@ impl Trace {
         self.interior.len() + 1
     }
 
-    /// By how much rounding may change a weight, relative: tried out, with every vertex moved along every axis by what rays
-    /// start off their surfaces by. Steep are refraction and cosines at grazing angles, short edges, beams that are
-    /// almost parallel, chords through bodies that are only just touched.
+    /// By how much rounding may change a weight, relative: tried out, with every vertex moved along every
+    /// axis by what rays start off their surfaces by. Steep are refraction and cosines at grazing angles,
+    /// short edges, beams that are almost parallel, chords through bodies that are only just touched.
     pub(crate) fn sensitivity(
         &self,
         scene: &ClosedForm,
@@ -214,7 +214,8 @@ impl Trace {
         weight: impl Fn(&Path) -> f64,
         expected: f64,
     ) -> f64 {
-        // Vertices may be off their surfaces by no more than rounding, so the step is smaller and the result scaled.
+        // Vertices may be off their surfaces by no more than rounding, so the step is smaller and the result
+        // scaled.
         const STEP: f64 = 1e-6;
         let mut sum = 0.0;
         for i in 0..self.interior.len() {
@@ -230,7 +231,8 @@ impl Trace {
         sum * OFFSET / STEP
     }
 
-    /// The ends of the edges: edge i runs from the camera's side of vertex i to the light's side of vertex i + 1.
+    /// The ends of the edges: edge i runs from the camera's side of vertex i to the light's side of vertex i
+    /// + 1.
     fn ends(&self, scene: &ClosedForm) -> Vec<(DVec3, DVec3)> {
         let lens = self.lens.as_dvec3();
         let light = &scene.lights[self.light.emitter.0 as usize];

@@ -1,4 +1,4 @@
-//! Where sub-paths end changes what an image costs and how noisy it is, and not what it shows.
+//! Russian roulette: it changes what an image costs and how noisy it is, and not what it shows.
 
 use std::path::Path;
 
@@ -6,7 +6,8 @@ use upbp_core::{Roulette, Settings, Techniques};
 use upbp_scene::ReadyScene;
 use upbp_testing::{Estimate, assert_same, channels, iterate};
 
-/// Walks by the albedo at every vertex against walks that are spared, and that never end: 16 seeds of three iterations each.
+/// Walks by the albedo at every vertex against walks that are spared, and that never end: 16 seeds of three
+/// iterations each.
 #[test]
 fn means_do_not_depend_on_the_roulette() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -82,7 +82,7 @@ fn mean(scene: &ClosedForm, choices: &PlanChoices) -> (f64, f64) {
     mean_of_blocks(scene, choices, 1)
 }
 
-/// Mean and standard error over blocks of so many iterations.
+/// Mean and standard error over blocks of `block` iterations.
 fn mean_of_blocks(scene: &ClosedForm, choices: &PlanChoices, block: u64) -> (f64, f64) {
     let one = |i| iteration(scene, &PlanChoices { iteration: i, ..choices.clone() });
     let mean_of = |first: u64| (first..first + block).map(one).sum::<f64>() / block as f64;
@@ -93,7 +93,7 @@ fn mean_of_blocks(scene: &ClosedForm, choices: &PlanChoices, block: u64) -> (f64
     (mean, (variance / n).sqrt())
 }
 
-/// Compares sets of techniques with the first of them: within four standard errors and half a per cent, which
+/// Compares sets of techniques with the first one: within four standard errors and half a per cent, which
 /// is more than kernels of this size blur.
 fn agree(camera: Vec3, powers: [f32; 5], lengths: PathLengths, sets: &[&str]) {
     let mut scene = ClosedForm::new(camera, SIZE);

@@ -29,7 +29,8 @@ const TOLERANCE: f64 = 1e-4;
 /// The share of the weights that agree to [`TOLERANCE`] without further ado.
 const REGULAR: f64 = 0.98;
 
-/// No difference exceeds this many times the tolerance and what moving the vertices by rounding does to the weight.
+/// No difference exceeds this many times the tolerance and what moving the vertices by rounding does to the
+/// weight.
 const LARGEST_EXCESS: f64 = 2.0;
 
 /// Differences of one technique.
@@ -286,8 +287,9 @@ fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: u
             quantile(0.999),
             quantile(1.0),
         );
-        // A vertex within rounding of a boundary cannot be rebuilt: about one sample in 10⁴, a Poisson count, in clusters
-        // since samples share vertices. This only guards that hardly any sample escapes the comparison.
+        // A vertex within rounding of a boundary cannot be rebuilt: about one sample in 10⁴, a Poisson count,
+        // in clusters since samples share vertices. This only guards that hardly any sample escapes the
+        // comparison.
         let expected = 1e-4 * seen as f64;
         let most = expected + 4.0 * expected.sqrt() + 4.0;
         assert!(doubtful as f64 <= most, "{technique:?}: {doubtful} of {seen} in doubt");

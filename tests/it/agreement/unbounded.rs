@@ -1,4 +1,5 @@
-//! A medium around everything: beams that end nowhere, and light from infinity that gets through in some channels only.
+//! A medium around everything: beams that end nowhere, and light from infinity that gets through in some
+//! channels only.
 
 use std::f64::consts::PI;
 
@@ -22,11 +23,11 @@ fn fixed_radii(radius: f32) -> Radii {
 /// Share of what is extinguished that is scattered.
 const ALBEDO: f64 = 0.8;
 
-/// Where the light is, seen from the camera that looks along z.
+/// Place of the light, seen from the camera that looks along z.
 const LIGHT: [f64; 2] = [1.0, 2.0];
 
-/// A point light of intensity 1 in fog without an end, and a black ball beside it, which makes the scene half a unit large. All pixels see
-/// the same.
+/// A point light of intensity 1 in fog without an end, and a black ball beside it, which makes the scene half
+/// a unit large. All pixels see the same.
 fn fog(sigma_t: Rgb) -> ReadyScene {
     let [a, s] = [1.0 - ALBEDO, ALBEDO].map(|share| sigma_t.map(|sigma| share * sigma));
     scene(&format!(
@@ -39,7 +40,8 @@ fn fog(sigma_t: Rgb) -> ReadyScene {
     ))
 }
 
-/// The light that was scattered once, by quadrature: `∫ σ_s/4π e^{−σ_t (t + d)}/d² dt` with t along the ray and d from there to the light.
+/// The light that was scattered once, by quadrature: `∫ σ_s/4π e^{−σ_t (t + d)}/d² dt` with t along the ray
+/// and d from there to the light.
 fn once(sigma_t: f64) -> f64 {
     const STEPS: u32 = 100_000;
     let [across, along] = LIGHT;

@@ -1,5 +1,5 @@
-//! Hosts that break the contract of their scene: the renderer drops and counts, or refuses, and never panics; what reaches
-//! the film is finite and not negative; and the contract checkers find every kind of fault.
+//! Hosts that break the contract of their scene: the renderer drops and counts, or refuses, and never panics;
+//! what reaches the film is finite and not negative; and the contract checkers find every kind of fault.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -17,7 +17,7 @@ use upbp_core::{
 };
 use upbp_scene::{Light, Material, PerspectiveCamera, ReadyScene};
 
-/// What the host does wrong.
+/// A contract that the host breaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     None,
@@ -474,7 +474,8 @@ fn nothing_bad_reaches_the_film_and_nothing_panics() {
             let outcome = std::panic::catch_unwind(|| render(fault, techniques));
             let counters = outcome.unwrap_or_else(|_| panic!("{fault:?} panics"));
             println!("{fault:?}, {techniques}: {counters:?}");
-            // Values that take part in a contribution are dropped there, and counted. Walks that are told what cannot be are lost.
+            // Values that take part in a contribution are dropped there, and counted. Walks that are told
+            // what cannot be are lost.
             match fault {
                 F::BsdfNan | F::BsdfNegative | F::BsdfInfinite | F::Radiance(_) => {
                     assert!(counters.expect("renders").dropped > 0, "{fault:?}");
@@ -507,7 +508,7 @@ fn scenes_without_bounds_or_power_are_refused() {
     assert!(render(F::Bounds(0.0), "all").unwrap_err().contains("bounds"));
 }
 
-/// What the checkers say of a scene, each asked for what it is about.
+/// The verdict of the checkers on a scene, each asked for what it is about.
 fn check(fault: Fault) -> Result<(), String> {
     let scene = Hostile::new(fault);
     let bounds = scene.bounds();
@@ -550,7 +551,7 @@ fn the_checkers_find_every_fault() {
     }
 }
 
-/// A renderer of a good scene that is cancelled after so many rays.
+/// A renderer of a scene that is cancelled by one of its rays.
 fn begin(scene: &Hostile) -> Result<Renderer<'_>, RenderError> {
     let settings = Settings { deterministic: true, max_length: 20, ..Settings::default() };
     let canceller = scene.end.as_ref().map(|(_, canceller)| canceller.clone()).unwrap_or_default();

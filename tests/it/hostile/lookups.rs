@@ -46,7 +46,7 @@ fn ray() -> impl Strategy<Value = Ray> {
     })
 }
 
-/// Elements, some of them many times.
+/// Elements, some many times.
 fn crowd<T: Clone + std::fmt::Debug>(one: impl Strategy<Value = T>) -> impl Strategy<Value = Vec<T>> {
     (prop::collection::vec(one, 0..60), 0_usize..200).prop_map(|(mut all, copies)| {
         if let Some(first) = all.first().cloned() {

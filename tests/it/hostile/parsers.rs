@@ -1,4 +1,5 @@
-//! What is read from files, with files that are nearly right and with noise: an error or a result, never a panic.
+//! Readers of files, with files that are nearly right and with noise: an error or a result, never a
+//! panic.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -18,7 +19,7 @@ const SETTINGS: &str = include_str!("../../data/parsers/settings.ron");
 
 const MESH: &str = include_str!("../../data/parsers/mesh.obj");
 
-/// What takes the place of a piece.
+/// Replacements of a piece of a file.
 const PIECES: [&str; 24] = [
     "",
     "0",

@@ -1,12 +1,12 @@
-//! Variance of points and beams where it has a closed form: two fixed rays that cross at right angles in a homogeneous
-//! medium (`docs/theory.md`, section 2.7).
+//! Variance of points and beams where it has a closed form: two fixed rays that cross at right angles in a
+//! homogeneous medium (`docs/theory.md`, section 2.7).
 //!
-//! A light that shoots a single ray and a camera that sees along a single ray leave nothing random but the distances
-//! that the walks sample. Walks, stored photons and beams, trees, kernels and estimators are those of the renderer; a
-//! plan of one technique gives every sample the weight one.
+//! A light that shoots a single ray and a camera that sees along a single ray leave nothing random but the
+//! distances that the walks sample. Walks, stored photons and beams, trees, kernels and estimators are those
+//! of the renderer; a plan of one technique gives every sample the weight one.
 //!
-//! With the extinction as unit of length, the kernel occupies `[a, a + w]` on both rays and its centre is the crossing.
-//! Second moments over squared means:
+//! With the extinction as unit of length, the kernel occupies `[a, a + w]` on both rays and its centre is the
+//! crossing. Second moments over squared means:
 //!
 //! | technique | light's side | camera's side |
 //! |---|---|---|
@@ -16,8 +16,8 @@
 //! | BB1D | 1 (long), short beam at the crossing (short) | the same |
 //! | PP3D, ball | a ball does not factor into intervals: quadrature over both rays ||
 //!
-//! The estimators blur beams only across, never along: the factor "short beam with overlap" belongs to none of them. It
-//! is checked with the stored beams' own ends.
+//! The estimators blur beams only across, never along: the factor "short beam with overlap" belongs to none
+//! of them. It is checked with the stored beams' own ends.
 
 use std::ops::RangeInclusive;
 
@@ -200,7 +200,7 @@ impl Moment {
     }
 }
 
-/// Which technique, on which rays.
+/// A technique and its rays.
 #[derive(Clone, Copy)]
 struct Setup {
     technique: &'static str,
@@ -279,7 +279,8 @@ impl Setup {
         chunk
     }
 
-    /// The moment of one light sub-path against one camera sub-path, from `batches` of `light` times `camera`.
+    /// The moment of one light sub-path against one camera sub-path, from `batches` of `light` times
+    /// `camera`.
     fn measure(&self, batches: u64, light: u32, camera: u32) -> Moment {
         let sums: Vec<Sums> = (0..batches)
             .into_par_iter()
@@ -461,7 +462,7 @@ fn two_random_ends() {
     assert!(failures.is_empty(), "more than 1 % off:\n{}", failures.join("\n"));
 }
 
-/// Where the logarithm of a ratio of moments, as good as straight in so small a range, passes zero.
+/// The zero of the logarithm of a ratio of moments, which is as good as straight in a small range.
 fn crossover(range: RangeInclusive<f64>, ratio: impl Fn(f64) -> f64) -> f64 {
     let (start, end) = range.into_inner();
     let points: Vec<(f64, f64)> =

@@ -3,7 +3,8 @@
 use upbp_testing::analytic::{Case, Table, cases, scene, settings, vector};
 use upbp_testing::render;
 
-/// What merges may lose at boundaries, where a kernel sticks out of its medium; falls with the radius.
+/// The part that merges may lose at boundaries, where a kernel sticks out of its medium; falls with the
+/// radius.
 const BOUNDARY_LOSS: f64 = 0.005;
 
 fn describe(case: &Case) -> String {

@@ -1,6 +1,7 @@
 //! A point source in an infinite medium: the photons that light sub-paths store.
 //!
-//! A photon carries flux over density on arrival, so that photons in a volume sum to the fluence integrated over it.
+//! A photon carries flux over density on arrival, so that photons in a volume sum to the fluence integrated
+//! over it.
 
 use upbp_core::TechniqueSet;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
@@ -82,7 +83,8 @@ fn fluence_around_a_point_source() {
     let mut table = Table::default();
     for case in cases("infinite_point_source_fluence") {
         let r = case.input("r");
-        // A shell of this half-thickness; the mean of the fluence in it differs by some h²/6 of its second derivative.
+        // A shell of this half-thickness; the mean of the fluence in it differs by some h²/6 of its second
+        // derivative.
         let half = (0.03 * r).min(0.1);
         let volume = 4.0 / 3.0 * std::f64::consts::PI * ((r + half).powi(3) - (r - half).powi(3));
         let mut sums = Sums::default();

@@ -1,6 +1,6 @@
-//! Every reference scene, by bidirectional path tracing, by the whole mixture and by what the program chooses, against an image of an
-//! independent renderer: short renders, errors in standard deviations. `examples/validate` does the same with more
-//! time and all techniques.
+//! Every reference scene, by bidirectional path tracing, by the whole mixture and by what the program
+//! chooses, against an image of an independent renderer: short renders, errors in standard deviations.
+//! `examples/validate` does the same with more time and all techniques.
 
 use upbp_core::Settings;
 use upbp_scene::ReadyScene;
@@ -10,11 +10,11 @@ use upbp_testing::shipped::Shipped;
 /// Iterations of each render: enough for the spread to be known.
 const ITERATIONS: u64 = 40;
 
-/// Standard errors that the mean of an image may be off. Of 30 renders with independent errors one is beyond with a
-/// probability of 0.1 %.
+/// Standard errors that the mean of an image may be off. Of 30 renders with independent errors one is beyond
+/// with a probability of 0.1 %.
 const MEAN: f64 = 4.0;
 
-/// The same for one of some 100 tiles of 3 channels in 30 renders. The spread of 40
+/// Standard errors that one of some 100 tiles of 3 channels may be off in 30 renders. The spread of 40
 /// iterations with a skew distribution has heavier tails than a normal one.
 const TILE: f64 = 6.0;
 

@@ -6,8 +6,8 @@ use upbp_core::{LightPaths, Settings};
 use upbp_testing::analytic::{Case, Table, cases, medium, narrow_camera, scene, settings, vector};
 use upbp_testing::render;
 
-/// Cases that merges can be asked in a test's time: the light neither hidden behind many mean free paths nor so close, or
-/// the phase function so peaked, that few photons carry all of it.
+/// Cases that merges can be asked in a test's time: the light neither hidden behind many mean free paths nor
+/// so close, or the phase function so peaked, that few photons carry all of it.
 const MERGED: [&str; 7] = [
     "single_point_0",
     "single_point_2",
@@ -89,8 +89,9 @@ fn point_light_seen_through_fog() {
     table.finish();
 }
 
-/// What a merge must give with a kernel of some radius, by quadrature: along the ray, the light of the point source is averaged
-/// over the kernel instead of taken at the point. Isotropic scattering; the kernel does not reach the light.
+/// The mean of a merge with a kernel of some radius, by quadrature: along the ray, the light of the point
+/// source is averaged over the kernel instead of taken at the point. Isotropic scattering; the kernel does
+/// not reach the light.
 fn smoothed(technique: &str, case: &Case, radius: f64) -> f64 {
     let sigma_t = case.input("sigma_a") + case.input("sigma_s");
     let fluence = |d: f64| (-sigma_t * d).exp() / (d * d);
@@ -131,9 +132,10 @@ fn smoothed(technique: &str, case: &Case, radius: f64) -> f64 {
     case.input("sigma_s") / (4.0 * PI) * (0..2000).map(steps(2000)).map(integrand).sum::<f64>() / 2000.0
 }
 
-/// Far from all boundaries the bias of a merge falls like the square of its radius: PP3D and PB2D have the bias that
-/// quadrature predicts, whose exponent comes to two as the radius shrinks. BB1D smooths across both beams at once, which is
-/// not predicted here; a bias of 10 % and more contains the next order, and its exponent is above two.
+/// Far from all boundaries the bias of a merge falls like the square of its radius: PP3D and PB2D have the
+/// bias that quadrature predicts, whose exponent comes to two as the radius shrinks. BB1D smooths across both
+/// beams at once, which is not predicted here; a bias of 10 % and more contains the next order, and its
+/// exponent is above two.
 #[test]
 fn bias_falls_with_the_square_of_the_radius() {
     let case = cases("single_scatter_point_light").remove(0);

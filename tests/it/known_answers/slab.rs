@@ -1,13 +1,14 @@
 //! Reflectance and transmittance of slabs.
 //!
-//! Light paths can be reversed: a camera ray that falls on the slab in some direction sees, of a half-space above that
-//! shines with radiance 1, what light from that direction would have returned. Above the slab shines a red plane, below
-//! it a green one; the camera stands in the narrow gap above.
+//! Light paths can be reversed: a camera ray that falls on the slab in some direction sees, of a half-space
+//! above that shines with radiance 1, what light from that direction would have returned. Above the slab
+//! shines a red plane, below it a green one; the camera stands in the narrow gap above.
 
 use upbp_testing::analytic::{Case, Table, cases, medium, narrow_camera, scene, settings};
 use upbp_testing::render_channels;
 
-/// Between slab and planes, in mean free paths, against a half-width of 1e4: what leaves sideways is negligible.
+/// Between slab and planes, in mean free paths, against a half-width of 1e4: what leaves sideways is
+/// negligible.
 const GAP: f64 = 0.01;
 
 fn slab(case: &Case, material: &str, camera: &str, more: &str) -> upbp_scene::ReadyScene {
@@ -56,8 +57,8 @@ fn slabs() {
                 case.accuracy,
             );
         }
-        // A white patch on the slab, seen from the slab's side, spreads camera rays as diffuse light is spread. It is
-        // too small to shade what comes back.
+        // A white patch on the slab, seen from the slab's side, spreads camera rays as diffuse light is
+        // spread. It is too small to shade what comes back.
         let patch = "(geometry: Quad(origin: (-1e-4, -1e-4, 1e-3), edge_u: (2e-4, 0.0, 0.0), edge_v: (0.0, 2e-4, 0.0)),
             material: \"white\")";
         let camera = narrow_camera([0.0, 0.0, 5e-4], [0.0, 0.0, 1e-3], 32);

@@ -1,4 +1,5 @@
-//! The choice of techniques: it leaves out what a scene does not need, changes no expectation, and can be repeated and frozen.
+//! The choice of techniques: it leaves out what a scene does not need, changes no expectation, and can be
+//! repeated and frozen.
 
 use std::path::Path;
 
@@ -67,7 +68,8 @@ fn light_that_only_merges_find_is_not_lost() {
     }
 }
 
-/// Kernels of surface photons may be as wide as a pixel, where that is more than usual and nobody asked for a radius.
+/// Kernels of surface photons may be as wide as a pixel, where that is more than usual and nobody asked for a
+/// radius.
 #[test]
 fn surface_photons_blur_what_a_pixel_blurs() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/suite/surface_caustic.ron");
@@ -88,8 +90,8 @@ fn surface_photons_blur_what_a_pixel_blurs() {
 
 /// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.
 ///
-/// Kernels have a fifth of their usual width: at first they blur 0.2 % of the light out of the medium of one of the scenes, whoever chose
-/// them, and this is about what choosing does.
+/// Kernels have a fifth of their usual width: at first they blur 0.2 % of the light out of the medium of one
+/// of the scenes, whoever chose them, and this is about what choosing does.
 fn unbiased(name: &str, folder: &str) {
     const SEEDS: u64 = 20;
     const ITERATIONS: u64 = 16;
@@ -124,8 +126,9 @@ fn no_bias_in_a_forward_scattering_box() {
     unbiased("forward_hg_box", "reference");
 }
 
-/// A render by the plan that its own seed has chosen against one by the plan of the next seed, with kernels of the usual width: plans of all
-/// seeds blur alike on average, so that what is left is what a plan and the samples that it serves have to do with each other.
+/// A render by the plan that its own seed has chosen against one by the plan of the next seed, with kernels
+/// of the usual width: plans of all seeds blur alike on average, so that what is left is what a plan and the
+/// samples that it serves have to do with each other.
 #[test]
 fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
     const SEEDS: u64 = 16;
@@ -181,8 +184,8 @@ fn a_frozen_plan_makes_the_same_iterations() {
     assert_eq!(resumed.report().plan, plan);
 }
 
-/// Time that was measured may choose otherwise when a render is taken up again: what its state says counts, whatever that is. The
-/// scene has two lights, whose shares depend on whether there are light sub-paths.
+/// Time that was measured may choose otherwise when a render is taken up again: what its state says counts,
+/// whatever that is. The scene has two lights, whose shares depend on whether there are light sub-paths.
 #[test]
 fn a_state_is_taken_up_whatever_was_chosen_since() {
     let scene = shipped("reference/chromatic_sphere");

@@ -1,4 +1,5 @@
-//! What is said of a scene before it is rendered: techniques that can make no light, and light that is found by chance.
+//! Checks of a scene before it is rendered: techniques that can make no light, and light that is found
+//! by chance.
 
 use upbp_core::{RenderError, Settings, TechniqueSet};
 use upbp_scene::ReadyScene;

@@ -1,5 +1,5 @@
-//! The same scene, settings and seed give the same bits, whatever the number of threads, and however the iterations are shared
-//! out among runs.
+//! Determinism: a scene, settings and a seed give the same bits, whatever the number of threads, and however
+//! the iterations are shared out among runs.
 
 use proptest::prelude::*;
 use upbp_core::{LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
@@ -64,7 +64,8 @@ fn a_crop_shows_the_same_camera_samples_as_the_whole() {
         })
         .expect("the shipped scene");
         let settings = Settings {
-            // Next event only: connections and merges depend on the light sub-paths, whose number follows the crop.
+            // Next event only: connections and merges depend on the light sub-paths, whose number follows the
+            // crop.
             techniques: "pt".parse().expect("technique names"),
             ..Settings::default()
         };
@@ -108,8 +109,8 @@ fn through_a_file(state: &State) -> State {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
-    /// Every iteration goes to one of four runs; the runs' states are merged in some order; the last run goes on from what the
-    /// others have done.
+    /// Every iteration goes to one of four runs; the runs' states are merged in some order; the last run goes
+    /// on from what the others have done.
     #[test]
     fn any_split_over_runs_gives_the_bits_of_one_run(
         run_of in proptest::collection::vec(0..4_usize, SHARED as usize),

@@ -1,7 +1,7 @@
 //! The memory of a render is what was expected, and what was allowed, within a tenth.
 //!
-//! Each case is a process of its own, so that nothing of another is counted. `UPBP_VERTICES=1e7` measures another number
-//! of light vertices than the usual ones, and only that.
+//! Each case is a process of its own, so that nothing of another is counted. `UPBP_VERTICES=1e7` measures
+//! another number of light vertices than the usual ones, and only that.
 #![cfg(target_os = "linux")]
 
 use std::fs;
@@ -33,7 +33,8 @@ fn settings(light_paths: u32, beams: f64, memory: u32) -> Settings {
     }
 }
 
-/// Renders two iterations; prints what was expected and what it took, bytes, and the number of light vertices.
+/// Renders two iterations; prints what was expected and what it took, bytes, and the number of light
+/// vertices.
 fn measure(memory: u32, vertices: f64, beams: f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cornell_media.ron");
     let side = Count::new(64).expect("a positive count");
@@ -48,7 +49,8 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
             let checked = settings(paths, beams, memory).validate().expect("valid settings");
             scene.renderer(checked).expect("a renderer")
         };
-        // A pilot first: what it leaves with the allocator and the threads does not grow with what is rendered.
+        // A pilot first: what it leaves with the allocator and the threads does not grow with what is
+        // rendered.
         let paths = vertices / renderer(1000, 100).state().identity().plan.stage(0).vertices_per_light_path;
         let before = status("VmRSS");
         let mut renderer = renderer(paths as u32, memory);
@@ -66,8 +68,8 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
 
 /// Runs a case in a process of its own: expected and measured bytes, vertices.
 fn run(memory: u32, vertices: f64, beams: f64) -> [f64; 2] {
-    // What is measured is what the render holds: by itself the GNU allocator keeps some MiB of what was freed, now more,
-    // now less.
+    // What is measured is what the render holds: by itself the GNU allocator keeps some MiB of what was
+    // freed, now more, now less.
     let allocator = [("MALLOC_MMAP_THRESHOLD_", "131072"), ("MALLOC_TRIM_THRESHOLD_", "131072")];
     let case = format!("{memory} {vertices} {beams}");
     let text = own_process::run("runs::memory::memory_is_what_was_expected", &case, &allocator);
@@ -87,7 +89,8 @@ fn run(memory: u32, vertices: f64, beams: f64) -> [f64; 2] {
 
 #[test]
 fn memory_is_what_was_expected() {
-    // What is allowed in MiB, how many light vertices are wanted, which part of the light sub-paths leaves beams.
+    // What is allowed in MiB, how many light vertices are wanted, which part of the light sub-paths leaves
+    // beams.
     if let Some(case) = own_process::case() {
         let numbers: Vec<f64> = case.split(' ').map(|word| word.parse().expect("a number")).collect();
         return measure(numbers[0] as u32, numbers[1], numbers[2]);

@@ -11,8 +11,8 @@ pub(crate) fn case() -> Option<String> {
     env::var(CASE).ok()
 }
 
-/// Runs a test of this program, given by its full name, in a process of its own that gets the case and the variables.
-/// Returns the output; if the test fails there, it fails here.
+/// Runs a test of this program, given by its full name, in a process of its own that gets the case and the
+/// variables. Returns the output; if the test fails there, it fails here.
 pub(crate) fn run(test: &str, case: &str, variables: &[(&str, &str)]) -> String {
     let output = Command::new(env::current_exe().expect("this program"))
         .args(["--nocapture", "--exact", test])

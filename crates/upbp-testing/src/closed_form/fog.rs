@@ -17,7 +17,7 @@ pub struct Fog {
 }
 
 impl Fog {
-    /// How often distances follow each channel.
+    /// Probabilities that a distance follows each channel.
     pub const ALPHA: [f64; 3] = [0.5, 0.2, 0.3];
 
     /// Probability to go on after a collision.

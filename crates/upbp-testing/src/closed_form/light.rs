@@ -42,7 +42,7 @@ fn uniform_sphere(u: [f32; 2]) -> DVec3 {
 }
 
 impl Source {
-    /// How strongly next events of a receiver prefer one end of a rectangle.
+    /// Preference of the next events of a receiver for one end of a rectangle, in `[0.2, 0.8]`.
     fn slant(receiver: DVec3) -> f64 {
         0.5 + 0.3 * (3.0 * receiver.x).sin()
     }

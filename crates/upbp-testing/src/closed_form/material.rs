@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use upbp_estimators::Spectrum;
 use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 
-/// How a surface scatters. All formulas depend on the cosines with the shading normal only, signed.
+/// A material. All formulas depend on the cosines with the shading normal only, signed.
 #[derive(Clone, Copy, Debug)]
 pub enum Material {
     /// Diffuse reflection on both sides.

@@ -117,7 +117,7 @@ impl ClosedForm {
         Self { objects, lights, media, camera }
     }
 
-    /// The body that counts at a point, by asking all of them.
+    /// The body that counts at a point, by asking every body.
     pub fn body_at(&self, point: DVec3) -> Option<Interior> {
         let around = self.objects.iter().filter(|object| object.shape.contains(point));
         around.filter_map(|object| object.interior).max_by_key(|interior| interior.priority)

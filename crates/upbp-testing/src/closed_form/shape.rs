@@ -83,7 +83,7 @@ impl Shape {
         }
     }
 
-    /// How far a point is from the surface.
+    /// Distance of a point from the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
         match self {
             Self::Sphere { .. } => (point - self.snap(point)).length(),

@@ -4,7 +4,7 @@ use std::fmt;
 
 use upbp_core::{LightPaths, Radii, Radius, Settings};
 
-/// How the channels' extinctions differ.
+/// Differences between the extinctions of the channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Chromatic {
     /// All the same.
@@ -20,17 +20,17 @@ pub(crate) enum Chromatic {
 pub(crate) enum Layout {
     /// The unit sphere, full of the medium.
     Ball,
-    /// The same with a boundary that refracts.
+    /// The unit sphere with a boundary that refracts.
     GlassBall,
     /// A smaller ball of the same medium in it.
     Nested,
     /// The cube of side 2.
     Cube,
-    /// The same from two halves, of the same medium.
+    /// The cube from two halves, of the same medium.
     Split,
-    /// The same twice, one in the other's place.
+    /// The cube twice, one in the other's place.
     Twice,
-    /// The same as triangles.
+    /// The cube as triangles.
     MeshCube,
     /// Two halves, of which one scatters ten times less.
     Halves,
@@ -50,7 +50,7 @@ pub(crate) enum Layout {
     Slab,
 }
 
-/// What shines.
+/// The light of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Light {
     /// Radiance 1 from everywhere.
@@ -75,17 +75,17 @@ pub(crate) enum Light {
     Globe,
     /// A point beside the bodies, and one with this many times its power far behind the camera.
     Uneven(f64),
-    /// A red plane right above a slab, a green one right below: what a camera ray sees of them is its part that is
-    /// reflected and its part that gets through.
+    /// A red plane right above a slab, a green one right below: the colours of a camera ray are its part
+    /// that is reflected and its part that gets through.
     Sides,
 }
 
-/// Where the camera stands; it looks along -z.
+/// Places of the camera, which looks along -z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum View {
     /// Before the bodies.
     Outside,
-    /// The same with one direction for all pixels: the axis.
+    /// Before the bodies, with one direction for all pixels: the axis.
     Narrow,
     /// With a lens.
     Lens,
@@ -99,7 +99,7 @@ pub(crate) enum View {
     BehindBoundary,
     /// In the origin.
     Centre,
-    /// Where [`Light::Point`] is.
+    /// At the place of [`Light::Point`].
     OnPoint,
     /// Exactly on the light, whichever it is.
     OnLight,

@@ -14,7 +14,7 @@ use crate::statistics::Estimate;
 /// A render that takes more processor seconds has hung.
 const LIMIT: f64 = 60.0;
 
-/// How often that is looked at.
+/// Time between two looks at the processor time of a case.
 const LOOK: Duration = Duration::from_secs(1);
 
 /// Part of all contributions that may be dropped.
@@ -23,7 +23,7 @@ const DROPPED: f64 = 1e-5;
 /// Part of all edges at which a walk may be lost.
 const LOST: f64 = 1e-5;
 
-/// What a render left.
+/// The outcome of a render.
 #[derive(Clone, Debug)]
 pub(crate) struct Render {
     /// Image means by channel.

@@ -11,7 +11,7 @@ use super::walk;
 use crate::analytic;
 use crate::statistics::Estimate;
 
-/// What must hold besides what always does.
+/// A check of a case, besides those that are made always.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Check {
     /// Nothing.
@@ -24,7 +24,8 @@ pub(crate) enum Check {
     Like(Axes),
     /// Red is the first of these, green the second.
     Exactly([f64; 2]),
-    /// What holds always, with the camera on a photon of the first iteration: this one, modulo their number.
+    /// The checks that are made always, with the camera on this photon of the first iteration, modulo their
+    /// number.
     OnPhoton(usize),
 }
 
@@ -224,8 +225,8 @@ fn media(cases: &mut Vec<Case>) {
         for albedo in ALBEDOS {
             for g in ASYMMETRIES {
                 for chromatic in CHROMATICS {
-                    // The variance of distances from the mixture of channels grows geometrically with collisions: in
-                    // thick media of unequal channels the mean of few samples says nothing.
+                    // The variance of distances from the mixture of channels grows geometrically with
+                    // collisions: in thick media of unequal channels the mean of few samples says nothing.
                     let spreads = chromatic != Chromatic::Grey && tau > 1.0 && albedo > 0.1;
                     let check = if spreads { Check::Sane } else { Check::Oracle };
                     for technique in ["bpt", "all"] {
@@ -258,7 +259,7 @@ fn furnaces(cases: &mut Vec<Case>) {
     }
 }
 
-/// The same scene at another scale and in another place.
+/// Scenes at other scales and in other places.
 fn transforms(cases: &mut Vec<Case>) {
     for scale in SCALES {
         for offset in OFFSETS {
@@ -319,7 +320,8 @@ fn layouts(cases: &mut Vec<Case>) {
             for tau in [0.0, 1e-2, 1.0, 1e2, 1e6] {
                 let bpt = Axes { tau, layout, light, technique: "bpt", ..Axes::default() };
                 cases.push(Case::new("layout", bpt.clone(), Check::Sane));
-                // In thick media and on specular chains few samples bring nearly all light: their spread is unknown.
+                // In thick media and on specular chains few samples bring nearly all light: their spread is
+                // unknown.
                 let known = tau <= 1.0
                     && !matches!(layout, Layout::GlassBall | Layout::GlassOverlap)
                     && !matches!(light, Light::Laser | Light::LaserAcross | Light::Uneven(_));

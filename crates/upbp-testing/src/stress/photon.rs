@@ -1,5 +1,5 @@
-//! Where photons are. With a single light their places depend on seed, iteration and index alone, so a camera can be put exactly
-//! on one of them.
+//! The places of photons. With a single light their places depend on seed, iteration and index alone, so a
+//! camera can be put exactly on one of them.
 
 use glam::Vec3;
 use upbp_core::Settings;

@@ -1,6 +1,8 @@
-//! The oracle: radiance of a ball in a furnace, by walks in double precision that share nothing with the renderer.
+//! The oracle: radiance of a ball in a furnace, by walks in double precision that share nothing with the
+//! renderer.
 //!
-//! Every escaping walk brings radiance 1 times the albedo to the power of its collisions, for each channel on its own.
+//! Every escaping walk brings radiance 1 times the albedo to the power of its collisions, for each channel on
+//! its own.
 
 use std::f64::consts::TAU;
 
@@ -34,8 +36,8 @@ fn scatter(before: DVec3, g: f64, random: &mut Random) -> DVec3 {
     (0.5 * (above - below) * before + (above * below).sqrt() * across).normalize()
 }
 
-/// Mean radiance of the film that sees a unit ball of medium of this optical thickness (along a diameter), with paths of
-/// at most `max_length` edges.
+/// Mean radiance of the film that sees a unit ball of medium of this optical thickness (along a diameter),
+/// with paths of at most `max_length` edges.
 pub(crate) fn furnace(tau: f64, albedo: f64, g: f64, max_length: u32, walks: u32) -> Estimate {
     let sigma = 0.5 * tau;
     let mut random = Random(17);
