@@ -1,7 +1,8 @@
 //! Renders of ready-made scenes.
 //!
-//! The renderer is compiled for every type of scene that it is given, in the crate that gives it one. For [`ReadyScene`]
-//! that is this one: programs that ask here need not compile the walks again, which takes minutes.
+//! The renderer is compiled for every type of scene that it is given, in the crate that gives it one. For
+//! [`ReadyScene`] that is this one: programs that ask here need not compile the walks again, which takes
+//! minutes.
 
 use upbp_core::{CheckedSettings, RenderError, Renderer, Start};
 

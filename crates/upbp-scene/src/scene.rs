@@ -56,8 +56,9 @@ pub struct ReadyScene {
 }
 
 impl ReadyScene {
-    /// The point of the description that has become the origin. A scene that is much farther from its origin than it is large
-    /// is moved, exactly; all other positions that a ready scene takes or returns are relative to this one.
+    /// The point of the description that has become the origin. A scene that is much farther from its origin
+    /// than it is large is moved, exactly; all other positions that a ready scene takes or returns are
+    /// relative to this one.
     #[must_use]
     pub const fn origin(&self) -> Vec3 {
         self.origin

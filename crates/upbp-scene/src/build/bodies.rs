@@ -1,45 +1,64 @@
-//! Which of several bodies counts where they overlap.
+//! The order of bodies, which decides the one that counts where bodies overlap.
 //!
-//! At load all bodies get a total order, so that what is inside of what never depends on the way that a
-//! path took: by the given priority, then the smaller volume above the larger, then the later in the file
-//! above the earlier. The second rule makes nested bodies work without any number: what is inside is smaller.
+//! At load all bodies get a total order, so that the body that counts never depends on the way of a path: by the
+//! given priority, then the smaller volume above the larger, then the later in the file above the earlier. The second
+//! rule makes nested bodies work without any number: the inner one is smaller.
 
 use upbp_accel::{Shape, ShapeId};
-use upbp_media::{BodyId, Interior, MediumId};
+use upbp_media::{BodyId, Interior};
 
+use super::builder::Builder;
+use super::surfaces::{Inside, ShapeDraft};
 use crate::scene::Body;
 
-/// A body before it has its place.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct BodyDraft<'a> {
-    /// Place of its shape in the scene.
-    pub(super) index: usize,
-    pub(super) shape: &'a Shape,
-    pub(super) medium: Option<MediumId>,
-    /// Index of refraction; `None` for that of the surroundings.
-    pub(super) ior: Option<f32>,
-    /// As given; the higher counts.
-    pub(super) priority: i32,
+/// A body before it has its rank: the index of its shape in the scene, the shape and the inside.
+type BodyDraft<'a> = (usize, &'a Shape, Inside);
+
+/// Bodies among drafts, in their order.
+fn drafts_of_bodies(drafts: &[ShapeDraft]) -> Vec<BodyDraft<'_>> {
+    let drafts = drafts.iter().enumerate();
+    drafts.filter_map(|(index, draft)| Some((index, &draft.shape, draft.body?))).collect()
 }
 
 /// Puts bodies in order, the lowest first: a body's [`Interior::priority`] is its place.
-pub(super) fn rank<'a>(drafts: impl Iterator<Item = BodyDraft<'a>>) -> Vec<Body> {
-    let mut drafts: Vec<BodyDraft<'a>> = drafts.collect();
-    drafts.sort_by(|a, b| {
-        let larger_first = || b.shape.volume_bound().total_cmp(&a.shape.volume_bound());
-        a.priority.cmp(&b.priority).then_with(larger_first).then(a.index.cmp(&b.index))
+pub(super) fn rank(drafts: &[ShapeDraft]) -> Vec<Body> {
+    let mut drafts = drafts_of_bodies(drafts);
+    // Stable, so that the later in the file comes last.
+    drafts.sort_by(|(_, a, inside), (_, b, other)| {
+        let larger_first = || b.volume_bound().total_cmp(&a.volume_bound());
+        inside.priority.cmp(&other.priority).then_with(larger_first)
     });
     let mut bodies: Vec<Body> = Vec::with_capacity(drafts.len());
-    for ((place, draft), priority) in drafts.iter().enumerate().zip(0..) {
-        let ior = draft.ior.unwrap_or_else(|| surrounding_ior(draft, &drafts[..place], &bodies));
-        let interior = Interior { body: BodyId(place as u32), medium: draft.medium, priority, ior };
-        bodies.push(Body { shape: ShapeId(draft.index as u32), aabb: draft.shape.aabb(), interior });
+    for ((place, (index, shape, inside)), priority) in drafts.iter().enumerate().zip(0..) {
+        let ior = inside.ior.unwrap_or_else(|| surrounding_ior(shape, &drafts[..place], &bodies));
+        let interior = Interior { body: BodyId(place as u32), medium: inside.medium, priority, ior };
+        bodies.push(Body { shape: ShapeId(*index as u32), aabb: shape.aabb(), interior });
     }
     bodies
 }
 
+impl Builder<'_> {
+    /// Reports bodies that lie all inside of one with a higher priority: they would be nowhere.
+    pub(super) fn check_bodies_count(&mut self, drafts: &[ShapeDraft]) {
+        let mut bodies = drafts_of_bodies(drafts);
+        bodies.sort_by_key(|(.., inside)| inside.priority);
+        for (index, shape, Inside { priority, .. }) in &bodies {
+            let mut higher = bodies.iter().filter(|(.., other)| other.priority > *priority);
+            if let Some((outer, _, Inside { priority: other, .. })) =
+                higher.find(|(_, other, _)| is_inside(shape, other))
+            {
+                let message = format!(
+                    "lies inside of {}, whose priority {other} is higher than its own {priority}: it would be nowhere",
+                    self.shape_item(*outer)
+                );
+                self.problem(self.shape_item(*index), message);
+            }
+        }
+    }
+}
+
 /// Whether a body is all inside of another sphere or box, as far as their own boxes tell.
-pub(super) fn is_inside(shape: &Shape, other: &Shape) -> bool {
+fn is_inside(shape: &Shape, other: &Shape) -> bool {
     let (min, max) = shape.aabb();
     match (shape, other) {
         (_, Shape::Box(_)) => {
@@ -60,19 +79,19 @@ pub(super) fn is_inside(shape: &Shape, other: &Shape) -> bool {
 /// The index of refraction around an index-matched body: that of the highest body below it that contains
 /// points all over its surface. A cloud in a glass block has the index of the glass, or a bubble in the
 /// cloud would refract wrongly.
-fn surrounding_ior(draft: &BodyDraft<'_>, lower: &[BodyDraft<'_>], placed: &[Body]) -> f32 {
+fn surrounding_ior(shape: &Shape, lower: &[BodyDraft<'_>], placed: &[Body]) -> f32 {
     let surface =
-        |i: u8| draft.shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]).0;
-    let (min, max) = draft.shape.aabb();
-    let contains = |shape: &Shape| {
-        let (outer_min, outer_max) = shape.aabb();
+        |i: u8| shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]).0;
+    let (min, max) = shape.aabb();
+    let contains = |other: &Shape| {
+        let (outer_min, outer_max) = other.aabb();
         let boxed = outer_min.cmple(min).all() && max.cmple(outer_max).all();
-        boxed && (0..16).all(|i| shape.contains(surface(i)) == Some(true))
+        boxed && (0..16).all(|i| other.contains(surface(i)) == Some(true))
     };
     lower
         .iter()
         .zip(placed)
         .rev()
-        .find(|(other, _)| contains(other.shape))
+        .find(|((_, other, _), _)| contains(other))
         .map_or(1.0, |(_, body)| body.interior.ior)
 }

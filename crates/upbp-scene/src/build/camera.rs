@@ -3,7 +3,7 @@
 use glam::Vec3;
 use upbp_estimators::scene::PixelRect;
 
-use super::Builder;
+use super::builder::Builder;
 use super::surfaces::ShapeDraft;
 use crate::camera::{PerspectiveCamera, PerspectiveView};
 use crate::description::Camera;

@@ -1,11 +1,13 @@
 //! Lights that are no surfaces.
 
+use std::collections::BTreeMap;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::Vec3;
+use upbp_media::{Homogeneous, Medium as _, MediumId};
 
-use super::Builder;
+use super::builder::Builder;
 use crate::description::Light as Description;
 use crate::light::{
     ConstantEnvironment, DirectionalLight, EnvironmentImage, ImageEnvironment, Light, PointLight, SpotCone,
@@ -13,7 +15,7 @@ use crate::light::{
 };
 
 /// How messages call a light: by its place from 1 and its kind.
-pub(super) fn item(index: usize, light: &Description) -> String {
+fn item(index: usize, light: &Description) -> String {
     let kind = match light {
         Description::Point { .. } => "Point",
         Description::Spot { .. } => "Spot",
@@ -25,12 +27,12 @@ pub(super) fn item(index: usize, light: &Description) -> String {
 }
 
 /// Whether it is infinitely far away.
-pub(super) fn is_infinite(light: &Description) -> bool {
+fn is_infinite(light: &Description) -> bool {
     matches!(light, Description::Directional { .. } | Description::Constant(_) | Description::Image { .. })
 }
 
 /// Whether it is not black.
-pub(super) fn shines(light: &Description) -> bool {
+fn shines(light: &Description) -> bool {
     match light {
         Description::Point { intensity, .. } | Description::Spot { intensity, .. } => {
             !intensity.get().is_black()
@@ -100,6 +102,41 @@ impl Builder<'_> {
         self.hash.write(&image.fingerprint().to_le_bytes());
         Ok(image)
     }
+
+    /// Reports a scene without any light, and lights that cannot reach anything.
+    pub(super) fn check_shines(&mut self, media: &[Homogeneous], ids: &BTreeMap<&str, MediumId>) {
+        let description = self.description;
+        let medium_of = |name: &String| ids.get(name.as_str()).and_then(|id| media.get(id.0 as usize));
+        if let Some(outside) = &description.outside
+            && medium_of(outside).is_some_and(is_closed)
+        {
+            for (index, light) in description.lights.iter().enumerate() {
+                if is_infinite(light) {
+                    let message = format!(
+                        "comes from infinitely far away and does not reach into the medium `{outside}` around everything"
+                    );
+                    self.problem(item(index, light), message);
+                }
+            }
+        }
+        let emits = |name: &String| medium_of(name).is_some_and(Homogeneous::emits);
+        let named =
+            description.outside.iter().chain(description.shapes.iter().flat_map(|shape| &shape.interior));
+        let shines = description.lights.iter().any(shines)
+            || description.shapes.iter().any(|shape| !shape.emission.get().is_black())
+            || named.into_iter().any(emits);
+        if !shines {
+            self.problem(
+                "scene",
+                "nothing in it shines: no light, no shape with an emission, no medium that emits",
+            );
+        }
+    }
+}
+
+/// Whether no light gets through an infinite length of a medium.
+fn is_closed(medium: &Homogeneous) -> bool {
+    medium.extinction().to_array().iter().all(|sigma| *sigma > 0.0)
 }
 
 /// In double precision: short and long vectors alike.

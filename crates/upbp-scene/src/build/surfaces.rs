@@ -8,7 +8,7 @@ use upbp_accel::{AxisBox, Quad, Shape, Sphere, TriangleMesh};
 use upbp_core::open_file;
 use upbp_media::{MediumId, Spectrum};
 
-use super::{Builder, unknown};
+use super::builder::{Builder, unknown};
 use crate::description::{self, Fnv1a, Geometry, Vector};
 use crate::material::{
     Conductor, Dielectric, Lambert, Material, MetalFresnel, Mirror, Phong, RoughDielectric, TrowbridgeReitz,

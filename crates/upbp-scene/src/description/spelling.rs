@@ -114,8 +114,8 @@ struct Open<'t> {
     field: &'t str,
 }
 
-/// The brackets that are open at the end of a text, and its last word. Nothing for a text that nests deeper than the parser
-/// follows: it was not understood.
+/// The brackets that are open at the end of a text, and its last word. Nothing for a text that nests deeper
+/// than the parser follows: it was not understood.
 fn open(text: &str) -> (Vec<Open<'_>>, &str) {
     const DEPTHS: usize = 256;
     let (mut open, mut word): (Vec<Open<'_>>, _) = (Vec::new(), "");

@@ -31,8 +31,8 @@ fn nested() -> String {
         + &cuboid(Vec3::splat(-INNER), Vec3::splat(INNER), "material: \"water\", interior: \"water\"")
 }
 
-/// The same with six walls that overlap at the edges, each wider than the one before, so that no faces coincide; and water up
-/// to `level` that reaches into them.
+/// The same with six walls that overlap at the edges, each wider than the one before, so that no faces
+/// coincide; and water up to `level` that reaches into them.
 fn walls(level: f32) -> String {
     let wall = |axis: usize, side: f32| {
         let width = OUTER + 4e-3 * (2.0 * axis as f32 + 0.5 * side);

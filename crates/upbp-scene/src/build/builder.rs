@@ -1,0 +1,67 @@
+//! The state that all steps of a build share.
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+use upbp_media::MediumId;
+
+use crate::description::{Fnv1a, SceneDescription};
+use crate::error::Problem;
+
+/// A description on its way to a scene, with the problems that were found.
+pub(super) struct Builder<'a> {
+    pub(super) description: &'a SceneDescription,
+    pub(super) base_dir: &'a Path,
+    pub(super) problems: Vec<Problem>,
+    /// Fingerprint of the description and of the files that were read.
+    pub(super) hash: Fnv1a,
+    /// The files that were read.
+    pub(super) files: Vec<PathBuf>,
+}
+
+impl Builder<'_> {
+    /// Notes a problem of a part of the scene.
+    pub(super) fn problem(&mut self, item: impl Into<String>, message: impl Display) {
+        self.problems.push(Problem { item: item.into(), message: message.to_string() });
+    }
+
+    /// The name of a shape in messages: its own, or its place from 1.
+    pub(super) fn shape_item(&self, index: usize) -> String {
+        match self.description.shapes.get(index).and_then(|shape| shape.name.as_deref()) {
+            Some(name) => format!("shape `{name}`"),
+            None => format!("shape {}", index + 1),
+        }
+    }
+
+    /// The path of a file that will be read, which is noted.
+    pub(super) fn path(&mut self, file: &str) -> PathBuf {
+        let path = self.base_dir.join(file);
+        self.files.push(path.clone());
+        path
+    }
+
+    /// The medium of that name, or a problem of `item`.
+    pub(super) fn medium(
+        &mut self,
+        item: &str,
+        name: &str,
+        ids: &BTreeMap<&str, MediumId>,
+    ) -> Option<MediumId> {
+        let id = ids.get(name).copied();
+        if id.is_none() {
+            self.problem(item, unknown("medium", name, self.description.media.names()));
+        }
+        id
+    }
+}
+
+/// The message about a name that is not defined, with those that are.
+pub(super) fn unknown<'n>(what: &str, name: &str, known: impl Iterator<Item = &'n str>) -> String {
+    let known: Vec<String> = known.map(|name| format!("`{name}`")).collect();
+    if known.is_empty() {
+        format!("unknown {what} `{name}`; there are none")
+    } else {
+        format!("unknown {what} `{name}`, known: {}", known.join(", "))
+    }
+}

@@ -1,0 +1,68 @@
+//! The bounds of a scene, and its origin.
+
+use glam::Vec3;
+use upbp_accel::Shape;
+use upbp_estimators::scene::BoundingSphere;
+
+use super::surfaces::ShapeDraft;
+use crate::camera::PerspectiveCamera;
+use crate::light::Light;
+
+/// Moves a scene that is much farther from its origin than it is large near it, exactly; returns the point of the
+/// description that has become the origin.
+pub(super) fn move_near_origin(
+    drafts: &mut [ShapeDraft],
+    lights: &mut [Light],
+    camera: &mut PerspectiveCamera,
+) -> Vec3 {
+    let origin = origin_near(&bounds(drafts, lights, camera));
+    if origin != Vec3::ZERO {
+        for draft in drafts {
+            draft.shape = draft.shape.clone().translated(-origin);
+        }
+        for light in lights {
+            light.translate(-origin);
+        }
+        *camera = camera.translated(-origin);
+    }
+    origin
+}
+
+/// The point near a scene that becomes the origin, so that positions have all their digits where the scene is
+/// (`docs/theory.md`, section 7); zero if the scene is near enough to the origin already.
+///
+/// A multiple of a power of two that is greater than any rounding in the file: moving is exact.
+fn origin_near(bounds: &BoundingSphere) -> Vec3 {
+    let step = f64::from(16.0 * bounds.radius).log2().ceil().exp2();
+    let near = (bounds.centre.as_dvec3() / step).round() * step;
+    // A scene as small as the rounding of its coordinates has no digits to save.
+    if near.is_finite() { near.as_vec3() } else { Vec3::ZERO }
+}
+
+/// A sphere around all shapes and finite lights, around the centre of their common box and as small as their own
+/// boxes allow.
+pub(super) fn bounds(drafts: &[ShapeDraft], lights: &[Light], camera: &PerspectiveCamera) -> BoundingSphere {
+    let shapes = drafts.iter().map(|draft| &draft.shape);
+    let positions = lights.iter().filter_map(|light| match light {
+        Light::Point(light) => Some(light.position),
+        Light::Spot(light) => Some(light.position),
+        _ => None,
+    });
+    let boxes = shapes.clone().map(Shape::aabb).chain(positions.clone().map(|position| (position, position)));
+    // Without anything finite only the camera is somewhere.
+    let (min, max) =
+        boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((camera.origin(), camera.origin()));
+    let centre = 0.5 * min + 0.5 * max;
+    let farthest_of_shapes = shapes.map(|shape| match shape {
+        Shape::Sphere(sphere) => sphere.centre().distance(centre) + sphere.radius(),
+        shape => {
+            let (min, max) = shape.aabb();
+            (min - centre).abs().max((max - centre).abs()).length()
+        }
+    });
+    let radius =
+        farthest_of_shapes.chain(positions.map(|position| position.distance(centre))).fold(0.0, f32::max);
+    // The roundings of the sum above; and a sphere must have an extent even around a single point.
+    let radius = radius * (1.0 + 1e-5) + 1e-6 * centre.abs().max_element();
+    BoundingSphere { centre, radius: if radius > 0.0 { radius } else { 1.0 } }
+}
