@@ -254,7 +254,7 @@ mod tests {
         }
 
         #[test]
-        fn beam_factor_times_density_is_the_reach(
+        fn beam_factor_times_density_is_the_probability_to_pass(
             stretches in vec((1e-3_f32..10.0, 1e-3_f32..3.0), 1..8),
         ) {
             let mut edge = EdgeDensity::EMPTY;

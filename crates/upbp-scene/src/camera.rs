@@ -14,12 +14,12 @@ use upbp_estimators::scene::{Camera, CameraConnection, CameraRay, PixelRect};
 
 use crate::sampling;
 
-/// Where a [`PerspectiveCamera`] is and what it sees.
+/// Position, direction and lens of a [`PerspectiveCamera`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PerspectiveView {
     /// Pinhole, or centre of the lens, scene units.
     pub origin: Vec3,
-    /// The point in the middle of the image.
+    /// The point in the middle of the image, scene units.
     pub target: Vec3,
     /// The direction that is upright in the image.
     pub up: Vec3,
@@ -88,7 +88,7 @@ impl PerspectiveCamera {
         })
     }
 
-    /// The same camera elsewhere.
+    /// The camera, moved by a vector in scene units.
     #[must_use]
     pub fn translated(self, by: Vec3) -> Self {
         Self { origin: self.origin + by, ..self }
@@ -106,7 +106,7 @@ impl PerspectiveCamera {
         self.forward
     }
 
-    /// From the centre of the lens to the lens point of `u_lens`.
+    /// The vector from the centre of the lens to the lens point of `u_lens`, scene units.
     fn lens_offset(&self, u_lens: [f32; 2]) -> Vec3 {
         if self.is_pinhole() {
             return Vec3::ZERO;

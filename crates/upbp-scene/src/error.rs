@@ -1,9 +1,9 @@
-//! What can be wrong with a scene.
+//! Errors of scenes.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Why a scene cannot be rendered.
+/// The reason for which a scene cannot be rendered.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -12,7 +12,7 @@ pub enum SceneError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
     /// The text is not a scene: the first place that is wrong.
@@ -24,7 +24,7 @@ pub enum SceneError {
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// What was expected and found.
+        /// The expected and the found text.
         message: String,
     },
     /// The text is read, but describes no scene: all problems.
@@ -50,12 +50,12 @@ impl SceneError {
     }
 }
 
-/// One thing that is wrong.
+/// One error of a description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// The part of the scene: ``shape `floor` ``, `light 2 (Spot)`.
     pub item: String,
-    /// What is wrong with it, what was expected, and the value that was found.
+    /// The error, the expected and the found value.
     pub message: String,
 }
 

@@ -12,7 +12,7 @@ use glam::Vec3;
 /// Corners, triangles and normals of a mesh.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct ObjMesh {
-    /// Corners.
+    /// Positions of the corners.
     pub positions: Vec<Vec3>,
     /// Triangles as indices of corners.
     pub indices: Vec<[u32; 3]>,
@@ -20,13 +20,13 @@ pub struct ObjMesh {
     pub normals: Option<Vec<Vec3>>,
 }
 
-/// What is wrong with an OBJ file.
+/// The first error of an OBJ file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {message}")]
 pub struct ObjError {
     /// Line, from 1.
     pub line: usize,
-    /// What was expected and found.
+    /// The expected and the found text.
     pub message: String,
 }
 
@@ -42,7 +42,7 @@ const MAX_LINE: u64 = 1 << 20;
 /// The most triangles of a mesh: a corner of a polygon takes two bytes of a file and twenty-four of memory.
 const MAX_TRIANGLES: usize = if cfg!(test) { 1 << 12 } else { 1 << 25 };
 
-/// Statements that say nothing about the surface.
+/// Statements that do not change the surface, which are skipped.
 const SKIPPED: [&str; 22] = [
     "vt",
     "vp",

@@ -9,19 +9,19 @@ use upbp_core::{CheckedSettings, RenderError, Renderer, Start};
 use crate::scene::ReadyScene;
 
 impl ReadyScene {
-    /// A render of this scene, as [`Renderer::new`], but compiled already.
+    /// Starts a render of this scene, as [`Renderer::new`], but compiled already.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Renderer::new`].
     #[inline(never)]
     pub fn renderer(&self, settings: CheckedSettings) -> Result<Renderer<'_>, RenderError> {
         Renderer::new(self, settings)
     }
 
-    /// A render of this scene with more to say, as [`Renderer::start`], but compiled already.
+    /// Starts a render of this scene with more choices, as [`Renderer::start`], but compiled already.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Renderer::start`].
     #[inline(never)]
     pub fn start_renderer(
         &self,

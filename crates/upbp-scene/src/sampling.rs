@@ -1,6 +1,6 @@
 //! Maps from the unit square to discs, hemispheres, spheres and cones.
 //!
-//! All of them preserve area, so that a density is a constant over the area of the target. Sources: Shirley
+//! Each map preserves area, so that a density is a constant over the area of the target. Sources: Shirley
 //! and Chiu, "A Low Distortion Map Between Disk and Square", JGT 2(3), 1997, for the disc; Archimedes for the
 //! rest: the area of a belt of the sphere is proportional to its height.
 

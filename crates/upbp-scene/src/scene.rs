@@ -1,8 +1,8 @@
 //! A scene that is ready to render.
 //!
-//! The geometry lies behind one hierarchy; beside it there is a record per shape of what it is. Boundaries of
-//! bodies are gathered in one traversal together with the surface that ends the ray, so that boundaries that
-//! coincide are all found.
+//! The geometry lies behind one hierarchy, with a record of material, body and light for each shape.
+//! Boundaries of bodies are gathered in one traversal together with the surface that ends the ray, so that
+//! boundaries that coincide are all found.
 
 use std::path::PathBuf;
 
@@ -15,10 +15,10 @@ use crate::camera::PerspectiveCamera;
 use crate::light::Light;
 use crate::material::Material;
 
-/// Distances that differ by less than this share of themselves are one event: some roundings.
+/// Relative difference of distances below which two surfaces coincide: some roundings.
 const COINCIDENT: f32 = 4.0 * f32::EPSILON;
 
-/// What a shape is, besides its geometry.
+/// The record of a shape: everything but its geometry.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface {
     /// `None`: an index-matched boundary.
@@ -29,7 +29,7 @@ pub(crate) struct Surface {
     pub(crate) emitter: Option<EmitterId>,
 }
 
-/// A body, for finding those that a point is in.
+/// A body, with its box for the search for bodies around a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
     pub(crate) shape: ShapeId,
@@ -70,14 +70,14 @@ impl ReadyScene {
         &self.geometry
     }
 
-    /// A number that is the same for equal scenes: the [hash of the
-    /// description](crate::SceneDescription::hash), mixed with the contents of the files that it refers to.
+    /// A fingerprint, equal for equal scenes: the [hash of the description](crate::SceneDescription::hash),
+    /// mixed with the contents of the files that it refers to.
     #[must_use]
     pub const fn hash(&self) -> u64 {
         self.hash
     }
 
-    /// The meshes and images that were read for it, in the order of their reading; not the scene file itself.
+    /// The mesh and image files that were read, in the order of reading, without the scene file itself.
     /// A program that writes files must not overwrite them.
     #[must_use]
     pub fn files(&self) -> &[PathBuf] {
@@ -107,8 +107,8 @@ impl ReadyScene {
     }
 }
 
-/// By distance; at the same distance into a body before out of one, so that a body that is only touched is
-/// left again.
+/// Sorts crossings by distance; at the same distance into a body before out of one, so that a body that is
+/// only touched is left again.
 fn sort(crossings: &mut [Crossing]) {
     crossings.sort_unstable_by(|a, b| {
         let by_body = || a.interior.body.cmp(&b.interior.body);
@@ -116,7 +116,7 @@ fn sort(crossings: &mut [Crossing]) {
     });
 }
 
-/// Keeps the nearer candidate, of two at the same distance the one of the earlier shape: the order of the
+/// Keeps the nearer of two candidates, at equal distance that of the earlier shape: the order of the
 /// traversal does not matter.
 fn keep_nearer(nearest: &mut Option<Candidate>, candidate: &Candidate) {
     let key = |candidate: &Candidate| (candidate.t, candidate.shape, candidate.primitive);

@@ -1,8 +1,8 @@
 //! The order of bodies, which decides the one that counts where bodies overlap.
 //!
-//! At load all bodies get a total order, so that the body that counts never depends on the way of a path: by the
-//! given priority, then the smaller volume above the larger, then the later in the file above the earlier. The second
-//! rule makes nested bodies work without any number: the inner one is smaller.
+//! At load all bodies get a total order, so that the body that counts never depends on the way of a path: by
+//! the given priority, then the smaller volume above the larger, then the later in the file above the
+//! earlier. The second rule makes nested bodies work without any number: the inner one is smaller.
 
 use upbp_accel::{Shape, ShapeId};
 use upbp_media::{BodyId, Interior};

@@ -46,7 +46,7 @@ impl Builder<'_> {
         PerspectiveCamera::new(&view, width, height, crop)
     }
 
-    /// A camera in something opaque sees nothing.
+    /// Reports a camera inside of an opaque shape, which would see nothing.
     pub(super) fn check_camera_is_free(&mut self, origin: Vec3, drafts: &[Option<ShapeDraft>]) {
         for (index, draft) in drafts.iter().enumerate() {
             let Some(draft) = draft else { continue };

@@ -8,8 +8,8 @@ use super::surfaces::ShapeDraft;
 use crate::camera::PerspectiveCamera;
 use crate::light::Light;
 
-/// Moves a scene that is much farther from its origin than it is large near it, exactly; returns the point of the
-/// description that has become the origin.
+/// Moves a scene that is much farther from its origin than it is large near it, exactly; returns the point of
+/// the description that has become the origin.
 pub(super) fn move_near_origin(
     drafts: &mut [ShapeDraft],
     lights: &mut [Light],
@@ -39,8 +39,8 @@ fn origin_near(bounds: &BoundingSphere) -> Vec3 {
     if near.is_finite() { near.as_vec3() } else { Vec3::ZERO }
 }
 
-/// A sphere around all shapes and finite lights, around the centre of their common box and as small as their own
-/// boxes allow.
+/// A sphere around all shapes and finite lights, around the centre of their common box and as small as their
+/// own boxes allow.
 pub(super) fn bounds(drafts: &[ShapeDraft], lights: &[Light], camera: &PerspectiveCamera) -> BoundingSphere {
     let shapes = drafts.iter().map(|draft| &draft.shape);
     let positions = lights.iter().filter_map(|light| match light {

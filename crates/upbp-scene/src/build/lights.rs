@@ -14,7 +14,7 @@ use crate::light::{
     SpotLight,
 };
 
-/// How messages call a light: by its place from 1 and its kind.
+/// The name of a light in messages: its place from 1 and its kind.
 fn item(index: usize, light: &Description) -> String {
     let kind = match light {
         Description::Point { .. } => "Point",
@@ -26,12 +26,12 @@ fn item(index: usize, light: &Description) -> String {
     format!("light {} ({kind})", index + 1)
 }
 
-/// Whether it is infinitely far away.
+/// Whether a light is infinitely far away.
 fn is_infinite(light: &Description) -> bool {
     matches!(light, Description::Directional { .. } | Description::Constant(_) | Description::Image { .. })
 }
 
-/// Whether it is not black.
+/// Whether a light is not black.
 fn shines(light: &Description) -> bool {
     match light {
         Description::Point { intensity, .. } | Description::Spot { intensity, .. } => {
@@ -139,7 +139,7 @@ fn is_closed(medium: &Homogeneous) -> bool {
     medium.extinction().to_array().iter().all(|sigma| *sigma > 0.0)
 }
 
-/// In double precision: short and long vectors alike.
+/// The unit vector along a vector of any length, by way of double precision.
 fn unit(v: Vec3) -> Option<Vec3> {
     v.as_dvec3().try_normalize().map(glam::DVec3::as_vec3)
 }

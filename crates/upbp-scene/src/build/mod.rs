@@ -1,4 +1,5 @@
-//! The build of a scene from its description: names are looked up, geometry is checked, bodies are put in order.
+//! The build of a scene from its description: names are looked up, geometry is checked, bodies are put in
+//! order.
 //!
 //! Every step goes on after a problem, so that all problems are reported together.
 

@@ -18,7 +18,7 @@ use crate::obj::ObjMesh;
 /// The largest mesh file that is read, in bytes.
 const MAX_FILE: u64 = 1 << 30;
 
-/// A shape that is checked on its own.
+/// A shape that is checked by itself, but not yet against others.
 #[derive(Clone, Debug)]
 pub(super) struct ShapeDraft {
     pub(super) shape: Shape,
@@ -38,7 +38,7 @@ pub(super) struct Inside {
     pub(super) priority: i32,
 }
 
-/// What a material makes of its shape.
+/// A material, and whether light passes it.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Opaque(Material),
@@ -184,7 +184,7 @@ impl Builder<'_> {
     }
 }
 
-/// What is read goes into a fingerprint.
+/// A reader whose bytes go into a fingerprint.
 struct Hashed<'h, R> {
     bytes: R,
     hash: &'h mut Fnv1a,
@@ -198,8 +198,8 @@ impl<R: Read> Read for Hashed<'_, R> {
     }
 }
 
-/// Names the first triangle that is no triangle. Files may have some, which are left out; what is written
-/// by hand is a mistake.
+/// Reports the first triangle without area. Those in mesh files are left out; one that is written by hand is
+/// a mistake.
 fn check_triangles(positions: &[Vec3], indices: &[[u32; 3]]) -> Result<(), String> {
     for (number, triangle) in indices.iter().enumerate() {
         let [Some(a), Some(b), Some(c)] = triangle.map(|corner| positions.get(corner as usize)) else {

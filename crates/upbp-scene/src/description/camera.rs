@@ -1,29 +1,28 @@
-//! Camera and image.
+//! The camera and the image.
 
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
-use super::value::{Count, FieldOfView, NonNegative, Positive, Vector};
+use super::value::{Count, FieldOfView, NonNegative, Positive, Vector, is_default};
 
-/// What looks at the scene.
+/// The camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Camera {
     /// A pinhole or a thin lens.
     Perspective {
-        /// Pinhole, or centre of the lens.
+        /// Pinhole, or centre of the lens, scene units.
         origin: Vector,
-        /// The point in the middle of the image.
+        /// The point in the middle of the image, scene units.
         target: Vector,
         /// The direction that is upright in the image.
         #[serde(default = "default_up")]
         up: Vector,
-        /// Full horizontal angle of the image.
+        /// Full horizontal angle of the image, degrees.
         fov_degrees: FieldOfView,
-        /// Radius of the lens; 0 for a pinhole.
+        /// Radius of the lens, scene units; 0 for a pinhole.
         #[serde(default = "default_lens_radius")]
         lens_radius: NonNegative,
-        /// Distance to the plane of focus; if absent, that of the target.
+        /// Distance to the plane of focus, scene units; if absent, that of the target.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         focus_distance: Option<Positive>,
     },
@@ -37,15 +36,15 @@ fn default_lens_radius() -> NonNegative {
     NonNegative::ZERO
 }
 
-/// The image.
+/// Size of the image, and the part to render.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Film {
-    /// Columns.
+    /// Width, pixels.
     pub width: Count,
-    /// Rows.
+    /// Height, pixels.
     pub height: Count,
-    /// The part to render; if absent, all of it.
+    /// The part to render; if absent, the whole image.
     #[serde(skip_serializing_if = "is_default")]
     pub crop: Option<Crop>,
 }
@@ -64,8 +63,8 @@ pub struct Crop {
     pub x: u32,
     /// First row.
     pub y: u32,
-    /// Columns.
+    /// Width, pixels.
     pub width: Count,
-    /// Rows.
+    /// Height, pixels.
     pub height: Count,
 }

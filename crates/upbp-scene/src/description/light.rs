@@ -2,23 +2,23 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::value::{BeamAngle, Colour, CutoffAngle, Degrees, Positive, Vector};
-use super::{is_default, single};
+use super::single;
+use super::value::{BeamAngle, Colour, CutoffAngle, Degrees, Positive, Vector, is_default};
 
 /// A light. Surfaces that shine are [shapes](super::Shape) with an emission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Light {
-    /// A point.
+    /// A point that shines equally in all directions.
     Point {
-        /// Where it is.
+        /// Position of the light, scene units.
         position: Vector,
         /// Radiant intensity, W sr⁻¹.
         intensity: Colour,
     },
-    /// A point that shines into a cone. Either `target` or `direction` says where.
+    /// A point that shines into a cone, towards either `target` or `direction`.
     Spot {
-        /// Where it is.
+        /// Position of the light, scene units.
         position: Vector,
         /// A point on the axis.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -28,30 +28,30 @@ pub enum Light {
         direction: Option<Vector>,
         /// Radiant intensity inside the beam, W sr⁻¹.
         intensity: Colour,
-        /// Angle from the axis up to which the intensity is full; if absent, the cutoff.
+        /// Angle from the axis up to which the intensity is full, degrees; if absent, the cutoff.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         beam_degrees: Option<BeamAngle>,
-        /// Angle from the axis at which it has fallen to zero, linearly with the angle.
+        /// Angle from the axis at which the intensity has fallen to zero, linearly with the angle, degrees.
         cutoff_degrees: CutoffAngle,
     },
     /// Parallel light from infinitely far away.
     Directional {
-        /// Where the light goes, of any length.
+        /// Direction of propagation, a vector of any length.
         direction: Vector,
-        /// Irradiance on a plane perpendicular to it, W m⁻².
+        /// Irradiance on a plane perpendicular to the direction, W m⁻².
         irradiance: Colour,
     },
-    /// The same radiance from all directions, infinitely far away.
+    /// A constant environment: the same radiance, W m⁻² sr⁻¹, from all directions, infinitely far away.
     #[serde(deserialize_with = "single::radiance")]
     Constant(Colour),
-    /// Radiance from all directions, infinitely far away, by an image.
+    /// An environment given by an image: radiance from all directions, infinitely far away.
     Image {
         /// Path of a latitude-longitude `OpenEXR` image, relative to the scene file.
         file: String,
-        /// Factor for its values.
+        /// Factor on the values of the image.
         #[serde(default = "default_scale", skip_serializing_if = "is_default_scale")]
         scale: Positive,
-        /// Turns it about +y, counter-clockwise as seen from above.
+        /// Rotation about +y, counter-clockwise as seen from above, degrees.
         #[serde(default = "default_rotation", skip_serializing_if = "is_default")]
         rotation_degrees: Degrees,
     },

@@ -5,23 +5,23 @@ use serde::{Deserialize, Serialize};
 use super::single;
 use super::value::{Colour, Ior, NonNegative, Reflectance, Roughness};
 
-/// What a surface is made of.
+/// A surface material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Material {
-    /// Matt; both sides reflect.
+    /// A matt surface, by its albedo; both sides reflect.
     #[serde(deserialize_with = "single::reflectance")]
     Lambert(Reflectance),
-    /// Matt with a glossy lobe; both sides reflect.
+    /// A matt surface with a glossy lobe; both sides reflect.
     Phong {
         /// Albedo of the matt part.
         diffuse: Reflectance,
         /// Albedo of the lobe; with the matt part at most 1.
         specular: Reflectance,
-        /// Sharpness of the lobe.
+        /// Exponent of the lobe: the higher, the narrower.
         exponent: NonNegative,
     },
-    /// Perfectly smooth metal; both sides reflect.
+    /// A perfectly smooth metal, by its reflectance; both sides reflect.
     #[serde(deserialize_with = "single::reflectance")]
     Mirror(Reflectance),
     /// Rough metal by its complex index of refraction; both sides reflect.
@@ -53,6 +53,6 @@ pub enum Material {
         /// Index of refraction of the body.
         ior: Ior,
     },
-    /// Nothing to see: bounds a body that does not refract.
+    /// An invisible boundary of a body that does not refract.
     Null,
 }

@@ -1,43 +1,47 @@
 //! Media.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
-use super::value::{Asymmetry, Colour, Positive};
-use super::{is_default, single};
+use super::single;
+use super::value::{Asymmetry, Colour, Positive, is_default};
 
-/// What fills a body, or everything.
+/// A participating medium, in a body or around everything.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Medium {
-    /// The same everywhere.
+    /// A medium with the same coefficients everywhere.
     Homogeneous {
-        /// Absorption coefficient per scene unit.
+        /// Absorption coefficient, inverse scene units.
         #[serde(default)]
         sigma_a: Colour,
-        /// Scattering coefficient per scene unit.
+        /// Scattering coefficient, inverse scene units.
         #[serde(default)]
         sigma_s: Colour,
         /// Phase function.
         #[serde(default, skip_serializing_if = "is_default")]
         phase: Phase,
-        /// Radiance that an opaque stretch of the medium would show if it did not scatter.
+        /// Radiance of an opaque stretch of the medium if it did not scatter, W m⁻² sr⁻¹.
         #[serde(default, skip_serializing_if = "is_default")]
         emission: Colour,
     },
 }
 
-/// Where a medium scatters light.
+/// A phase function: the distribution of directions after scattering.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub enum Phase {
-    /// In all directions alike.
+    /// Equal in all directions.
     #[default]
     Isotropic,
-    /// As particles much smaller than the wavelength.
+    /// Rayleigh scattering, by particles much smaller than the wavelength.
     Rayleigh,
-    /// By Henyey and Greenstein, with this mean cosine: above 0 forward.
+    /// The function of Henyey and Greenstein, by its mean cosine: above 0 forward, below 0 backward.
     #[serde(deserialize_with = "single::g")]
     HenyeyGreenstein(Asymmetry),
-    /// A mixture: weights, which need not add up to one, and parts.
-    #[serde(deserialize_with = "single::parts")]
+    /// A weighted sum: pairs of a weight and a phase function. The weights need not add up to one.
+    #[serde(deserialize_with = "parts")]
     Blend(Vec<(Positive, Phase)>),
+}
+
+fn parts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(Positive, Phase)>, D::Error> {
+    single::read(deserializer, &["parts"])
 }

@@ -1,4 +1,4 @@
-//! Things by name.
+//! Maps from names.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -7,26 +7,26 @@ use std::marker::PhantomData;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// A map from names to things. A file that gives one name twice is refused: the plain map would silently
+/// A map from names to things. A file that gives one name twice is refused, where a plain map would silently
 /// keep the second.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Named<T>(BTreeMap<String, T>);
 
 impl<T> Named<T> {
-    /// No things.
+    /// A map without things.
     #[must_use]
     pub const fn new() -> Self {
         Self(BTreeMap::new())
     }
 
-    /// Whether there are none.
+    /// Whether the map has no things.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// How many there are.
+    /// The number of things.
     #[must_use]
     pub fn len(&self) -> usize {
         self.0.len()
@@ -43,12 +43,12 @@ impl<T> Named<T> {
         self.0.insert(name.into(), thing)
     }
 
-    /// Names and things, by name.
+    /// Names and things, sorted by name.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &T)> {
         self.0.iter().map(|(name, thing)| (name.as_str(), thing))
     }
 
-    /// Names, sorted.
+    /// The names, sorted.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }

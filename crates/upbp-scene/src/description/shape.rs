@@ -1,29 +1,28 @@
-//! Surfaces.
+//! Surfaces and bodies.
 
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
-use super::value::{Colour, Positive, Vector};
+use super::value::{Colour, Positive, Vector, is_default};
 
 /// A surface, or a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
-    /// For messages.
+    /// Name of the shape in messages.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Where it is.
+    /// Position and form.
     pub geometry: Geometry,
     /// Name of the material.
     pub material: String,
     /// Name of the medium inside of a body; vacuum if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interior: Option<String>,
-    /// Where bodies overlap, the one with the higher priority counts; among equals the one with the smaller
-    /// volume.
+    /// Rank where bodies overlap: the one with the higher priority counts, among equals the one with the
+    /// smaller volume.
     #[serde(default, skip_serializing_if = "is_default")]
     pub priority: i32,
-    /// Radiance of the side that the normal points to.
+    /// Radiance emitted on the side that the normal points to, W m⁻² sr⁻¹.
     #[serde(default, skip_serializing_if = "is_default")]
     pub emission: Colour,
 }
@@ -44,16 +43,16 @@ pub enum Geometry {
     Quad {
         /// A corner.
         origin: Vector,
-        /// One edge from there.
+        /// The first edge from that corner.
         edge_u: Vector,
-        /// The other.
+        /// The second edge from that corner.
         edge_v: Vector,
     },
-    /// A box along the axes.
+    /// An axis-aligned box.
     Box {
         /// The corner with the least coordinates.
         min: Vector,
-        /// The corner with the greatest.
+        /// The corner with the greatest coordinates.
         max: Vector,
     },
     /// Triangles from a file, or given here: either `file`, or `positions` and `indices`.
@@ -73,7 +72,7 @@ pub enum Geometry {
         /// Factor for all coordinates, applied first.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         scale: Option<Positive>,
-        /// Moves all corners, applied second.
+        /// Translation of all corners, applied second.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         translate: Option<Vector>,
     },

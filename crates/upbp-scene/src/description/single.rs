@@ -8,14 +8,13 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Error, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-use super::Phase;
-use super::value::{Asymmetry, Colour, Ior, Positive, Reflectance};
+use super::value::{Asymmetry, Colour, Ior, Reflectance};
 
 /// One function per name, for `deserialize_with`.
 macro_rules! single {
     ($($name:ident: $value:ty),* $(,)?) => {$(
         pub(super) fn $name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<$value, D::Error> {
-            deserializer.deserialize_any(Single { name: &[stringify!($name)], value: PhantomData })
+            read(deserializer, &[stringify!($name)])
         }
     )*};
 }
@@ -23,12 +22,19 @@ macro_rules! single {
 single! {
     g: Asymmetry,
     ior: Ior,
-    parts: Vec<(Positive, Phase)>,
     radiance: Colour,
     reflectance: Reflectance,
 }
 
-/// What the parentheses hold, which its type reads; or the name, a colon, and that.
+/// Reads a value with or without its `name`.
+pub(super) fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    deserializer: D,
+    name: &'static [&'static str; 1],
+) -> Result<T, D::Error> {
+    deserializer.deserialize_any(Single { name, value: PhantomData })
+}
+
+/// Reads the value in the parentheses of a kind, with or without its name.
 struct Single<T> {
     name: &'static [&'static str; 1],
     value: PhantomData<T>,

@@ -1,4 +1,4 @@
-//! What a message about wrong text adds to the parser's own words: how that kind of thing is written.
+//! Hints in messages about wrong text: the right spelling of the kind that was meant.
 
 use ron::error::{Error, SpannedError};
 
@@ -49,7 +49,7 @@ const KINDS: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// The word that an example begins with.
+/// The first word of an example.
 fn name(example: &str) -> &str {
     example.split('(').next().unwrap_or(example)
 }
@@ -58,7 +58,7 @@ fn example(of: &str) -> Option<&'static str> {
     KINDS.iter().flat_map(|(_, examples)| *examples).copied().find(|example| name(example) == of)
 }
 
-/// What is wrong there, and how it is written.
+/// The message about an error of the parser, with the right spelling.
 pub(super) fn message(text: &str, error: &SpannedError) -> String {
     let (what, name_expected) = match &error.code {
         // The name that the parser's language has for a number.
@@ -106,7 +106,7 @@ fn hint(text: &str, end: usize, name_expected: bool) -> String {
     innermost.map_or_else(String::new, |example| format!(", as in `{example}`"))
 }
 
-/// A bracket that is open at a place.
+/// A bracket that is open at a place of a text.
 struct Open<'t> {
     /// The word before it.
     name: &'t str,

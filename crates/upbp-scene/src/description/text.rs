@@ -1,21 +1,23 @@
-//! Scenes as RON text, and their fingerprint.
+//! Scenes as RON text, and their fingerprints.
 
 use ron::Options;
 use ron::error::SpannedError;
 use ron::extensions::Extensions;
 use ron::ser::PrettyConfig;
 
-use super::{SceneDescription, spelling};
+use super::scene::SceneDescription;
+use super::spelling;
 use crate::error::SceneError;
 
-/// `Some` and the parentheses of single values may be left out.
+/// The options for writing: without `Some` and without the parentheses of single values.
 fn options() -> Options {
     Options::default()
         .with_default_extension(Extensions::IMPLICIT_SOME)
         .with_default_extension(Extensions::UNWRAP_NEWTYPES)
 }
 
-/// The same; and kinds with a single value see what their parentheses hold (`single`).
+/// The options for reading: those for writing, and kinds with a single value see the inside of their
+/// parentheses (`single`).
 fn reading() -> Options {
     options().with_default_extension(Extensions::UNWRAP_VARIANT_NEWTYPES)
 }
@@ -41,12 +43,12 @@ impl SceneDescription {
         options().to_string_pretty(self, pretty).map_err(|error| SceneError::Unwritable(error.to_string()))
     }
 
-    /// A number that is the same for equal descriptions, on any machine: FNV-1a over the compact text. The
-    /// contents of files that the scene refers to do not enter.
+    /// A fingerprint, equal for equal descriptions on any machine: FNV-1a over the compact text. The contents
+    /// of files that the scene refers to do not enter.
     #[must_use]
     pub fn hash(&self) -> u64 {
         let mut hash = Fnv1a::default();
-        // A description that cannot be written has its error as a fingerprint.
+        // The fingerprint of a description that cannot be written is that of the error.
         hash.write(options().to_string(self).unwrap_or_else(|error| error.to_string()).as_bytes());
         hash.0
     }

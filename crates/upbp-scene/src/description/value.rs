@@ -1,4 +1,4 @@
-//! Numbers that are checked where they are read.
+//! Numbers that are checked when they are read.
 //!
 //! Each type accepts one range and refuses the rest, NaN and infinities included, with a message that says
 //! what was expected; the reader adds line and column.
@@ -23,7 +23,12 @@ pub struct ValueError {
     pub found: String,
 }
 
-/// A number as one would write it.
+/// Whether a field may be left out of a file.
+pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// A number as a person would write it.
 fn shown(value: f32) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }
@@ -42,7 +47,7 @@ macro_rules! number {
         pub struct $name($inner);
 
         impl $name {
-            /// Checks the range.
+            /// Accepts a number in the range of the type.
             pub fn new(value: f32) -> Result<Self, ValueError> {
                 let accepts: fn(f32) -> bool = $accepts;
                 if accepts(value) {
@@ -162,7 +167,7 @@ impl From<Version> for u32 {
 pub struct Count(u32);
 
 impl Count {
-    /// Checks the range.
+    /// Accepts a number in the range of the type.
     pub fn new(value: u32) -> Result<Self, ValueError> {
         if (1..=65_536).contains(&value) {
             Ok(Self(value))
@@ -171,7 +176,7 @@ impl Count {
         }
     }
 
-    /// Side of the image if a file does not say.
+    /// Width and height of an image whose file gives none.
     pub(super) const DEFAULT: Self = Self(512);
 
     /// The number.
@@ -206,7 +211,7 @@ impl Vector {
     /// The origin.
     pub const ZERO: Self = Self(Vec3::ZERO);
 
-    /// Checks that all coordinates are finite, and at most 10¹² in size.
+    /// Accepts a vector whose coordinates are finite and at most 10¹² in size.
     pub fn new(value: Vec3) -> Result<Self, ValueError> {
         if value.is_finite() && value.abs().max_element() <= MAX_COORDINATE {
             Ok(Self(value))
@@ -247,7 +252,7 @@ macro_rules! colour {
             /// Black.
             pub const ZERO: Self = Self(Spectrum::ZERO);
 
-            /// Checks the range of every channel.
+            /// Accepts a spectrum whose channels are in the range of the type.
             pub fn new(value: Spectrum) -> Result<Self, ValueError> {
                 let accepts: fn(f32) -> bool = $accepts;
                 let [r, g, b] = value.to_array();
@@ -302,7 +307,7 @@ colour!(
 );
 
 impl Reflectance {
-    /// Reflects everything.
+    /// The reflectance of a surface that absorbs nothing.
     pub const ONE: Self = Self(Spectrum::ONE);
 }
 

@@ -1,4 +1,4 @@
-//! The same light from all directions, infinitely far away.
+//! The constant environment: equal light from all directions, infinitely far away.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -8,7 +8,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::{beyond, disc_area, start_on_disc};
+use super::geometry::{beyond, disc_area, start_on_disc};
 use crate::sampling;
 
 /// A constant environment.
@@ -18,7 +18,7 @@ pub struct ConstantEnvironment {
     pub radiance: Spectrum,
 }
 
-/// Density of a uniform direction.
+/// Density of a uniform direction, sr⁻¹.
 const PDF_UNIFORM: f32 = 0.25 * FRAC_1_PI;
 
 impl Emitter for ConstantEnvironment {

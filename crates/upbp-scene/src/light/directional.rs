@@ -6,14 +6,14 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::{beyond, disc_area, start_on_disc};
+use super::geometry::{beyond, disc_area, start_on_disc};
 
 /// A directional light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionalLight {
-    /// Unit vector in which the light goes.
+    /// Direction of propagation, a unit vector.
     pub direction: Vec3,
-    /// Irradiance on a plane perpendicular to it, W m⁻².
+    /// Irradiance on a plane perpendicular to the direction, W m⁻².
     pub irradiance: Spectrum,
 }
 

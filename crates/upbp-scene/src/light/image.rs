@@ -17,13 +17,13 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::{beyond, disc_area, start_on_disc};
+use super::geometry::{beyond, disc_area, start_on_disc};
 use crate::description::Fnv1a;
 
 /// The most pixels that an environment may have: 16384 × 8192.
 const MAX_PIXELS: usize = 1 << 27;
 
-/// Why an image cannot serve as an environment.
+/// The reason for which an image cannot serve as an environment.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EnvironmentImageError {
@@ -63,7 +63,7 @@ pub struct EnvironmentImage {
     pixels: Vec<Spectrum>,
     /// `∫ luminance dω` up to the end of each row, relative to the whole.
     rows: Vec<f32>,
-    /// The same within each row, up to the end of each column, relative to the row.
+    /// `∫ luminance dω` within each row up to the end of each column, relative to the row.
     columns: Vec<f32>,
     /// `∫ luminance dω` over all directions.
     total_luminance: f64,
@@ -72,7 +72,7 @@ pub struct EnvironmentImage {
 }
 
 impl EnvironmentImage {
-    /// From pixels row by row, the first row around +y. Values are radiance in W m⁻² sr⁻¹.
+    /// An environment from pixels row by row, the first row around +y. Values are radiance in W m⁻² sr⁻¹.
     pub fn new(width: usize, height: usize, pixels: Vec<Spectrum>) -> Result<Self, EnvironmentImageError> {
         let expected = width.checked_mul(height).filter(|&count| count > 0 && count <= MAX_PIXELS);
         if expected != Some(pixels.len()) {
@@ -144,7 +144,7 @@ impl EnvironmentImage {
         Self::new(pixels.width, pixels.height, pixels.values)
     }
 
-    /// A number that is the same for equal pixels.
+    /// A fingerprint, equal for equal pixels.
     pub(crate) fn fingerprint(&self) -> u64 {
         let mut hash = Fnv1a::default();
         hash.write(&(self.width as u64).to_le_bytes());
@@ -209,7 +209,7 @@ fn pixel_solid_angle(width: usize, height: usize, y: usize) -> f64 {
     std::f64::consts::TAU / width as f64 * belt
 }
 
-/// The step of a cumulative table that `u` falls on, and where within the step, in `[0, 1)`.
+/// The step of a cumulative table that `u` falls on, and the place within the step, in `[0, 1)`.
 fn invert(cumulative: &[f32], u: f32) -> (usize, f32) {
     let index = cumulative.partition_point(|&end| end <= u).min(cumulative.len() - 1);
     let start = if index == 0 { 0.0 } else { cumulative[index - 1] };

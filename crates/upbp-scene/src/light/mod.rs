@@ -1,4 +1,4 @@
-//! What shines: surfaces, points, spots, and light from infinitely far away.
+//! Lights: surfaces, points, spots, and light from infinitely far away.
 //!
 //! One file per light. Contract and measures: [`Emitter`] and `docs/theory.md`, section 2.8; oracle:
 //! [`check_emitter`](upbp_estimators::check::check_emitter).
@@ -6,11 +6,10 @@
 mod area;
 mod constant;
 mod directional;
+mod geometry;
 mod image;
 mod point;
 mod spot;
-
-use std::f32::consts::PI;
 
 use glam::Vec3;
 use upbp_estimators::scene::{
@@ -23,27 +22,26 @@ pub use self::directional::DirectionalLight;
 pub use self::image::{EnvironmentImage, EnvironmentImageError, ImageEnvironment};
 pub use self::point::PointLight;
 pub use self::spot::{SpotCone, SpotLight};
-use crate::sampling;
 
 /// A light of a ready-made scene.
 #[derive(Clone, Debug)]
 pub enum Light {
     /// A surface that shines.
     Area(AreaLight),
-    /// A point that shines in all directions alike.
+    /// A point that shines equally in all directions.
     Point(PointLight),
     /// A point that shines into a cone.
     Spot(SpotLight),
     /// Parallel light.
     Directional(DirectionalLight),
-    /// The same light from all directions.
+    /// Equal light from all directions.
     Constant(ConstantEnvironment),
     /// Light from all directions, by an image.
     Image(ImageEnvironment),
 }
 
 impl Light {
-    /// Moves a light that is somewhere. A surface that shines is made of its shape, wherever that is.
+    /// Moves a point or spot light. A surface that shines is made of a shape that has been moved already.
     pub(crate) fn translate(&mut self, by: Vec3) {
         match self {
             Self::Point(light) => light.position += by,
@@ -108,34 +106,6 @@ impl Emitter for Light {
     ) -> f32 {
         dispatch!(self, light => light.pdf_incident(bounds, point, direction, receiver, pdf_position))
     }
-}
-
-/// Area of the disc that parallel light starts from.
-fn disc_area(bounds: &BoundingSphere) -> f32 {
-    PI * bounds.radius * bounds.radius
-}
-
-/// A start of a ray in `direction`, uniform over the disc that casts its shadow on the scene, before the
-/// scene.
-fn start_on_disc(bounds: &BoundingSphere, direction: Vec3, u: [f32; 2]) -> Vec3 {
-    let across = sampling::disc(u) * bounds.radius;
-    let (tangent, bitangent) = upbp_media::orthonormal_basis(direction);
-    // Ten per cent outside, so that no rounding puts the start behind a surface on the bounds.
-    let back = direction * (1.1 * bounds.radius);
-    bounds.centre - back + tangent * across.x + bitangent * across.y
-}
-
-/// A point outside of the scene in the direction of an infinite light.
-fn beyond(bounds: &BoundingSphere, receiver: Vec3, towards_light: Vec3) -> EmitterPoint {
-    let distance = 2.0 * bounds.radius + receiver.distance(bounds.centre);
-    EmitterPoint { position: receiver + towards_light * distance, normal: -towards_light }
-}
-
-/// Unit direction and distance from one point to another; none if they coincide.
-fn direction_and_distance(from: Vec3, to: Vec3) -> Option<(Vec3, f32)> {
-    let between = to - from;
-    let distance = between.length();
-    (distance > 0.0 && distance.is_finite()).then(|| (between / distance, distance))
 }
 
 #[cfg(test)]

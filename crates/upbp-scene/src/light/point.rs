@@ -1,4 +1,4 @@
-//! A point that shines in all directions alike.
+//! The point light, which shines equally in all directions.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -8,19 +8,19 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::direction_and_distance;
+use super::geometry::direction_and_distance;
 use crate::sampling;
 
 /// An isotropic point light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
-    /// Where it is, scene units.
+    /// Position of the light, scene units.
     pub position: Vec3,
     /// Radiant intensity, W sr⁻¹.
     pub intensity: Spectrum,
 }
 
-/// Density of a uniform direction.
+/// Density of a uniform direction, sr⁻¹.
 const PDF_DIRECTION: f32 = 0.25 * FRAC_1_PI;
 
 impl Emitter for PointLight {

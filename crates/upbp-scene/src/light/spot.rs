@@ -9,7 +9,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::direction_and_distance;
+use super::geometry::direction_and_distance;
 use crate::sampling;
 
 /// The cone of a [`SpotLight`].
@@ -19,7 +19,7 @@ pub struct SpotCone {
     pub axis: Vec3,
     /// Angle from the axis up to which the intensity is full, radians, in `[0, cutoff]`.
     pub beam: f32,
-    /// Angle from the axis at which it has fallen to zero, radians, in `(0, π]`.
+    /// Angle from the axis at which the intensity has fallen to zero, radians, in `(0, π]`.
     pub cutoff: f32,
 }
 
@@ -38,7 +38,8 @@ impl SpotCone {
         }
     }
 
-    /// `∫ falloff dω = 2π (1 − (sin c − sin b) / (c − b))`, and `2π (1 − cos c)` in the limit of a hard edge.
+    /// Solid angle weighted by the falloff, steradians: `∫ falloff dω = 2π (1 − (sin c − sin b) / (c − b))`,
+    /// and `2π (1 − cos c)` in the limit of a hard edge.
     #[must_use]
     pub fn solid_angle(&self) -> f32 {
         let (beam, cutoff) = (f64::from(self.beam), f64::from(self.cutoff));
@@ -61,16 +62,16 @@ impl SpotCone {
 /// A spot light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
-    /// Where it is, scene units.
+    /// Position of the light, scene units.
     pub position: Vec3,
     /// Radiant intensity inside the beam, W sr⁻¹.
     pub intensity: Spectrum,
-    /// Where it shines.
+    /// Axis and angles of the beam.
     pub cone: SpotCone,
 }
 
 impl SpotLight {
-    /// Directions are uniform within the cutoff.
+    /// Density of directions, which are uniform within the cutoff, sr⁻¹.
     fn pdf_direction(&self) -> f32 {
         1.0 / (TAU * self.cone.height())
     }

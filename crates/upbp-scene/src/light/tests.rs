@@ -1,6 +1,6 @@
 //! Every light against the contract.
 
-use std::f32::consts::{FRAC_PI_2, TAU};
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
 use upbp_accel::{AxisBox, Quad, Shape, Sphere, TriangleMesh};

@@ -7,17 +7,18 @@ use glam::Vec3;
 use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
+use super::fresnel;
+use super::local::{continuation_by_albedo, indices};
 use super::trowbridge_reitz::TrowbridgeReitz;
-use super::{continuation_by_albedo, fresnel, indices};
 
-/// How the small mirrors of a metal reflect.
+/// The reflectance of the small mirrors of a metal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MetalFresnel {
     /// From the complex index of refraction `eta + i k`, per channel, in vacuum.
     Indices {
-        /// Real part.
+        /// Real part of the index.
         eta: Spectrum,
-        /// Imaginary part.
+        /// Imaginary part of the index.
         k: Spectrum,
     },
     /// Schlick's approximation from the reflectance at normal incidence.
@@ -40,9 +41,9 @@ impl MetalFresnel {
 /// Rough metal. Both sides reflect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
-    /// The small mirrors.
+    /// The normals of the small mirrors.
     pub normals: TrowbridgeReitz,
-    /// How they reflect.
+    /// The reflectance of the small mirrors.
     pub fresnel: MetalFresnel,
 }
 

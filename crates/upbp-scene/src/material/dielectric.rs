@@ -5,7 +5,7 @@ use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
 use super::fresnel::refraction;
-use super::{indices, mirrored};
+use super::local::{indices, mirrored};
 
 /// Reflection and refraction by Fresnel's equations, chosen by the share of each. The indices come from the
 /// bodies on both sides.

@@ -1,9 +1,9 @@
-//! How much a smooth interface reflects: Fresnel's equations for unpolarised light.
+//! Fresnel's equations: the share of unpolarised light that a smooth interface reflects.
 //!
 //! Source: Born and Wolf, "Principles of Optics", sections 1.5 and 14.2; Schlick, "An Inexpensive BRDF Model
 //! for Physically-based Rendering", Computer Graphics Forum 13(3), 1994.
 
-/// What becomes of light that meets a dielectric interface.
+/// Reflection and refraction at a dielectric interface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Refraction {
     /// Share that is reflected, in `[0, 1]`; the same for the reversed path.
@@ -12,7 +12,8 @@ pub(super) struct Refraction {
     pub(super) cos_transmitted: f32,
 }
 
-/// From index `eta_from` at `cos_incident` in `[0, 1]` towards index `eta_to`.
+/// Reflection and refraction on the way from index `eta_from`, at `cos_incident` in `[0, 1]`, to index
+/// `eta_to`.
 pub(super) fn refraction(cos_incident: f32, eta_from: f32, eta_to: f32) -> Refraction {
     if eta_from == eta_to {
         return Refraction { reflectance: 0.0, cos_transmitted: cos_incident };

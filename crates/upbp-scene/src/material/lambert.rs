@@ -1,4 +1,4 @@
-//! A matt surface: the same radiance in all directions, on the side that is lit.
+//! A matt surface: equal radiance in all directions, on the side that is lit.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -6,7 +6,7 @@ use glam::Vec3;
 use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
-use super::{continuation_by_albedo, cosine_pdf, sample_cosine};
+use super::local::{continuation_by_albedo, cosine_pdf, sample_cosine};
 
 /// Lambert's law: `f = reflectance / π`. Both sides reflect.
 #[derive(Clone, Copy, Debug, PartialEq)]

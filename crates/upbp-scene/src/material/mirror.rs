@@ -4,7 +4,7 @@ use glam::Vec3;
 use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
-use super::{continuation_by_albedo, mirrored};
+use super::local::{continuation_by_albedo, mirrored};
 
 /// Mirror reflection on both sides, the same at all angles.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! Surfaces: how they scatter light.
+//! Materials: the scattering of light at surfaces.
 //!
 //! One file per material. Directions are local, z along the shading normal, and point away from the surface.
 //! Contract and conventions: [`Bsdf`]; oracle: [`check_bsdf`](upbp_estimators::check::check_bsdf).
@@ -7,6 +7,7 @@ mod conductor;
 mod dielectric;
 mod fresnel;
 mod lambert;
+mod local;
 mod mirror;
 mod phong;
 mod rough_dielectric;
@@ -24,10 +25,7 @@ pub use self::phong::Phong;
 pub use self::rough_dielectric::RoughDielectric;
 pub use self::trowbridge_reitz::TrowbridgeReitz;
 
-/// Floor of [`Bsdf::continuation`]: a path that survives a dark surface gains at most a factor of 20.
-const MIN_CONTINUATION: f32 = 0.05;
-
-/// What a surface of a ready-made scene is made of. Index-matched boundaries have none.
+/// A material of a ready-made scene. Index-matched boundaries have none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Material {
     /// Matt.
@@ -51,7 +49,7 @@ impl Material {
         matches!(self, Self::Dielectric(_) | Self::RoughDielectric(_))
     }
 
-    /// Whether light goes in single directions.
+    /// Whether the material scatters light into single directions only.
     #[must_use]
     pub const fn is_specular(&self) -> bool {
         matches!(self, Self::Mirror(_) | Self::Dielectric(_))
@@ -98,32 +96,6 @@ impl Bsdf for Material {
     fn continuation(&self, from: Vec3) -> f32 {
         dispatch!(self, material => material.continuation(from))
     }
-}
-
-/// Roulette by albedo: no path carries more after it than before.
-fn continuation_by_albedo(albedo: Spectrum) -> f32 {
-    albedo.max_component().clamp(MIN_CONTINUATION, 1.0)
-}
-
-/// The indices on the side of `from` and on the other.
-fn indices(from: Vec3, interface: Interface) -> (f32, f32) {
-    if from.z > 0.0 { (interface.above, interface.below) } else { (interface.below, interface.above) }
-}
-
-/// Mirror direction about z.
-fn mirrored(direction: Vec3) -> Vec3 {
-    Vec3::new(-direction.x, -direction.y, direction.z)
-}
-
-/// Density of [`cosine_hemisphere`](crate::sampling::cosine_hemisphere) on the side of `from`.
-fn cosine_pdf(from: Vec3, to: Vec3) -> f32 {
-    if from.z * to.z > 0.0 { to.z.abs() * std::f32::consts::FRAC_1_PI } else { 0.0 }
-}
-
-/// Draws from [`cosine_pdf`].
-fn sample_cosine(from: Vec3, u: [f32; 2]) -> Vec3 {
-    let up = crate::sampling::cosine_hemisphere(u);
-    Vec3::new(up.x, up.y, up.z.copysign(from.z))
 }
 
 #[cfg(test)]

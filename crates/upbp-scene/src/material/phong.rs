@@ -10,7 +10,7 @@ use glam::Vec3;
 use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
-use super::{continuation_by_albedo, cosine_pdf, mirrored, sample_cosine};
+use super::local::{continuation_by_albedo, cosine_pdf, mirrored, sample_cosine};
 use crate::sampling::to_world;
 
 /// The modified Phong model. Both sides reflect.

@@ -8,11 +8,11 @@ use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
 use super::fresnel::refraction;
-use super::indices;
+use super::local::indices;
 use super::trowbridge_reitz::TrowbridgeReitz;
 
-/// Indices that differ by less than this share do not bend light: the surface passes it straight, whatever
-/// its roughness. The reflectance that is left out is below 10⁻⁶; the normal that would refract between two
+/// Relative difference of indices below which the surface passes light straight, whatever its
+/// roughness. The reflectance that is left out is below 10⁻⁶; the normal that would refract between two
 /// given directions has no digits left there.
 const MATCHED: f32 = 1e-3;
 
@@ -23,7 +23,7 @@ pub struct RoughDielectric {
     pub normals: TrowbridgeReitz,
 }
 
-/// What scatters between two directions.
+/// The small interface that scatters between two directions.
 struct Facet {
     /// Normal on the side of the first direction.
     normal: Vec3,

@@ -24,7 +24,7 @@ impl TrowbridgeReitz {
         1.0 / (PI * alpha2 * sum * sum)
     }
 
-    /// Smith's Λ: masked per visible area.
+    /// Smith's Λ: the ratio of masked to visible area.
     fn lambda(self, direction: Vec3) -> f32 {
         let cos2 = direction.z * direction.z;
         let tan2 = (direction.x * direction.x + direction.y * direction.y) / cos2;
@@ -38,7 +38,7 @@ impl TrowbridgeReitz {
         1.0 / (1.0 + self.lambda(direction))
     }
 
-    /// Share that both directions see, given the height that they have in common.
+    /// Share of the small mirrors that both directions see; their heights are correlated.
     pub(super) fn shadowing_masking(self, a: Vec3, b: Vec3) -> f32 {
         1.0 / (1.0 + self.lambda(a) + self.lambda(b))
     }
