@@ -63,8 +63,8 @@ impl Homogeneous {
         Ok(Self { sigma_a, sigma_s, sigma_t, emission: Spectrum::ZERO, phase, sampling })
     }
 
-    /// Makes the medium glow with radiance `L_e`, in W m⁻² sr⁻¹: the source term per length is `σ_a L_e`, and an
-    /// opaque stretch without scattering shows `L_e`.
+    /// Makes the medium glow with radiance `L_e`, in W m⁻² sr⁻¹: the source term per length is `σ_a L_e`, and
+    /// an opaque stretch without scattering shows `L_e`.
     ///
     /// A channel without absorption does not glow.
     ///
@@ -101,14 +101,15 @@ impl Homogeneous {
     }
 }
 
-/// The length of a segment in scene units, at most the largest number: an infinite length times an extinction of
-/// zero would not be a number.
+/// The length of a segment in scene units, at most the largest number: an infinite length times an extinction
+/// of zero would not be a number.
 #[inline]
 fn finite_length(segment: &RaySegment) -> f64 {
     segment.length_f64().min(f64::MAX)
 }
 
-/// Transmittance `e^{−σ ℓ}` per channel, in double precision: an edge multiplies the factors of all its segments.
+/// Transmittance `e^{−σ ℓ}` per channel, in double precision: an edge multiplies the factors of all its
+/// segments.
 #[inline]
 fn attenuation(sigma: Spectrum, length: f64) -> [f64; 3] {
     sigma.to_array().map(|sigma| (-f64::from(sigma) * length).exp())
@@ -172,8 +173,8 @@ impl Medium for Homogeneous {
                 }
             }
         };
-        // Random numbers are multiples of 2⁻²⁴: in a medium of optical thickness 10⁻⁸, zero alone would make six
-        // times the right number of collisions. The rest goes below the last bit.
+        // Random numbers are multiples of 2⁻²⁴: in a medium of optical thickness 10⁻⁸, zero alone would make
+        // six times the right number of collisions. The rest goes below the last bit.
         let u_distance = f64::from(u_distance) + rest * LAST_BIT;
         // 1 − u is in (0, 1], so that the logarithm is finite. A channel without extinction gives ∞, or 0/0
         // for u = 0: both fail the comparison and pass.

@@ -14,9 +14,9 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 /// - neither depends on the throughput of the path, since the density must be computable from the other
 ///   end as well.
 ///
-/// The transmittance of a segment is the product over its pieces; its probability to pass need not be, since a
-/// mixture of channels draws anew on each piece. A density is therefore that of a walk only if it is computed from
-/// the segments that the walk took, cut where the walk cut them.
+/// The transmittance of a segment is the product over its pieces; its probability to pass need not be, since
+/// a mixture of channels draws anew on each piece. A density is therefore that of a walk only if it is
+/// computed from the segments that the walk took, cut where the walk cut them.
 ///
 /// A medium that does not scatter is never sampled: its segments are passed with probability one and
 /// only attenuate. Coefficients and densities per length are in inverse scene units. Methods are called
@@ -126,8 +126,8 @@ pub trait Medium: Send + Sync {
     /// Transmittance of one segment, and the densities of walks to pass it or to stop at its ends.
     fn segment(&self, segment: &RaySegment) -> SegmentDensity;
 
-    /// Draws the distance from the ray's origin, in scene units and in `[start, end)`, at which a walk from start to
-    /// end stops; `None` if it passes the segment.
+    /// Draws the distance from the ray's origin, in scene units and in `[start, end)`, at which a walk from
+    /// start to end stops; `None` if it passes the segment.
     ///
     /// `u_channel` and `u_distance` are uniform in `[0, 1)`. With `u_distance = 0` a walk may stop
     /// exactly at the start.
@@ -163,7 +163,7 @@ pub trait Medium: Send + Sync {
     /// Depends on the position alone, so that both directions of walking agree on it.
     fn continuation(&self, position: Vec3) -> f32;
 
-    /// One over the mean extinction, in scene units; infinite without extinction. For heuristics: it steers the
-    /// weights of techniques, never their sum.
+    /// One over the mean extinction, in scene units; infinite without extinction. For heuristics: it steers
+    /// the weights of techniques, never their sum.
     fn mean_free_path(&self) -> f32;
 }

@@ -8,7 +8,8 @@
 
 use crate::Spectrum;
 
-/// Least probability of a channel, before normalisation: its inverse bounds the throughput of a passed segment.
+/// Least probability of a channel, before normalisation: its inverse bounds the throughput of a passed
+/// segment.
 const FLOOR: f64 = 0.05;
 
 /// Points of the quadrature over distances.

@@ -79,7 +79,8 @@ impl Entry {
 
 /// The bodies that a point is inside of, by ascending priority, among equals in order of entering.
 ///
-/// The list has no limit. Rays that look ahead walk a copy: that of a few bodies takes a few vector instructions.
+/// The list has no limit. Rays that look ahead walk a copy: that of a few bodies takes a few vector
+/// instructions.
 pub struct MediumStack {
     /// The first `few` entries are in use, unless there are more bodies than entries.
     bodies: [Entry; Self::FEW],
@@ -93,7 +94,8 @@ impl MediumStack {
     /// Number of bodies that are stored without an allocation.
     const FEW: usize = 6;
 
-    /// The list of a point outside all bodies, in the medium `outside` (`None` for vacuum), of refractive index 1.
+    /// The list of a point outside all bodies, in the medium `outside` (`None` for vacuum), of refractive
+    /// index 1.
     #[inline]
     #[must_use]
     pub const fn new(outside: Option<MediumId>) -> Self {

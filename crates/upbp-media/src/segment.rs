@@ -1,6 +1,6 @@
 //! Stretches of a ray inside one medium, and the densities that an edge accumulates over its stretches.
 //!
-//! A walk that leaves a vertex passes segments until it stops inside one of them or reaches a surface.
+//! A walk that leaves a vertex passes segments until it stops inside a segment or reaches a surface.
 //! The combination of techniques asks for the density of that event in both directions of walking; both
 //! are built here from two numbers per segment, so that no medium has to know of its neighbours.
 //!
@@ -230,7 +230,8 @@ mod tests {
             let densities: Vec<_> =
                 pieces.iter().map(|piece| piece.unwrap_or(SegmentDensity::VACUUM)).collect();
             let (first, last) = (densities[0], densities[densities.len() - 1]);
-            let pass_probability = |range: &[SegmentDensity]| range.iter().map(|s| s.pass_probability).product::<f64>();
+            let pass_probability =
+                |range: &[SegmentDensity]| range.iter().map(|s| s.pass_probability).product::<f64>();
             let end = pass_probability(&densities[..densities.len() - 1]) * last.stop_at_end;
             let start = first.stop_at_start * pass_probability(&densities[1..]);
             prop_assert!(apart(edge.pass_probability, pass_probability(&densities)) < 1e-14);

@@ -1,7 +1,7 @@
 //! Pieces of long segments.
 //!
 //! The box of a diagonal segment is mostly empty, and grows with the square of the length. Pieces have
-//! smaller boxes; each owns a half-open part of its segment, so that a hit belongs to one of them.
+//! smaller boxes; each owns a half-open part of its segment, so that a hit belongs to exactly one piece.
 
 use glam::DVec3;
 

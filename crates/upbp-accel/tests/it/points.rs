@@ -1,6 +1,6 @@
 //! Look-ups of points equal a test of every point.
 
-use crate::support::{Random, SPREADS, any_direction, positions};
+use crate::support::{Random, SCALES_AND_PLACES, SPREADS, any_direction, any_ray, positions};
 use glam::Vec3;
 use proptest::prelude::*;
 use upbp_accel::{PointTree, Ray};
@@ -61,13 +61,7 @@ fn check(points: &[Vec3], scale: f32, offset: Vec3, queries: usize, random: &mut
         hits += found.len();
 
         let toward = points.get(random.below(points.len().max(1))).copied().unwrap_or(offset) - place;
-        let direction = match toward.try_normalize() {
-            Some(direction) if random.unit() < 0.3 => direction,
-            _ => any_direction(random),
-        };
-        let t_min = if random.unit() < 0.5 { 0.0 } else { random.unit() * scale };
-        let t_max = if random.unit() < 0.5 { f32::INFINITY } else { t_min + random.unit() * 2.0 * scale };
-        let ray = Ray::new(place, direction).with_range(t_min, t_max);
+        let ray = any_ray(place, toward, 0.3, scale, random);
         let found = around(&tree, &ray, radius);
         assert_eq!(found, brute_around(points, &ray, radius), "{ray:?} {radius}");
         hits += found.len();
@@ -79,13 +73,7 @@ fn check(points: &[Vec3], scale: f32, offset: Vec3, queries: usize, random: &mut
 fn every_spread_scale_and_place_equals_brute_force() {
     let mut random = Random::new(1);
     for spread in SPREADS {
-        for (scale, offset) in [
-            (1.0, Vec3::ZERO),
-            (1e-6, Vec3::ZERO),
-            (1e6, Vec3::ZERO),
-            (1.0, Vec3::new(1e5, -1e5, 1e5)),
-            (1e-3, Vec3::new(0.0, 1e5, 0.0)),
-        ] {
+        for (scale, offset) in SCALES_AND_PLACES {
             for count in [1, 7, 8, 9, 64, 65, 513, 3000] {
                 let points = positions(spread, count, scale, offset, &mut random);
                 let hits = check(&points, scale, offset, 30, &mut random);

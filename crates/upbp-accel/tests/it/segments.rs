@@ -1,6 +1,6 @@
 //! Look-ups of segments equal a test of every segment.
 
-use crate::support::{Random, SPREADS, Spread, any_direction, positions};
+use crate::support::{Random, SCALES_AND_PLACES, SPREADS, Spread, any_direction, any_ray, positions};
 use glam::Vec3;
 use proptest::prelude::*;
 use upbp_accel::{ClosestApproach, Ray, Segment, SegmentTree, SplitParams, closest_approach};
@@ -75,13 +75,7 @@ fn check(segments: &[Segment], scale: f32, offset: Vec3, queries: usize, random:
             1 => offset + random.cube() * 3.0 * scale,
             _ => offset + random.cube() * scale,
         };
-        let direction = match (on_segment - place).try_normalize() {
-            Some(direction) if random.unit() < 0.4 => direction,
-            _ => any_direction(random),
-        };
-        let t_min = if random.unit() < 0.5 { 0.0 } else { random.unit() * scale };
-        let t_max = if random.unit() < 0.5 { f32::INFINITY } else { t_min + random.unit() * 2.0 * scale };
-        let ray = Ray::new(place, direction).with_range(t_min, t_max);
+        let ray = any_ray(place, on_segment - place, 0.4, scale, random);
         let of_ray = brute_around_ray(segments, &ray, radius);
         let of_point = brute_around_point(segments, place, radius);
         hits += of_ray.len() + of_point.len();
@@ -97,13 +91,7 @@ fn check(segments: &[Segment], scale: f32, offset: Vec3, queries: usize, random:
 fn every_spread_scale_and_place_equals_brute_force() {
     let mut random = Random::new(5);
     for spread in SPREADS {
-        for (scale, offset) in [
-            (1.0, Vec3::ZERO),
-            (1e-6, Vec3::ZERO),
-            (1e6, Vec3::ZERO),
-            (1.0, Vec3::new(1e5, -1e5, 1e5)),
-            (1e-3, Vec3::new(0.0, 1e5, 0.0)),
-        ] {
+        for (scale, offset) in SCALES_AND_PLACES {
             for count in [1, 8, 9, 65, 600] {
                 let origins = positions(spread, count, scale, offset, &mut random);
                 let segments = segments(&origins, scale, &mut random);

@@ -1,6 +1,7 @@
 //! Weighted sums of phase functions.
 
-use super::{Deflection, PhaseFunction};
+use super::PhaseFunction;
+use super::deflection::Deflection;
 use crate::MediaError;
 
 /// The largest single-precision number below one.

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Deflection, UNIFORM};
+use super::deflection::{Deflection, UNIFORM};
 use crate::MediaError;
 
 /// The asymmetry of a phase function: its mean cosine, in `(-1, 1)`.

@@ -7,21 +7,18 @@
 //! Source: `docs/theory.md`, sections 1.1 and 7. Oracles: quadrature over the sphere and histograms.
 
 mod blend;
+mod deflection;
 mod henyey_greenstein;
 mod rayleigh;
 #[cfg(test)]
 mod tests;
 
-use std::f32::consts::{FRAC_1_PI, TAU};
-
 use glam::Vec3;
 
 pub use self::blend::Blend;
+use self::deflection::{Deflection, UNIFORM, isotropic};
 pub use self::henyey_greenstein::Asymmetry;
-use crate::{MediaError, orthonormal_basis};
-
-/// The density of the uniform distribution of directions, per steradian.
-const UNIFORM: f32 = 0.25 * FRAC_1_PI;
+use crate::MediaError;
 
 /// A phase function, symmetric about the direction of propagation.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,50 +40,6 @@ pub struct PhaseSample {
     pub after: Vec3,
     /// Density of the draw per steradian; also the value of the phase function.
     pub pdf: f32,
-}
-
-/// The angle of a collision as `1 − cos θ` and `1 + cos θ`, both in `[0, 2]`: the peaks of a phase
-/// function need the one that is small there with all its digits.
-#[derive(Copy, Clone, Debug)]
-struct Deflection<T> {
-    one_minus_cos: T,
-    one_plus_cos: T,
-}
-
-impl Deflection<f32> {
-    /// Between two unit vectors. Since `|a ∓ b|² / 2 = 1 ∓ a·b`, no digits cancel; an error of length of
-    /// either vector enters squared.
-    #[inline]
-    fn between(before: Vec3, after: Vec3) -> Self {
-        Self {
-            one_minus_cos: 0.5 * (before - after).length_squared(),
-            one_plus_cos: 0.5 * (before + after).length_squared(),
-        }
-    }
-
-    /// From the cosine, which is clamped to `[-1, 1]`.
-    #[inline]
-    fn from_cosine(cos_theta: f32) -> Self {
-        let cos_theta = cos_theta.clamp(-1.0, 1.0);
-        Self { one_minus_cos: 1.0 - cos_theta, one_plus_cos: 1.0 + cos_theta }
-    }
-}
-
-impl Deflection<f64> {
-    /// The unit direction at this angle from `before`, at azimuth `2π · u`.
-    #[inline]
-    fn direction(self, before: Vec3, u: f32) -> Vec3 {
-        // The product keeps the sine where the cosine rounds to ±1.
-        let sin_theta = (self.one_minus_cos * self.one_plus_cos).max(0.0).sqrt();
-        let cos_theta = 0.5 * (self.one_plus_cos - self.one_minus_cos);
-        let (sin_phi, cos_phi) = (TAU * u).sin_cos();
-        let (tangent, bitangent) = orthonormal_basis(before);
-        let across = (cos_phi * tangent + sin_phi * bitangent).as_dvec3();
-        // Rounded to single precision once, at the end: a peak of g = 0.99999 is only some 100 roundings
-        // wide.
-        let after = cos_theta * before.as_dvec3() + sin_theta * across;
-        (after * after.length_recip()).as_vec3()
-    }
 }
 
 impl PhaseFunction {
@@ -128,7 +81,8 @@ impl PhaseFunction {
         self.value(Deflection::from_cosine(cos_theta))
     }
 
-    /// Draws the direction after a collision, for a unit direction `before` and two uniform numbers in `[0, 1)`.
+    /// Draws the direction after a collision, for a unit direction `before` and two uniform numbers in `[0,
+    /// 1)`.
     #[inline]
     #[must_use]
     pub fn sample(&self, before: Vec3, u: [f32; 2]) -> PhaseSample {
@@ -161,7 +115,7 @@ impl PhaseFunction {
     #[inline]
     fn sample_direction(&self, before: Vec3, [u_angle, u_azimuth]: [f32; 2]) -> Vec3 {
         let deflection = match self {
-            Self::Isotropic => isotropic_deflection(u_angle),
+            Self::Isotropic => isotropic(u_angle),
             Self::HenyeyGreenstein(g) => henyey_greenstein::sample(*g, u_angle),
             Self::Rayleigh => rayleigh::sample(u_angle),
             Self::Blend(blend) => {
@@ -171,11 +125,4 @@ impl PhaseFunction {
         };
         deflection.direction(before, u_azimuth)
     }
-}
-
-/// The angle at the fraction `u` of the uniform distribution, counted from straight back.
-#[inline]
-fn isotropic_deflection(u: f32) -> Deflection<f64> {
-    let one_plus_cos = 2.0 * f64::from(u);
-    Deflection { one_minus_cos: 2.0 - one_plus_cos, one_plus_cos }
 }

@@ -4,7 +4,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::Deflection;
+use super::deflection::Deflection;
 
 /// `3 (1 + cos² θ) / 16π` per steradian.
 #[inline]

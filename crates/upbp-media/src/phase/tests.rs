@@ -6,6 +6,7 @@ use serde::de::IntoDeserializer;
 use serde::de::value::{Error, F32Deserializer};
 
 use super::*;
+use crate::orthonormal_basis;
 use crate::testing::{Random, assert_fits, assert_uniform, integrate_towards_zero};
 
 const LARGEST_BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;

@@ -8,7 +8,8 @@ use upbp_media::Spectrum;
 
 use crate::sampling::cosine_hemisphere;
 
-/// Floor of [`Bsdf::continuation`](upbp_estimators::scene::Bsdf::continuation): a path that survives a dark surface gains at most a factor of 20.
+/// Floor of [`Bsdf::continuation`](upbp_estimators::scene::Bsdf::continuation): a path that survives a dark
+/// surface gains at most a factor of 20.
 const MIN_CONTINUATION: f32 = 0.05;
 
 /// Probability of continuation by albedo: no path carries more after the roulette than before the surface.

@@ -1,4 +1,4 @@
-//! What a user reads when a scene file is wrong.
+//! Messages about wrong scene files, as a user reads them.
 
 use upbp_scene::{ReadyScene, SceneError};
 

@@ -31,7 +31,7 @@ fn nested() -> String {
         + &cuboid(Vec3::splat(-INNER), Vec3::splat(INNER), "material: \"water\", interior: \"water\"")
 }
 
-/// The same with six walls that overlap at the edges, each wider than the one before, so that no faces
+/// A glass with six walls that overlap at the edges, each wider than the one before, so that no faces
 /// coincide; and water up to `level` that reaches into them.
 fn walls(level: f32) -> String {
     let wall = |axis: usize, side: f32| {

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+use upbp_accel::Ray;
 
 /// Uniform numbers from a fixed seed.
 pub(crate) struct Random(Xoshiro256PlusPlus);
@@ -84,6 +85,15 @@ pub(crate) fn positions(
         .collect()
 }
 
+/// Sizes of the spread and the places where it lies: small, large and far away.
+pub(crate) const SCALES_AND_PLACES: [(f32, Vec3); 5] = [
+    (1.0, Vec3::ZERO),
+    (1e-6, Vec3::ZERO),
+    (1e6, Vec3::ZERO),
+    (1.0, Vec3::new(1e5, -1e5, 1e5)),
+    (1e-3, Vec3::new(0.0, 1e5, 0.0)),
+];
+
 /// Directions of all kinds: along the axes with zeros of both signs, in a plane, any.
 pub(crate) fn any_direction(random: &mut Random) -> Vec3 {
     let axes = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
@@ -96,4 +106,15 @@ pub(crate) fn any_direction(random: &mut Random) -> Vec3 {
         }
         _ => random.direction(),
     }
+}
+
+/// A ray from a place, with ends or without; along `toward` with a probability, otherwise in any direction.
+pub(crate) fn any_ray(place: Vec3, toward: Vec3, probability: f32, scale: f32, random: &mut Random) -> Ray {
+    let direction = match toward.try_normalize() {
+        Some(direction) if random.unit() < probability => direction,
+        _ => any_direction(random),
+    };
+    let t_min = if random.unit() < 0.5 { 0.0 } else { random.unit() * scale };
+    let t_max = if random.unit() < 0.5 { f32::INFINITY } else { t_min + random.unit() * 2.0 * scale };
+    Ray::new(place, direction).with_range(t_min, t_max)
 }
