@@ -3,8 +3,8 @@
 use upbp_media::Spectrum;
 
 use crate::counters::Counters;
-use crate::mis::{Densities, Weight};
-use crate::technique::{Layer, Technique};
+use crate::observer::{ObservedSample, Observer};
+use crate::technique::Layer;
 
 /// The result of one camera sub-path: radiance per layer, weighted.
 #[derive(Clone, Copy, Debug)]
@@ -24,20 +24,16 @@ pub(crate) struct Output<'a, O: ?Sized> {
 }
 
 impl<O: ?Sized> Output<'_, O> {
-    /// Adds a weighted contribution; whether it was accepted.
+    /// Adds a sample to the layer of its technique, if it is a radiance, and shows it to the observer.
     #[inline]
-    pub(crate) fn add<D: Densities>(
-        &mut self,
-        technique: Technique,
-        value: Spectrum,
-        weight: &Weight<D>,
-    ) -> bool {
-        match self.counters.accept(technique, value, weight.value()) {
-            Some(contribution) => {
-                self.layers[technique.layer() as usize] += contribution;
-                true
-            }
-            None => false,
+    pub(crate) fn record<B>(&mut self, sample: &ObservedSample<B, O::Densities>)
+    where
+        O: Observer<B>,
+    {
+        let ObservedSample { technique, value, ref weight, .. } = *sample;
+        if let Some(contribution) = self.counters.accept(technique, value, weight.value()) {
+            self.layers[technique.layer() as usize] += contribution;
+            self.observer.sample(sample);
         }
     }
 }

@@ -1,37 +1,22 @@
 //! What one iteration does: techniques, counts, radii.
 
-use upbp_media::Medium;
+use upbp_media::{Medium, MediumId};
 
 use crate::kernel::Kernel;
 use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
 use crate::periods::LookUps;
 use crate::roulette::Roulette;
 use crate::scene::Scene;
-use crate::technique::{Technique, TechniqueSet};
+use crate::technique::{PerMerge, Technique, TechniqueSet};
 
-/// The kernel of each merge technique.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Kernels {
-    /// Surface merging.
-    pub surf: Kernel,
-    /// Photon points around points.
-    pub pp3d: Kernel,
-    /// Photon points around query beams.
-    pub pb2d: Kernel,
-    /// Photon beams around points.
-    pub bp2d: Kernel,
-    /// Photon beams around query beams.
-    pub bb1d: Kernel,
-}
+/// The kernel of each merge.
+pub type Kernels = PerMerge<Kernel>;
 
 impl Kernels {
     /// No merges.
-    pub const NONE: Self = Self {
-        surf: Kernel::NONE,
-        pp3d: Kernel::NONE,
-        pb2d: Kernel::NONE,
-        bp2d: Kernel::NONE,
-        bb1d: Kernel::NONE,
+    pub const NONE: Self = {
+        let none = Kernel::NONE;
+        Self { surf: none, pp3d: none, pb2d: none, bp2d: none, bb1d: none }
     };
 }
 
@@ -198,6 +183,14 @@ impl Plan {
         }
     }
 
+    /// The same iteration with fewer light sub-paths, each of which counts for more, for pilot renders. Weights stay those
+    /// of the whole number.
+    #[must_use]
+    pub fn thinned(&self, light_paths: u32, beam_paths: u32) -> Self {
+        let light_paths = light_paths.min(self.light_paths);
+        Self { light_paths, beam_paths: beam_paths.min(self.beam_paths).min(light_paths), ..self.clone() }
+    }
+
     /// Whether anything is stored along light sub-paths for camera sub-paths to look up.
     #[must_use]
     pub fn stores_vertices(&self) -> bool {
@@ -216,19 +209,21 @@ impl Plan {
         self.looks_up(Technique::Bp2d) || self.looks_up(Technique::Bb1d)
     }
 
-    /// Whether this iteration looks up what a technique merges, anywhere.
+    /// Whether this iteration merges by `technique`, anywhere.
     #[must_use]
     pub fn looks_up(&self, technique: Technique) -> bool {
-        let in_media = |factor: fn(&VolumeMerges) -> f64| self.mis.volume.iter().any(|v| factor(v) > 0.0);
-        self.due.has(technique)
-            && match technique {
-                Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => false,
-                Technique::Surf => self.mis.surf > 0.0,
-                Technique::Pp3d => in_media(|v| v.pp3d),
-                Technique::Pb2d => in_media(|v| v.pb2d),
-                Technique::Bp2d => in_media(|v| v.bp2d),
-                Technique::Bb1d => in_media(|v| v.bb1d),
-            }
+        let has = match technique {
+            Technique::Surf => self.mis.surf > 0.0,
+            _ => self.mis.volume.iter().any(|merges| merges.of(technique) > 0.0),
+        };
+        has && self.due.has(technique)
+    }
+
+    /// Whether this iteration merges by `technique` in a medium.
+    #[inline]
+    #[must_use]
+    pub(crate) fn merges_in(&self, medium: MediumId, technique: Technique) -> bool {
+        self.mis.merges_in(medium).of(technique) > 0.0 && self.due.has(technique)
     }
 
     /// How much a photon counts when it is looked up: one over the number of light sub-paths, as often as there are iterations to

@@ -27,6 +27,6 @@ pub use periods::LookUps;
 pub use prepared::{EmitterShares, World, WorldError};
 pub use random::{Stream, StreamKind, half};
 pub use roulette::{Roulette, Survival};
-pub use technique::{Layer, Technique, TechniqueSet, UnknownTechnique};
+pub use technique::{Layer, PerMerge, Technique, TechniqueSet, UnknownTechnique};
 pub use upbp_accel::{Ray, offset_origin};
 pub use upbp_media::{BodyId, Interior, MediumId, MediumStack, Spectrum};

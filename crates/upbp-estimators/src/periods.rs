@@ -6,58 +6,23 @@
 
 use std::num::NonZeroU32;
 
-use serde::{Deserialize, Serialize};
-
 use crate::random::{Stream, StreamKind, half};
-use crate::technique::{Technique, TechniqueSet};
+use crate::technique::{PerMerge, Technique, TechniqueSet};
 
-/// One of how many iterations makes each look-up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LookUps {
-    /// Surface merging.
-    pub surf: NonZeroU32,
-    /// PP3D.
-    pub pp3d: NonZeroU32,
-    /// PB2D.
-    pub pb2d: NonZeroU32,
-    /// BP2D.
-    pub bp2d: NonZeroU32,
-    /// BB1D.
-    pub bb1d: NonZeroU32,
-}
+/// Periods of the photon queries of each merge, in iterations: one iteration of each period makes them.
+pub type LookUps = PerMerge<NonZeroU32>;
 
 impl LookUps {
-    /// Every iteration makes all of them.
+    /// Every iteration makes all photon queries.
     pub const ALL: Self = {
         let one = NonZeroU32::MIN;
         Self { surf: one, pp3d: one, pb2d: one, bp2d: one, bb1d: one }
     };
 
-    /// With what each merge technique is given.
+    /// The period of the photon queries of a technique; 1 if it has none.
     #[must_use]
-    pub fn by(period: impl Fn(Technique) -> NonZeroU32) -> Self {
-        use Technique::{Bb1d, Bp2d, Pb2d, Pp3d, Surf};
-        Self {
-            surf: period(Surf),
-            pp3d: period(Pp3d),
-            pb2d: period(Pb2d),
-            bp2d: period(Bp2d),
-            bb1d: period(Bb1d),
-        }
-    }
-
-    /// One of how many iterations looks up what a technique merges; 1 for what looks nothing up.
-    #[must_use]
-    pub const fn period(&self, technique: Technique) -> u32 {
-        match technique {
-            Technique::Surf => self.surf.get(),
-            Technique::Pp3d => self.pp3d.get(),
-            Technique::Pb2d => self.pb2d.get(),
-            Technique::Bp2d => self.bp2d.get(),
-            Technique::Bb1d => self.bb1d.get(),
-            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 1,
-        }
+    pub fn period(&self, technique: Technique) -> u32 {
+        self.get(technique).map_or(1, |period| period.get())
     }
 
     /// What runs in an iteration: each technique in one of every `m` iterations of a [half](crate::half) from a multiple of
@@ -84,7 +49,7 @@ mod tests {
 
     #[test]
     fn each_block_of_iterations_has_one_turn() {
-        let look_ups = LookUps::by(|technique| match technique {
+        let look_ups = LookUps::from_fn(|technique| match technique {
             Technique::Surf => NonZeroU32::new(8).unwrap(),
             Technique::Bb1d => NonZeroU32::new(3).unwrap(),
             _ => NonZeroU32::MIN,

@@ -82,6 +82,50 @@ impl Technique {
     }
 }
 
+/// One value for each technique that merges.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PerMerge<T> {
+    /// Surface merging.
+    pub surf: T,
+    /// Photon points around query points.
+    pub pp3d: T,
+    /// Photon points around query beams.
+    pub pb2d: T,
+    /// Photon beams around query points.
+    pub bp2d: T,
+    /// Photon beams around query beams.
+    pub bb1d: T,
+}
+
+impl<T> PerMerge<T> {
+    /// The values of a function of the technique.
+    #[must_use]
+    pub fn from_fn(mut value: impl FnMut(Technique) -> T) -> Self {
+        Self {
+            surf: value(Technique::Surf),
+            pp3d: value(Technique::Pp3d),
+            pb2d: value(Technique::Pb2d),
+            bp2d: value(Technique::Bp2d),
+            bb1d: value(Technique::Bb1d),
+        }
+    }
+
+    /// The value of a technique; `None` if it merges nothing.
+    #[inline]
+    #[must_use]
+    pub const fn get(&self, technique: Technique) -> Option<&T> {
+        match technique {
+            Technique::Surf => Some(&self.surf),
+            Technique::Pp3d => Some(&self.pp3d),
+            Technique::Pb2d => Some(&self.pb2d),
+            Technique::Bp2d => Some(&self.bp2d),
+            Technique::Bb1d => Some(&self.bb1d),
+            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => None,
+        }
+    }
+}
+
 /// A layer of the image: the weighted contributions of a technique, all of bidirectional path tracing in one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]

@@ -209,7 +209,7 @@ fn seldom_look_ups_and_other_counts() {
         seed: 201,
         next_events: 3.0,
         connections: 0.4,
-        look_ups: LookUps::by(|technique| NonZeroU32::new(1 + technique as u32 % 3).unwrap()),
+        look_ups: LookUps::from_fn(|technique| NonZeroU32::new(1 + technique as u32 % 3).unwrap()),
         ..usual.clone()
     };
     let (expected, expected_error) = mean(&scene, &usual);

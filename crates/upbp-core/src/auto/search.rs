@@ -83,7 +83,7 @@ impl Candidate {
 
     /// As a stage has it.
     pub(crate) fn look_ups(&self) -> LookUps {
-        LookUps::by(|technique| if self.seldom.has(technique) { SELDOM } else { NonZeroU32::MIN })
+        LookUps::from_fn(|technique| if self.seldom.has(technique) { SELDOM } else { NonZeroU32::MIN })
     }
 
     /// The light sub-paths that a technique uses.

@@ -176,6 +176,19 @@ impl MisPlan {
 }
 
 impl VolumeMerges {
+    /// The value of one technique; 0 if it merges nothing in media.
+    #[inline]
+    #[must_use]
+    pub const fn of(&self, technique: Technique) -> f64 {
+        match technique {
+            Technique::Pp3d => self.pp3d,
+            Technique::Pb2d => self.pb2d,
+            Technique::Bp2d => self.bp2d,
+            Technique::Bb1d => self.bb1d,
+            _ => 0.0,
+        }
+    }
+
     /// The sum of all four.
     #[inline]
     #[must_use]

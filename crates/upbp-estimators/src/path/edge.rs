@@ -9,8 +9,11 @@ use glam::Vec3;
 use upbp_accel::Ray;
 use upbp_media::{EdgeDensity, Interior, Medium, MediumId, MediumStack, RaySegment};
 
+use crate::iteration::Plan;
+use crate::mis::BeamExtent;
 use crate::random::Stream;
 use crate::scene::{Crossing, Hit, MAX_CROSSINGS, Scene};
+use crate::technique::Technique;
 
 /// How much of a ray's way is needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -378,6 +381,37 @@ impl<B: Copy> Passage<B> {
     /// What the edge accumulates to its end.
     pub fn density<S: Scene>(&self, scene: &S) -> EdgeDensity {
         self.spans.last().map_or(EdgeDensity::EMPTY, |span| self.density_to(scene, span, span.end))
+    }
+
+    /// The spans that a beam along the edge runs through, each with the distance where the beam ends in it.
+    pub fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&Span, f32)> {
+        let stop = match extent {
+            BeamExtent::Short => self.stop,
+            BeamExtent::Long => None,
+        };
+        let count = stop.map_or(self.spans.len(), |(last, _)| last + 1);
+        self.spans[..count].iter().enumerate().map(move |(i, span)| match stop {
+            Some((last, t)) if last == i => (span, t),
+            _ => (span, span.end),
+        })
+    }
+
+    /// The query beams along a camera edge for merges by `technique`: each with its span and medium. None if no light
+    /// sub-path could complete a path, whose last edge is the `depth`-th from the camera.
+    pub(crate) fn query_beams(
+        &self,
+        plan: &Plan,
+        depth: u32,
+        technique: Technique,
+    ) -> impl Iterator<Item = (&Span, MediumId, Ray)> {
+        // The photon's side has at least one edge.
+        let completes = depth < plan.lengths.max;
+        let spans = completes.then(|| self.beam_spans(plan.mis.query_beams)).into_iter().flatten();
+        spans.filter_map(move |(span, end)| {
+            let medium = span.medium.filter(|&medium| plan.merges_in(medium, technique))?;
+            let ray = Ray { origin: self.origin, direction: self.direction, t_min: span.start, t_max: end };
+            Some((span, medium, ray))
+        })
     }
 
     /// The part of `span` before `t`.

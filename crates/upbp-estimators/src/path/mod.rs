@@ -12,7 +12,7 @@ pub use context::{Context, Scratch};
 pub use edge::{Extent, Passage, Span};
 pub(crate) use interaction::MIN_COSINE;
 pub use interaction::{Evaluation, Scattered, Sides, Site, SurfaceSite};
+pub(crate) use vertex::{CameraEdge, CameraVertex};
 pub use vertex::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
-pub(crate) use vertex::{QueryEdge, QueryVertex};
 pub(crate) use visibility::ray_origin;
 pub use visibility::{Target, clear_edge};

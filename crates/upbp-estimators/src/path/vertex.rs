@@ -1,14 +1,15 @@
-//! What light sub-paths leave: vertices, photon beams, splats.
+//! Vertices and edges of sub-paths: what light sub-paths leave, and what camera sub-paths meet it with.
 
 use glam::Vec3;
 use upbp_accel::Segment;
-use upbp_media::{EdgeDensity, MediumId, Spectrum};
+use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
 use super::context::Context;
-use super::interaction::{Sides, Site};
+use super::edge::{Passage, Span};
+use super::interaction::Site;
 use crate::counters::Counters;
-use crate::mis::{Densities, Pending, Tip};
-use crate::scene::{Emitter, EmitterId, EmitterPoint, Scene};
+use crate::mis::{BeamExtent, Densities, Edge, Pending, Tip};
+use crate::scene::{Emitter, EmitterId, EmitterPoint, Scene, Walk};
 use crate::technique::Technique;
 
 /// A vertex of a light sub-path where camera sub-paths can be connected or merged.
@@ -98,8 +99,56 @@ pub struct PhotonBeam<D = f64> {
     pub path: u32,
 }
 
-/// A camera sub-path between two vertices.
-pub(crate) struct QueryEdge<D> {
+impl<D: Densities> PhotonBeam<D> {
+    /// The vertex at distance `t` along the beam; `None` where no walk can stop.
+    pub(crate) fn vertex_at<S: Scene>(
+        &self,
+        context: &Context<'_, S>,
+        t: f32,
+    ) -> Option<LightVertex<S::Bsdf, D>> {
+        let Context { world, plan } = *context;
+        let Segment { origin, direction, start, .. } = self.segment;
+        let segment = RaySegment { origin, direction, start, end: t };
+        let density = self.before.with(&world.scene.media()[self.medium.0 as usize].segment(&segment));
+        let distance = if self.from_infinity { f64::INFINITY } else { f64::from(t) };
+        let edge = Edge::new(&density, distance, 1.0, self.pending.in_medium, true);
+        if !(edge.forward > 0.0) {
+            return None;
+        }
+        let position = origin + direction * t;
+        let connections = self.source.connections(context, direction, position);
+        Some(LightVertex {
+            position,
+            towards_light: -direction,
+            throughput: self.throughput * transmitted(&density, plan.mis.photon_beams),
+            tip: self.pending.arrive(&plan.mis, Walk::Light, &edge, connections),
+            depth: self.depth,
+            path: self.path,
+            site: Site::Medium(self.medium),
+        })
+    }
+}
+
+/// Throughput of a beam inside it: `T/R` of a short one, `T` of a long one.
+fn transmitted(density: &EdgeDensity, extent: BeamExtent) -> Spectrum {
+    density.transmittance / extent.normalisation(density.pass_probability) as f32
+}
+
+/// A vertex of a camera sub-path where light sub-paths can be connected or merged.
+pub(crate) struct CameraVertex<B, D> {
+    pub(crate) position: Vec3,
+    /// Direction to the vertex before, towards the camera.
+    pub(crate) towards_camera: Vec3,
+    /// Importance over density on arrival, before scattering.
+    pub(crate) throughput: Spectrum,
+    pub(crate) tip: Tip<D>,
+    /// Edges from the camera.
+    pub(crate) depth: u32,
+    pub(crate) site: Site<B>,
+}
+
+/// An edge of a camera sub-path: a query beam through all its media.
+pub(crate) struct CameraEdge<D> {
     /// Importance over density at the edge's first vertex, after scattering.
     pub(crate) throughput: Spectrum,
     /// What the weights need of the first vertex.
@@ -110,16 +159,27 @@ pub(crate) struct QueryEdge<D> {
     pub(crate) depth: u32,
 }
 
-/// A camera sub-path's end at a vertex.
-pub(crate) struct QueryVertex<B, D> {
-    pub(crate) position: Vec3,
-    /// Direction to the vertex before, towards the camera.
-    pub(crate) towards_camera: Vec3,
-    pub(crate) throughput: Spectrum,
-    pub(crate) tip: Tip<D>,
-    pub(crate) depth: u32,
-    pub(crate) site: Site<B>,
-    pub(crate) sides: Sides,
+impl<D: Densities> CameraEdge<D> {
+    /// The vertex at distance `t` along the edge, in a medium; `None` where no walk can stop.
+    pub(crate) fn vertex_at<S: Scene>(
+        &self,
+        context: &Context<'_, S>,
+        passage: &Passage<S::Bsdf>,
+        (span, medium): (&Span, MediumId),
+        t: f32,
+    ) -> Option<CameraVertex<S::Bsdf, D>> {
+        let Context { world, plan } = *context;
+        let density = passage.density_to(world.scene, span, t);
+        let edge = Edge::new(&density, f64::from(t), 1.0, self.pending.in_medium, true);
+        (edge.forward > 0.0).then(|| CameraVertex {
+            position: passage.origin + passage.direction * t,
+            towards_camera: -passage.direction,
+            throughput: self.throughput * transmitted(&density, plan.mis.query_beams),
+            tip: self.pending.arrive(&plan.mis, Walk::Camera, &edge, self.connections),
+            depth: self.depth,
+            site: Site::Medium(medium),
+        })
+    }
 }
 
 /// A contribution of light tracing to some pixel.

@@ -6,7 +6,7 @@
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::{Joint, ObservedSample, Observer};
-use crate::path::{Context, LightVertex, QueryVertex, Site, Target, clear_edge, ray_origin};
+use crate::path::{CameraVertex, Context, LightVertex, Sides, Site, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Crossing, Scene, Walk};
 use crate::technique::Technique;
@@ -15,7 +15,8 @@ use crate::technique::Technique;
 pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
-    vertex: &QueryVertex<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    sides: &Sides,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -29,7 +30,7 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         let light = &map.vertices[stream.index(map.vertices.len())];
         if plan.lengths.contain(vertex.depth + light.depth + 1) {
             out.observer.turns_to(Some(Technique::Connect));
-            connect(context, vertex, light, factor, crossings, out);
+            connect(context, vertex, sides, light, factor, crossings, out);
         }
     }
     out.observer.turns_to(None);
@@ -37,7 +38,8 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 
 fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    vertex: &QueryVertex<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    sides: &Sides,
     light: &LightVertex<S::Bsdf, O::Densities>,
     factor: f64,
     crossings: &mut Vec<Crossing>,
@@ -77,7 +79,7 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     }
     out.counters.shadow_rays += 1;
     let crosses = vertex.site.crosses(vertex.towards_camera, direction);
-    let stack = vertex.sides.towards(crosses);
+    let stack = sides.towards(crosses);
     let origin = ray_origin(&vertex.site, vertex.position, direction);
     let surface = match &light.site {
         Site::Surface(surface) => Some((light.position, surface.geometric_normal)),
@@ -113,17 +115,15 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         * scattering
         * density.transmittance
         * (geometry * factor) as f32;
-    if out.add(Technique::Connect, value, &weight) {
-        out.observer.sample(&ObservedSample {
-            technique: Technique::Connect,
-            camera_depth: vertex.depth,
-            joint: Joint::Connect {
-                path: light.path,
-                light: (light.position, light.site, light.depth),
-                camera: (vertex.position, vertex.site),
-            },
-            weight,
-            value,
-        });
-    }
+    out.record(&ObservedSample {
+        technique: Technique::Connect,
+        camera_depth: vertex.depth,
+        joint: Joint::Connect {
+            path: light.path,
+            light: (light.position, light.site, light.depth),
+            camera: (vertex.position, vertex.site),
+        },
+        weight,
+        value,
+    });
 }

@@ -7,7 +7,7 @@ use crate::film_sample::Output;
 use crate::mis::{Densities, Edge, Weight};
 use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
 use crate::path::Context;
-use crate::path::{Passage, QueryEdge};
+use crate::path::{CameraEdge, Passage};
 use crate::scene::{Emitter, EmitterId, EmitterPoint, Hit, Scene, Walk};
 use crate::technique::Technique;
 
@@ -17,7 +17,7 @@ use crate::technique::Technique;
 pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
-    edge: &QueryEdge<O::Densities>,
+    edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let Context { world, plan } = *context;
@@ -31,15 +31,13 @@ pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             let emitted = medium.emitted(&passage.segment(span, span.end));
             let value = edge.throughput * span.before.transmittance * emitted;
             let weight = Weight::<O::Densities>::alone(Technique::Hit);
-            if out.add(Technique::Hit, value, &weight) {
-                out.observer.sample(&ObservedSample {
-                    technique: Technique::Hit,
-                    camera_depth: edge.depth,
-                    joint: Joint::Emission,
-                    weight,
-                    value,
-                });
-            }
+            out.record(&ObservedSample {
+                technique: Technique::Hit,
+                camera_depth: edge.depth,
+                joint: Joint::Emission,
+                weight,
+                value,
+            });
         }
     }
 }
@@ -53,7 +51,7 @@ pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     receiver: Vec3,
     mis_edge: &Edge,
     throughput: Spectrum,
-    edge: &QueryEdge<O::Densities>,
+    edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     if let Some(emitter) = hit.emitter {
@@ -66,7 +64,7 @@ pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     passage: &Passage<S::Bsdf>,
-    edge: &QueryEdge<O::Densities>,
+    edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let world = context.world;
@@ -96,7 +94,7 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     receiver: Vec3,
     mis_edge: &Edge,
     throughput: Spectrum,
-    edge: &QueryEdge<O::Densities>,
+    edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let Context { world, plan } = *context;
@@ -125,13 +123,11 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         )
     };
     let value = throughput * densities.radiance;
-    if out.add(Technique::Hit, value, &weight) {
-        out.observer.sample(&ObservedSample {
-            technique: Technique::Hit,
-            camera_depth: edge.depth,
-            joint: Joint::Hit(LightEnd { emitter, point: *point, direction }),
-            weight,
-            value,
-        });
-    }
+    out.record(&ObservedSample {
+        technique: Technique::Hit,
+        camera_depth: edge.depth,
+        joint: Joint::Hit(LightEnd { emitter, point: *point, direction }),
+        weight,
+        value,
+    });
 }

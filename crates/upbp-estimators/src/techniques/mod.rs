@@ -2,16 +2,23 @@
 //!
 //! Source: `docs/theory.md`, section 2 for contributions, 4.4 for weights.
 
-mod beams;
+mod bb1d;
+mod bp2d;
 mod connect;
 mod hit;
 mod light_tracing;
+mod merge;
 mod nee;
-mod points;
+mod pb2d;
+mod pp3d;
+mod surf;
 
-pub(crate) use beams::along_beam;
+pub(crate) use bb1d::bb1d;
+pub(crate) use bp2d::bp2d;
 pub(crate) use connect::connections;
 pub(crate) use hit::{emission_along, emitter_hit, environment};
 pub(crate) use light_tracing::light_tracing;
 pub(crate) use nee::next_events;
-pub(crate) use points::at_point;
+pub(crate) use pb2d::pb2d;
+pub(crate) use pp3d::pp3d;
+pub(crate) use surf::surf;

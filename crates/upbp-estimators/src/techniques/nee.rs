@@ -2,7 +2,7 @@
 
 use crate::film_sample::Output;
 use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
-use crate::path::{Context, MIN_COSINE, QueryVertex, Target, clear_edge, ray_origin};
+use crate::path::{CameraVertex, Context, MIN_COSINE, Sides, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
@@ -10,7 +10,8 @@ use crate::technique::Technique;
 /// Connects `vertex` to as many points on lights as the plan says.
 pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    vertex: &QueryVertex<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    sides: &Sides,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -21,14 +22,15 @@ pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     }
     for _ in 0..stream.round(plan.next_events) {
         out.observer.turns_to(Some(Technique::Nee));
-        next_event(context, vertex, stream, crossings, out);
+        next_event(context, vertex, sides, stream, crossings, out);
     }
     out.observer.turns_to(None);
 }
 
 fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    vertex: &QueryVertex<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    sides: &Sides,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -67,7 +69,7 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let origin = ray_origin(&vertex.site, vertex.position, direction);
     let surface = (kind == EmitterKind::Area).then_some((incident.point.position, incident.point.normal));
     let target = Target { direction, distance: incident.distance, surface };
-    let stack = vertex.sides.towards(crosses);
+    let stack = sides.towards(crosses);
     let Some(density) = clear_edge(scene, &stack, origin, &target, crossings) else { return };
 
     let in_medium = vertex.site.in_medium();
@@ -93,16 +95,14 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         * density.transmittance
         * incident.radiance
         * (geometry / (pdf * f64::from(plan.next_events))) as f32;
-    if out.add(Technique::Nee, value, &weight) {
-        out.observer.sample(&ObservedSample {
-            technique: Technique::Nee,
-            camera_depth: vertex.depth,
-            joint: Joint::Nee {
-                light: LightEnd { emitter, point: incident.point, direction: -direction },
-                camera: (vertex.position, vertex.site),
-            },
-            weight,
-            value,
-        });
-    }
+    out.record(&ObservedSample {
+        technique: Technique::Nee,
+        camera_depth: vertex.depth,
+        joint: Joint::Nee {
+            light: LightEnd { emitter, point: incident.point, direction: -direction },
+            camera: (vertex.position, vertex.site),
+        },
+        weight,
+        value,
+    });
 }

@@ -8,7 +8,9 @@ use crate::film_sample::{CameraWalk, Output};
 use crate::light_map::LightMap;
 use crate::mis::{Densities, Edge, Pending};
 use crate::observer::{ObservedVertex, Observer};
-use crate::path::{Arrival, Context, Extent, QueryEdge, QueryVertex, Scratch, arrive, pend, ray_origin};
+use crate::path::{
+    Arrival, CameraEdge, CameraVertex, Context, Extent, Scratch, Site, arrive, pend, ray_origin,
+};
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
 use crate::scene::{Camera, Scene, Walk};
@@ -47,7 +49,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let mut stack = world.stack_at_camera(ray.origin);
     let mut origin = ray.origin;
     let mut direction = ray.direction;
-    let mut edge = QueryEdge {
+    let mut edge = CameraEdge {
         throughput: Spectrum::ONE,
         pending: Pending::at_camera(f64::from(ray.pdf)),
         connections: O::Densities::of(Technique::LightTracing, plan.mis.pow(plan.mis.light_tracing)),
@@ -62,7 +64,8 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         out.counters.boundary_conflicts += scratch.passage.take_conflicts();
         let passage = &scratch.passage;
         techniques::emission_along(context, passage, &edge, &mut out);
-        techniques::along_beam(context, map, passage, &edge, &mut out);
+        techniques::pb2d(context, map, passage, &edge, &mut out);
+        techniques::bb1d(context, map, passage, &edge, &mut out);
 
         let arrived = match arrive(scene, passage) {
             Arrival::Vertex(arrived) => arrived,
@@ -97,30 +100,36 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             out.counters.cut_walks += u64::from(arrived.site.is_connectible());
             break;
         }
-        let connectible = arrived.site.is_connectible();
+        let (connectible, sides) = (arrived.site.is_connectible(), &arrived.sides);
         let tip = edge.pending.arrive(
             &plan.mis,
             Walk::Camera,
             &mis_edge,
             if connectible { edge.connections } else { O::Densities::ZERO },
         );
-        let vertex = QueryVertex {
+        let vertex = CameraVertex {
             position: arrived.position,
             towards_camera: from,
             throughput,
             tip,
             depth,
             site: arrived.site,
-            sides: arrived.sides,
         };
         if connectible {
             if !scattered_before {
                 walk.seen = out.layers[Layer::Bpt as usize];
                 scattered_before = true;
             }
-            techniques::next_events(context, &vertex, &mut stream, &mut scratch.crossings, &mut out);
-            techniques::connections(context, map, &vertex, &mut stream, &mut scratch.crossings, &mut out);
-            techniques::at_point(context, map, &vertex, &mut out);
+            let crossings = &mut scratch.crossings;
+            techniques::next_events(context, &vertex, sides, &mut stream, crossings, &mut out);
+            techniques::connections(context, map, &vertex, sides, &mut stream, crossings, &mut out);
+            match &vertex.site {
+                Site::Surface(surface) => techniques::surf(context, map, &vertex, surface, &mut out),
+                Site::Medium(medium) => {
+                    techniques::pp3d(context, map, &vertex, *medium, &mut out);
+                    techniques::bp2d(context, map, &vertex, *medium, &mut out);
+                }
+            }
         }
 
         let Some(scattered) =
@@ -137,8 +146,8 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         });
         origin = ray_origin(&vertex.site, vertex.position, scattered.direction);
         direction = scattered.direction;
-        stack = vertex.sides.towards(scattered.transmitted);
-        edge = QueryEdge {
+        stack = sides.towards(scattered.transmitted);
+        edge = CameraEdge {
             throughput: throughput * scattered.weight,
             pending: pend(context, &vertex.tip, &vertex.site, &scattered),
             connections: plan.mis.connections(),

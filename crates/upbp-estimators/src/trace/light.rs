@@ -195,38 +195,25 @@ fn store_beams<S: Scene, D: Densities>(
     out: &mut LightChunk<S::Bsdf, D>,
 ) {
     let Context { world, plan } = *context;
-    let stop = match plan.mis.photon_beams {
-        BeamExtent::Short => passage.stop,
-        BeamExtent::Long => None,
-    };
-    for (i, span) in passage.spans.iter().enumerate() {
-        if let Some(medium) = span.medium
-            && let Some(end) = beam_end(world, passage, span, medium, stop.filter(|(last, _)| *last == i))
-        {
-            let merges = plan.mis.merges_in(medium);
-            if merges.bb1d > 0.0 || merges.bp2d > 0.0 {
-                out.counters.photon_beams += 1;
-                out.beams.push(PhotonBeam {
-                    segment: Segment {
-                        origin: passage.origin,
-                        direction: passage.direction,
-                        start: span.start,
-                        end,
-                    },
-                    medium,
-                    before: span.before,
-                    pending: flight.pending,
-                    source: flight.source,
-                    throughput: flight.throughput,
-                    from_infinity: flight.infinite,
-                    depth,
-                    path,
-                });
-            }
+    for (span, end) in passage.beam_spans(plan.mis.photon_beams) {
+        let Some(medium) = span.medium else { continue };
+        let merges = plan.mis.merges_in(medium);
+        if !(merges.bb1d > 0.0 || merges.bp2d > 0.0) {
+            continue;
         }
-        if stop.is_some_and(|(last, _)| last == i) {
-            break;
-        }
+        let Some(end) = beam_end(world, passage, span, medium, end) else { continue };
+        out.counters.photon_beams += 1;
+        out.beams.push(PhotonBeam {
+            segment: Segment { origin: passage.origin, direction: passage.direction, start: span.start, end },
+            medium,
+            before: span.before,
+            pending: flight.pending,
+            source: flight.source,
+            throughput: flight.throughput,
+            from_infinity: flight.infinite,
+            depth,
+            path,
+        });
     }
 }
 
@@ -235,7 +222,7 @@ const DOUBLINGS: usize = 64;
 /// Part of the light at its start that may get farther than such a beam, in any channel: what single precision does not tell.
 const NEGLIGIBLE: f32 = 1e-7;
 
-/// The end of a beam in `span`, whose medium is `medium`, where the walk may stop.
+/// The end of a beam in `span`, whose medium is `medium`, that runs to distance `end` there.
 ///
 /// Where there is none, the beam ends where what is left in every channel is [negligible](NEGLIGIBLE), or is not attenuated any further. So weights
 /// may take it to be without an end.
@@ -245,9 +232,8 @@ fn beam_end<S: Scene>(
     passage: &Passage<S::Bsdf>,
     span: &Span,
     medium: MediumId,
-    stop: Option<(usize, f32)>,
+    end: f32,
 ) -> Option<f32> {
-    let end = stop.map_or(span.end, |(_, t)| t);
     if end.is_finite() || !span.start.is_finite() {
         return (end > span.start && span.start.is_finite()).then_some(end);
     }

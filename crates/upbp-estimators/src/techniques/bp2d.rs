@@ -1,0 +1,37 @@
+//! BP2D: photon beams around a vertex in a medium (`docs/theory.md`, section 2.5).
+
+use upbp_media::MediumId;
+
+use super::merge::merge;
+use crate::film_sample::Output;
+use crate::light_map::LightMap;
+use crate::observer::Observer;
+use crate::path::{CameraVertex, Context};
+use crate::scene::Scene;
+use crate::technique::Technique;
+
+/// Merges the photon beams around `vertex`, which lies in `medium`.
+pub(crate) fn bp2d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+    context: &Context<'_, S>,
+    map: &LightMap<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    medium: MediumId,
+    out: &mut Output<'_, O>,
+) {
+    let plan = context.plan;
+    if !plan.merges_in(medium, Technique::Bp2d) {
+        return;
+    }
+    let kernel = &plan.kernels.bp2d;
+    out.observer.turns_to(Some(Technique::Bp2d));
+    map.beam_tree.around_point(vertex.position, kernel.radius(), |index, t, distance2| {
+        let beam = &map.beams[index as usize];
+        if beam.medium == medium
+            && plan.lengths.contain(vertex.depth + beam.depth)
+            && let Some(light) = beam.vertex_at(context, t)
+        {
+            merge(context, Technique::Bp2d, &light, vertex, kernel.value(distance2), out);
+        }
+    });
+    out.observer.turns_to(None);
+}

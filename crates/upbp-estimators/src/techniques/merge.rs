@@ -1,0 +1,59 @@
+//! Merges of a light vertex and a camera vertex within a kernel: weight and value, the same for all five.
+//!
+//! On a beam the vertex lies somewhere along it, not at the distance that a walk sampled: density and weight are those of
+//! the point where the beams come closest (`docs/theory.md`, sections 2.2 to 2.6 and 4.4).
+
+use crate::film_sample::Output;
+use crate::mis::{Densities, Weight};
+use crate::observer::{Joint, ObservedSample, Observer};
+use crate::path::{CameraVertex, Context, LightVertex, Site};
+use crate::scene::{Scene, Walk};
+use crate::technique::Technique;
+
+/// Merges two vertices; `kernel` is the kernel's value between them, for beams per sine of the angle.
+pub(super) fn merge<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+    context: &Context<'_, S>,
+    technique: Technique,
+    light: &LightVertex<S::Bsdf, O::Densities>,
+    camera: &CameraVertex<S::Bsdf, O::Densities>,
+    kernel: f32,
+    out: &mut Output<'_, O>,
+) {
+    let Context { world, plan } = *context;
+    let mis = &plan.mis;
+    let Some(scattering) = camera.site.evaluate(
+        world.scene,
+        plan.roulette,
+        Walk::Camera,
+        camera.position,
+        camera.towards_camera,
+        light.towards_light,
+    ) else {
+        return;
+    };
+    let (factor, merges) = match camera.site {
+        Site::Surface(_) => {
+            let factor = mis.surface_factor();
+            (factor, O::Densities::of(technique, factor))
+        }
+        Site::Medium(medium) => {
+            let (c_light, c_camera) = (light.tip.distance_factor, camera.tip.distance_factor);
+            let factors = mis.volume_factors(medium, c_light, c_camera, scattering.sin_theta);
+            (factors.of(technique), factors.sum())
+        }
+    };
+    let before_light = light.tip.before(mis, scattering.rho_own);
+    let before_camera = camera.tip.before(mis, scattering.rho_opposite);
+    let per_photon = kernel * plan.per_photon(technique);
+    out.record(&ObservedSample {
+        technique,
+        camera_depth: camera.depth,
+        joint: Joint::Merge {
+            path: light.path,
+            light: (light.position, light.depth),
+            camera: (camera.position, camera.site),
+        },
+        weight: Weight::of_merge(factor, merges, before_light, before_camera),
+        value: camera.throughput * light.throughput * scattering.value * per_photon,
+    });
+}

@@ -1,0 +1,34 @@
+//! PB2D: photon points in media around a camera edge, the query beam (`docs/theory.md`, section 2.4).
+
+use super::merge::merge;
+use crate::film_sample::Output;
+use crate::light_map::LightMap;
+use crate::observer::Observer;
+use crate::path::{CameraEdge, Context, Passage, Site};
+use crate::scene::Scene;
+use crate::technique::Technique;
+
+/// Merges the photons around `edge`, through all its media.
+pub(crate) fn pb2d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+    context: &Context<'_, S>,
+    map: &LightMap<S::Bsdf, O::Densities>,
+    passage: &Passage<S::Bsdf>,
+    edge: &CameraEdge<O::Densities>,
+    out: &mut Output<'_, O>,
+) {
+    let plan = context.plan;
+    let kernel = &plan.kernels.pb2d;
+    for (span, medium, ray) in passage.query_beams(plan, edge.depth, Technique::Pb2d) {
+        out.observer.turns_to(Some(Technique::Pb2d));
+        map.medium.around_ray(&ray, kernel.radius(), |index, t, distance2| {
+            let photon = &map.vertices[index as usize];
+            if matches!(photon.site, Site::Medium(other) if other == medium)
+                && plan.lengths.contain(edge.depth + photon.depth)
+                && let Some(vertex) = edge.vertex_at(context, passage, (span, medium), t)
+            {
+                merge(context, Technique::Pb2d, photon, &vertex, kernel.value(distance2), out);
+            }
+        });
+        out.observer.turns_to(None);
+    }
+}

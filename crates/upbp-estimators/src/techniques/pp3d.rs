@@ -1,0 +1,36 @@
+//! PP3D: photon points in media around a vertex in a medium (`docs/theory.md`, section 2.3).
+
+use upbp_media::MediumId;
+
+use super::merge::merge;
+use crate::film_sample::Output;
+use crate::light_map::LightMap;
+use crate::observer::Observer;
+use crate::path::{CameraVertex, Context, Site};
+use crate::scene::Scene;
+use crate::technique::Technique;
+
+/// Merges the photons around `vertex`, which lies in `medium`.
+pub(crate) fn pp3d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+    context: &Context<'_, S>,
+    map: &LightMap<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    medium: MediumId,
+    out: &mut Output<'_, O>,
+) {
+    let plan = context.plan;
+    if !plan.merges_in(medium, Technique::Pp3d) {
+        return;
+    }
+    let kernel = &plan.kernels.pp3d;
+    out.observer.turns_to(Some(Technique::Pp3d));
+    map.medium.in_ball(vertex.position, kernel.radius(), |index, distance2| {
+        let photon = &map.vertices[index as usize];
+        if matches!(photon.site, Site::Medium(other) if other == medium)
+            && plan.lengths.contain(vertex.depth + photon.depth)
+        {
+            merge(context, Technique::Pp3d, photon, vertex, kernel.value(distance2), out);
+        }
+    });
+    out.observer.turns_to(None);
+}

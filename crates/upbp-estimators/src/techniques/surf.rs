@@ -1,0 +1,54 @@
+//! Surface merging: photons on surfaces around a surface vertex (`docs/theory.md`, section 2.2).
+
+use super::merge::merge;
+use crate::film_sample::Output;
+use crate::light_map::LightMap;
+use crate::observer::Observer;
+use crate::path::{CameraVertex, Context, LightVertex, Site, SurfaceSite};
+use crate::scene::Scene;
+use crate::technique::Technique;
+
+/// Photons whose surface faces away by more than this do not lie on the query's surface: cosine of the angle between
+/// the two normals.
+const MIN_NORMAL_COSINE: f32 = 0.7;
+
+/// Photons farther than this from the tangent plane, relative to the kernel's radius, lie on another surface.
+const MAX_PLANE_DISTANCE: f32 = 0.3;
+
+/// Merges the photons around `vertex`, which lies on `surface`.
+pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+    context: &Context<'_, S>,
+    map: &LightMap<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    surface: &SurfaceSite<S::Bsdf>,
+    out: &mut Output<'_, O>,
+) {
+    let plan = context.plan;
+    if !plan.looks_up(Technique::Surf) {
+        return;
+    }
+    let kernel = &plan.kernels.surf;
+    out.observer.turns_to(Some(Technique::Surf));
+    map.surface.in_ball(vertex.position, kernel.radius(), |index, distance2| {
+        let photon = &map.vertices[index as usize];
+        if plan.lengths.contain(vertex.depth + photon.depth)
+            && lies_on(surface, vertex, photon, kernel.radius())
+        {
+            merge(context, Technique::Surf, photon, vertex, kernel.value(distance2), out);
+        }
+    });
+    out.observer.turns_to(None);
+}
+
+/// Keeps light from leaking around edges and through thin walls. What it cuts off the kernel vanishes with the radius.
+fn lies_on<B, D>(
+    surface: &SurfaceSite<B>,
+    vertex: &CameraVertex<B, D>,
+    photon: &LightVertex<B, D>,
+    radius: f32,
+) -> bool {
+    let Site::Surface(other) = &photon.site else { return false };
+    let normal = surface.geometric_normal;
+    normal.dot(other.geometric_normal) > MIN_NORMAL_COSINE
+        && (photon.position - vertex.position).dot(normal).abs() < MAX_PLANE_DISTANCE * radius
+}
