@@ -24,17 +24,19 @@ pub struct Counters {
     pub dropped: u64,
     /// Camera sub-paths that were ended by the limit of the path length at a vertex that scatters.
     pub cut_walks: u64,
-    /// Walks that were ended since what they met cannot be: they escaped while still inside a body (geometry that is not closed), or a host
-    /// told of hits that are not ahead or not finite, or of boundaries without an end.
+    /// Walks that were ended since what they met cannot be: they escaped while still inside a body (geometry
+    /// that is not closed), or a host told of hits that are not ahead or not finite, or of boundaries without
+    /// an end.
     pub lost_walks: u64,
-    /// Boundaries that contradict the bodies that a walk thinks to be in: a body entered twice or left without being inside.
-    /// At a start within rounding of a boundary, or on one, the bodies are corrected; where geometry is not closed, the
-    /// boundary is ignored.
+    /// Boundaries that contradict the bodies that a walk thinks to be in: a body entered twice or left
+    /// without being inside. At a start within rounding of a boundary, or on one, the bodies are corrected;
+    /// where geometry is not closed, the boundary is ignored.
     pub boundary_conflicts: u64,
 }
 
 impl Counters {
-    /// Adds the counts of another pass. What comes from files may be of any size: sums end at the largest number.
+    /// Adds the counts of another pass. What comes from files may be of any size: sums end at the largest
+    /// number.
     pub fn add(&mut self, other: &Self) {
         let sum = |a: &mut u64, b: u64| *a = a.saturating_add(b);
         sum(&mut self.light_edges, other.light_edges);

@@ -11,12 +11,12 @@ use crate::technique::Layer;
 pub struct CameraWalk {
     /// Contributions by [`Layer`].
     pub layers: [Spectrum; Layer::COUNT],
-    /// Of them, light met before the first vertex that scatters: seen directly, by mirrors and through glass. How bright it
-    /// is depends on the place on the film alone, not on luck further on.
+    /// The part in `layers` that was met before the first vertex that scatters: seen directly, by mirrors and
+    /// through glass. How bright it is depends on the place on the film alone, not on luck further on.
     pub seen: Spectrum,
 }
 
-/// What a technique adds to: the layers of the sample at hand and the counters of the pass.
+/// Receiver of a camera sub-path's samples: layers, counters of the pass, and an observer.
 pub(crate) struct Output<'a, O: ?Sized> {
     pub(crate) layers: &'a mut [Spectrum; Layer::COUNT],
     pub(crate) counters: &'a mut Counters,

@@ -1,4 +1,4 @@
-//! What one iteration does: techniques, counts, radii.
+//! Techniques, counts, kernels and the weights' constants of one iteration.
 
 use upbp_media::{Medium, MediumId};
 
@@ -49,7 +49,7 @@ pub struct Plan {
     pub techniques: TechniqueSet,
     /// Light sub-paths.
     pub light_paths: u32,
-    /// How many of them leave photon beams.
+    /// Light sub-paths that leave photon beams.
     pub beam_paths: u32,
     /// Light vertices that each camera vertex is connected to, on average.
     pub connections: f32,
@@ -57,13 +57,13 @@ pub struct Plan {
     pub next_events: f32,
     /// Limits of the path length.
     pub lengths: PathLengths,
-    /// When walks end by Russian roulette.
+    /// Russian roulette.
     pub roulette: Roulette,
     /// Kernels with the radii of this iteration.
     pub kernels: Kernels,
-    /// In which iterations photons are looked up.
+    /// Periods of photon queries, in iterations.
     pub look_ups: LookUps,
-    /// What runs in this iteration: all but the look-ups of other iterations.
+    /// The techniques that run in this iteration: all but those whose photon queries other iterations make.
     pub due: TechniqueSet,
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
@@ -80,22 +80,24 @@ pub struct PlanChoices {
     pub techniques: TechniqueSet,
     /// Light sub-paths.
     pub light_paths: u32,
-    /// How many of them leave photon beams; at most `light_paths`.
+    /// Light sub-paths that leave photon beams, at most `light_paths`.
     pub beam_paths: u32,
-    /// Light vertices that each camera vertex is connected to, on average: finite, not negative; a fraction is a probability.
+    /// Light vertices that each camera vertex is connected to, on average: finite, not negative; a fraction
+    /// is a probability.
     pub connections: f32,
-    /// Points on lights that each camera vertex is connected to, likewise.
+    /// Points on lights that each camera vertex is connected to, on average: finite, not negative; a fraction
+    /// is a probability.
     pub next_events: f32,
-    /// Expected number of connectible vertices of a light sub-path. Must be known before the iteration: a figure of
-    /// the iteration itself would correlate with its samples.
+    /// Expected number of connectible vertices of a light sub-path. Must be known before the iteration: a
+    /// figure of the iteration itself would correlate with its samples.
     pub vertices_per_light_path: f64,
     /// Limits of the path length.
     pub lengths: PathLengths,
-    /// When walks end by Russian roulette.
+    /// Russian roulette.
     pub roulette: Roulette,
     /// Kernels.
     pub kernels: Kernels,
-    /// In which iterations photons are looked up.
+    /// Periods of photon queries, in iterations.
     pub look_ups: LookUps,
     /// Heuristic of the weights.
     pub heuristic: Heuristic,
@@ -105,9 +107,9 @@ pub struct PlanChoices {
     pub query_beams: BeamExtent,
 }
 
-/// How much the merges of a kernel count in a medium, in `[0, 1]` (`docs/theory.md`, section 6.5): the light changes within a
-/// mean free path of a boundary, and a wider kernel averages over that. Where no other technique finds a path, the factor
-/// cancels out of the weights.
+/// Factor of the merges of a kernel in a medium, in `[0, 1]` (`docs/theory.md`, section 6.5): the light
+/// changes within a mean free path of a boundary, and a wider kernel averages over that. Where no other
+/// technique finds a path, the factor cancels out of the weights.
 fn trust(kernel: &Kernel, mean_free_path: f32) -> f64 {
     let ratio = f64::from(kernel.radius()) / f64::from(mean_free_path);
     // A host may not know the mean free path.
@@ -126,29 +128,26 @@ impl Plan {
         };
         let paths = f64::from(light_paths);
         let beams = f64::from(beam_paths);
-        // The two numbers of a photon beam are counted with N_B, all others with N_L (docs/theory.md, section 2.1).
-        let merges = VolumeMerges {
-            pp3d: on(Technique::Pp3d, paths * kernels.pp3d.effective_volume()),
-            pb2d: on(Technique::Pb2d, paths * kernels.pb2d.effective_volume()),
-            bp2d: on(Technique::Bp2d, beams * kernels.bp2d.effective_volume()),
-            bb1d: on(Technique::Bb1d, beams * kernels.bb1d.effective_volume()),
+        // The two numbers of a photon beam are counted with N_B, all others with N_L (docs/theory.md, section
+        // 2.1).
+        let merge = |technique: Technique, kernel: &Kernel| {
+            let paths = if technique.uses_beams() { beams } else { paths };
+            on(technique, paths * kernel.effective_volume())
         };
-        let volume = scene
-            .media()
-            .iter()
-            .map(|medium| {
-                if !medium.scatters() {
-                    return VolumeMerges::default();
-                }
-                let trusted = |merge: f64, kernel: &Kernel| merge * trust(kernel, medium.mean_free_path());
-                VolumeMerges {
-                    pp3d: trusted(merges.pp3d, &kernels.pp3d),
-                    pb2d: trusted(merges.pb2d, &kernels.pb2d),
-                    bp2d: trusted(merges.bp2d, &kernels.bp2d),
-                    bb1d: trusted(merges.bb1d, &kernels.bb1d),
-                }
-            })
-            .collect();
+        let in_medium = |medium: &S::Medium| {
+            if !medium.scatters() {
+                return VolumeMerges::default();
+            }
+            let trusted = |technique, kernel: &Kernel| {
+                merge(technique, kernel) * trust(kernel, medium.mean_free_path())
+            };
+            VolumeMerges {
+                pp3d: trusted(Technique::Pp3d, &kernels.pp3d),
+                pb2d: trusted(Technique::Pb2d, &kernels.pb2d),
+                bp2d: trusted(Technique::Bp2d, &kernels.bp2d),
+                bb1d: trusted(Technique::Bb1d, &kernels.bb1d),
+            }
+        };
         // Expected samples of one connection: draws per vertex over stored vertices per light path.
         let connect = if choices.vertices_per_light_path > 0.0 && light_paths > 0 {
             on(Technique::Connect, f64::from(choices.connections) / choices.vertices_per_light_path)
@@ -161,8 +160,8 @@ impl Plan {
             nee: on(Technique::Nee, f64::from(choices.next_events)),
             connect,
             light_tracing: on(Technique::LightTracing, paths),
-            surf: on(Technique::Surf, paths * kernels.surf.effective_volume()),
-            volume,
+            surf: merge(Technique::Surf, &kernels.surf),
+            volume: scene.media().iter().map(in_medium).collect(),
             photon_beams: choices.photon_beams,
             query_beams: choices.query_beams,
         };
@@ -183,27 +182,27 @@ impl Plan {
         }
     }
 
-    /// The same iteration with fewer light sub-paths, each of which counts for more, for pilot renders. Weights stay those
-    /// of the whole number.
+    /// This iteration with fewer light sub-paths, each of which counts for more, for pilot renders. Weights
+    /// stay those of the whole number.
     #[must_use]
     pub fn thinned(&self, light_paths: u32, beam_paths: u32) -> Self {
         let light_paths = light_paths.min(self.light_paths);
         Self { light_paths, beam_paths: beam_paths.min(self.beam_paths).min(light_paths), ..self.clone() }
     }
 
-    /// Whether anything is stored along light sub-paths for camera sub-paths to look up.
+    /// Whether vertices of light sub-paths are stored, for connections or merges.
     #[must_use]
     pub fn stores_vertices(&self) -> bool {
         self.connections > 0.0 || self.looks_up(Technique::Surf) || self.stores_medium_photons()
     }
 
-    /// Whether photon points in media are looked up.
+    /// Whether photon points in media are stored.
     #[must_use]
     pub fn stores_medium_photons(&self) -> bool {
         self.looks_up(Technique::Pp3d) || self.looks_up(Technique::Pb2d)
     }
 
-    /// Whether photon beams are looked up.
+    /// Whether photon beams are stored.
     #[must_use]
     pub fn stores_beams(&self) -> bool {
         self.looks_up(Technique::Bp2d) || self.looks_up(Technique::Bb1d)
@@ -226,14 +225,11 @@ impl Plan {
         self.mis.merges_in(medium).of(technique) > 0.0 && self.due.has(technique)
     }
 
-    /// How much a photon counts when it is looked up: one over the number of light sub-paths, as often as there are iterations to
-    /// one that looks it up.
+    /// Factor of a photon in a merge: one over the number of light sub-paths, times the period of its
+    /// queries.
     #[inline]
     pub(crate) fn per_photon(&self, technique: Technique) -> f32 {
-        let paths = match technique {
-            Technique::Bp2d | Technique::Bb1d => self.beam_paths,
-            _ => self.light_paths,
-        };
+        let paths = if technique.uses_beams() { self.beam_paths } else { self.light_paths };
         self.look_ups.period(technique) as f32 / paths as f32
     }
 

@@ -4,15 +4,15 @@ use std::f64::consts::PI;
 
 /// A radial kernel in one, two or three dimensions, normalised to integrate to one.
 ///
-/// Points use constant kernels for the three-dimensional and the surface estimate, parabolic (Epanechnikov) ones
-/// where a beam takes part: there the kernel is evaluated along a line and its edge would show.
+/// Points use constant kernels for the three-dimensional and the surface estimate, parabolic (Epanechnikov)
+/// ones where a beam takes part: there the kernel is evaluated along a line and its edge would show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kernel {
     radius: f32,
     /// Value at the centre.
     peak: f32,
-    /// The value at distance `d` is `peak (1 − falloff d²)`. Not the product of the two: it is beyond single precision
-    /// for radii below 10⁻⁹.
+    /// The value at distance `d` is `peak (1 − falloff d²)`. Not the product of the two: it is beyond single
+    /// precision for radii below 10⁻⁹.
     falloff: f32,
     /// `1 / ∫K²`, the volume that stands for the kernel in a weight.
     effective_volume: f64,

@@ -1,4 +1,4 @@
-//! What all light sub-paths of an iteration left, ready to be looked up.
+//! Light vertices and photon beams of an iteration, in trees for the queries of camera sub-paths.
 
 use upbp_accel::{PointTree, SegmentTree, SplitParams};
 
@@ -7,7 +7,7 @@ use crate::mis::Densities;
 use crate::path::{LightVertex, PhotonBeam, Site};
 use crate::technique::Technique;
 
-/// Light vertices and photon beams with their look-up structures.
+/// Light vertices and photon beams of an iteration, with the trees that camera sub-paths query.
 pub struct LightMap<B, D = f64> {
     /// All vertices that can be connected or merged.
     pub vertices: Vec<LightVertex<B, D>>,

@@ -24,9 +24,9 @@ pub struct LightEnd {
 pub struct ObservedVertex<B> {
     /// Edges from the sub-path's end to this vertex.
     pub depth: u32,
-    /// Where it is.
+    /// Position, scene units.
     pub position: Vec3,
-    /// How it scatters.
+    /// Scattering at the vertex.
     pub site: Site<B>,
     /// Whether it scattered by a Dirac lobe.
     pub delta: bool,
@@ -34,7 +34,7 @@ pub struct ObservedVertex<B> {
     pub albedo: f32,
 }
 
-/// What joins the two sub-paths of a sample.
+/// The way the two sub-paths of a sample are joined.
 #[derive(Clone, Copy, Debug)]
 pub enum Joint<B> {
     /// The camera sub-path went through a medium that emits.
@@ -86,7 +86,7 @@ pub struct ObservedSample<B, D = f64> {
     pub technique: Technique,
     /// Edges of the camera sub-path up to the joint.
     pub camera_depth: u32,
-    /// How the sub-paths meet.
+    /// The way the sub-paths are joined.
     pub joint: Joint<B>,
     /// Weight of the technique.
     pub weight: Weight<D>,
@@ -96,7 +96,8 @@ pub struct ObservedSample<B, D = f64> {
 
 /// Receives what the walks do. All methods do nothing by default and then cost nothing, if the type is known.
 pub trait Observer<B> {
-    /// What weights are to tell: `f64` or [`ByTechnique`](crate::mis::ByTechnique).
+    /// The type of densities in weights: `f64`, or, to tell techniques apart,
+    /// [`ByTechnique`](crate::mis::ByTechnique).
     type Densities: Densities;
 
     /// A light sub-path starts.
@@ -119,7 +120,8 @@ pub trait Observer<B> {
         let _ = vertex;
     }
 
-    /// The walk turns to a technique: to the tracing of one next event or connection, to one look-up. `None`: it goes on.
+    /// The walk turns to a technique: to the tracing of one next event or connection, to one look-up. `None`:
+    /// it goes on.
     fn turns_to(&mut self, technique: Option<Technique>) {
         let _ = technique;
     }
@@ -130,8 +132,8 @@ pub trait Observer<B> {
     }
 }
 
-/// Any observer, by calls through a table: for those that see a few thousand paths, so that walks are not compiled for each of
-/// them.
+/// Any observer, by calls through a table: for those that see a few thousand paths, so that walks are not
+/// compiled for each type.
 pub type DynObserver<'a, B, D = f64> = dyn Observer<B, Densities = D> + 'a;
 
 /// Nobody looks.

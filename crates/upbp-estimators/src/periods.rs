@@ -1,8 +1,9 @@
-//! In which iterations photons are looked up.
+//! Periods of photon queries, in iterations.
 //!
-//! A look-up that brings little need not be made in every iteration: it is made in one of `m`, its contributions count `m` times, and
-//! in the weights of all iterations its number of samples is `n/m`. So the weights of a path sum to one for any `m`, and a technique
-//! that hardly pays but may be the only one for some paths stays, at a part of the cost of its look-ups and of what they need.
+//! A look-up that brings little need not be made in every iteration: it is made in one of `m`, its
+//! contributions count `m` times, and in the weights of all iterations its number of samples is `n/m`. So the
+//! weights of a path sum to one for any `m`, and a technique that hardly pays but may be the only one for
+//! some paths stays, at a part of the cost of its look-ups and of what they need.
 
 use std::num::NonZeroU32;
 
@@ -25,8 +26,9 @@ impl LookUps {
         self.get(technique).map_or(1, |period| period.get())
     }
 
-    /// What runs in an iteration: each technique in one of every `m` iterations of a [half](crate::half) from a multiple of
-    /// `m` on, whichever it happens to be. So every iteration has it with probability `1/m`, and `m` of a half have it once.
+    /// The techniques that run in an iteration: each in one of every `m` iterations of a [half](crate::half)
+    /// from a multiple of `m` on, whichever it happens to be. So every iteration has it with probability
+    /// `1/m`, and `m` of a half have it once.
     #[must_use]
     pub fn due(&self, seed: u64, iteration: u64) -> TechniqueSet {
         let (half, iteration) = half(iteration);

@@ -4,7 +4,7 @@ use upbp_media::{Medium, MediumStack, RaySegment, SegmentDensity};
 
 use crate::scene::{BoundingSphere, Camera, Emitter, EmitterId, EmitterKind, Scene};
 
-/// What is derived once from a [`Scene`].
+/// A [`Scene`] with all that is derived from it once.
 pub struct World<'a, S: Scene> {
     /// The scene.
     pub scene: &'a S,
@@ -25,8 +25,8 @@ impl<'a, S: Scene> World<'a, S> {
     /// Looks at the scene once: emitters' powers, bounds, the camera's surroundings.
     ///
     /// # Errors
-    /// Bounds that are not positive and finite, a power that is negative or not finite, a crop outside of the film,
-    /// a medium that does not exist around the scene.
+    /// Bounds that are not positive and finite, a power that is negative or not finite, a crop outside of the
+    /// film, a medium that does not exist around the scene.
     pub fn new(scene: &'a S) -> Result<Self, WorldError> {
         let bounds = scene.bounds();
         if !(bounds.radius > 0.0 && bounds.radius.is_finite() && bounds.centre.is_finite()) {
@@ -98,8 +98,9 @@ impl<'a, S: Scene> World<'a, S> {
         })
     }
 
-    /// Chooses emitters by what they bring instead of by power: `emission` where light sub-paths start, `next_event` where
-    /// camera vertices look for light. Either way the choice must not depend on samples that it serves.
+    /// Chooses emitters by what they bring instead of by power: `emission` where light sub-paths start,
+    /// `next_event` where camera vertices look for light. Either way the choice must not depend on samples
+    /// that it serves.
     ///
     /// Power keeps a share, so that no emitter is lost that was not seen.
     pub fn choose_emitters_by(&mut self, emission: &EmitterShares, next_event: &EmitterShares) {
@@ -155,8 +156,9 @@ impl<'a, S: Scene> World<'a, S> {
         self.emitting_media
     }
 
-    /// Whether any medium is so dense that rounding often puts a vertex in it on the other side of its boundary. A ray that is
-    /// followed to the next surface or to infinity finds out; one that is followed to the next collision does not.
+    /// Whether any medium is so dense that rounding often puts a vertex in it on the other side of its
+    /// boundary. A ray that is followed to the next surface or to infinity finds out; one that is followed to
+    /// the next collision does not.
     #[must_use]
     pub const fn has_dense_media(&self) -> bool {
         self.dense_media
@@ -169,11 +171,11 @@ impl<'a, S: Scene> World<'a, S> {
     }
 }
 
-/// Media whose mean free path is a smaller part of the scene's radius are dense: of their vertices next to a boundary, one in
-/// ten thousand is within rounding of it.
+/// Media whose mean free path is a smaller part of the scene's radius are dense: of their vertices next to a
+/// boundary, one in ten thousand is within rounding of it.
 const DENSE: f32 = 1e-3;
 
-/// What each emitter was seen to bring, as [`World::choose_emitters_by`] takes it.
+/// Light that each emitter was seen to bring, as [`World::choose_emitters_by`] takes it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EmitterShares {
     /// Light by emitter, in any unit; emitters that are left out bring nothing.
@@ -197,8 +199,8 @@ const LEAST_OF_EVEN_SHARE: f64 = 0.01;
 /// A discrete distribution over emitters.
 #[derive(Clone, Debug)]
 struct Selection {
-    /// Running sums of the probabilities, in units of the random numbers: what is chosen with these has exactly the
-    /// probability that it is said to have, and whatever shines is chosen at all.
+    /// Running sums of the probabilities, in units of the random numbers: what is chosen with these has
+    /// exactly the probability that it is said to have, and whatever shines is chosen at all.
     cumulative: Vec<u32>,
 }
 
@@ -264,7 +266,7 @@ impl Selection {
     }
 }
 
-/// What is wrong with a scene as a whole.
+/// A fault of a scene as a whole.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorldError {

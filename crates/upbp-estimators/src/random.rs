@@ -1,40 +1,43 @@
 //! Random numbers as streams that are addressed, not shared.
 //!
-//! Every sub-path draws from its own stream, a function of (seed, iteration, kind of path, index): results then
-//! depend neither on the number of threads nor on who renders which iteration, and the walks of both sides are
-//! independent (a shared stream correlates them, `docs/theory.md`, section 10, row 6).
+//! Every sub-path draws from its own stream, a function of (seed, iteration, kind of path, index): results
+//! then depend neither on the number of threads nor on who renders which iteration, and the walks of both
+//! sides are independent (a shared stream correlates them, `docs/theory.md`, section 10, row 6).
 //!
-//! The first decisions of a sub-path are points of Owen-scrambled (0, 2)-sequences, padded: every decision has an order and a
-//! scramble of its own (`docs/theory.md`, section 6.7). The light sub-paths of an iteration are stratified among
-//! each other, the camera sub-paths of a pixel over iterations; each sub-path for itself is uniform and independent of all others,
-//! so nothing is biased. Later decisions, whose strata no longer mean anything, come from xoshiro256++.
+//! The first decisions of a sub-path are points of Owen-scrambled (0, 2)-sequences, padded: every decision
+//! has an order and a scramble of its own (`docs/theory.md`, section 6.7). The light sub-paths of an
+//! iteration are stratified among each other, the camera sub-paths of a pixel over iterations; each sub-path
+//! for itself is uniform and independent of all others, so nothing is biased. Later decisions, whose strata
+//! no longer mean anything, come from xoshiro256++.
 //!
-//! Source: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020. Oracle: `tests::strata_hold_one_point_each`.
+//! Source: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020. Oracle:
+//! `tests::strata_hold_one_point_each`.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// Draws that are stratified: about four vertices of a path.
 const STRATIFIED_DRAWS: u32 = 24;
-/// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the lens, the first
-/// distance in a medium, and the next event there, an emitter and a point on it. Without a medium, what is drawn next.
+/// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the
+/// lens, the first distance in a medium, and the next event there, an emitter and a point on it. Without a
+/// medium, what is drawn next.
 const COMMON_DRAWS: u32 = 5;
 
-/// What a stream is for.
+/// The purpose of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum StreamKind {
     /// Light sub-paths.
     Light,
-    /// Camera sub-paths. Those of even and of odd iterations are stratified apart, so that the two halves of a render are
-    /// independent of each other and their difference tells the error.
+    /// Camera sub-paths. Those of even and of odd iterations are stratified apart, so that the two halves of
+    /// a render are independent of each other and their difference tells the error.
     Camera,
     /// Light sub-paths of the pilot, which sets radii and counts before the first iteration.
     PilotLight,
-    /// Camera sub-paths of the pilot. Those with the same index, of different iterations, begin alike and are independent after a few
-    /// draws: what they differ in is what stratification leaves of the variance of a pixel, since it takes away what their common
-    /// decisions make.
+    /// Camera sub-paths of the pilot. Those with the same index, of different iterations, begin alike and are
+    /// independent after a few draws: what they differ in is what stratification leaves of the variance of a
+    /// pixel, since it takes away what their common decisions make.
     PilotCamera,
-    /// Which iterations look photons up.
+    /// The choice of iterations that make photon queries.
     LookUps,
 }
 
@@ -43,7 +46,7 @@ pub enum StreamKind {
 pub struct Stream {
     /// Number of the point in the sequences that this stream shares with others.
     point: u32,
-    /// What is common to the streams that are stratified among each other.
+    /// Key of all streams that are stratified among each other.
     family: u64,
     draws: u32,
     /// Draws from the sequences.
@@ -59,8 +62,8 @@ impl Stream {
             mix(mix(seed ^ 0x9e37_79b9_7f4a_7c15) ^ (kind as u64 + 1).wrapping_mul(0x8cb9_2ba7_2f3d_8dd7));
         let of_iteration = iteration.wrapping_mul(0xd1b5_4a32_d192_ed03);
         let of_index = index.wrapping_mul(0xaef1_7502_108e_f2d9);
-        // Light sub-paths share an iteration, camera sub-paths a pixel. Beyond 2³² the sequences repeat their points, which
-        // costs stratification only.
+        // Light sub-paths share an iteration, camera sub-paths a pixel. Beyond 2³² the sequences repeat their
+        // points, which costs stratification only.
         let (point, family, from_sequences) = match kind {
             StreamKind::Light | StreamKind::PilotLight => {
                 (index as u32, mix(common ^ of_iteration), STRATIFIED_DRAWS)
@@ -73,7 +76,8 @@ impl Stream {
             StreamKind::PilotCamera => (0, mix(common ^ of_index), COMMON_DRAWS),
             StreamKind::LookUps => (0, 0, 0),
         };
-        // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in common.
+        // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in
+        // common.
         let rest = Xoshiro256PlusPlus::seed_from_u64(mix(mix(common ^ of_iteration) ^ of_index));
         Self { point, family, draws: 0, from_sequences, rest }
     }
@@ -87,7 +91,7 @@ impl Stream {
         }
     }
 
-    /// Two of them, stratified together.
+    /// Two uniform numbers in `[0, 1)`, stratified together.
     pub fn pair(&mut self) -> [f32; 2] {
         if let Some(key) = self.next_decision() {
             let point = order(self.point, key);
@@ -126,7 +130,8 @@ impl Stream {
     }
 }
 
-/// The half of a render that an iteration belongs to, 0 or 1, and its number there. Halves have no random decision in common.
+/// The half of a render that an iteration belongs to, 0 or 1, and its number there. Halves have no random
+/// decision in common.
 #[must_use]
 pub const fn half(iteration: u64) -> (usize, u64) {
     ((iteration % 2) as usize, iteration / 2)
@@ -136,14 +141,16 @@ fn to_unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// The number of the point that takes the place of `point`: a permutation that keeps aligned blocks of 2ᵏ together.
+/// The number of the point that takes the place of `point`: a permutation that keeps aligned blocks of 2ᵏ
+/// together.
 fn order(point: u32, key: u64) -> u32 {
     scramble(point, key as u32)
 }
 
 /// Owen scrambling: every bit is flipped or not by a hash of the bits above it.
 fn scramble(bits: u32, seed: u32) -> u32 {
-    // A hash in which each bit depends on lower ones only (Laine and Karras, constants after Vegdahl), on reversed bits.
+    // A hash in which each bit depends on lower ones only (Laine and Karras, constants after Vegdahl), on
+    // reversed bits.
     let mut x = bits.reverse_bits();
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(seed);
@@ -153,8 +160,8 @@ fn scramble(bits: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// The second dimension of the Sobol sequence; the first is the reversal of the bits. Its matrix is Pascal's triangle modulo
-/// two, a Kronecker power of 2 × 2 matrices: one butterfly per bit of the bit number.
+/// The second dimension of the Sobol sequence; the first is the reversal of the bits. Its matrix is Pascal's
+/// triangle modulo two, a Kronecker power of 2 × 2 matrices: one butterfly per bit of the bit number.
 fn sobol(point: u32) -> u32 {
     let mut x = point.reverse_bits();
     x ^= (x & 0x0000_ffff) << 16;
@@ -294,7 +301,8 @@ mod tests {
 
     #[test]
     fn every_draw_is_uniform_over_seeds() {
-        // One point of one family, over seeds: χ² with 15 degrees of freedom is below 45 with probability 0.9999.
+        // One point of one family, over seeds: χ² with 15 degrees of freedom is below 45 with probability
+        // 0.9999.
         for draw in [0, 1, 5, STRATIFIED_DRAWS + 1] {
             let mut counts = [0_u32; 16];
             for seed in 0..20_000 {

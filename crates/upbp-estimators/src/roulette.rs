@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// When sub-paths end (`docs/theory.md`, section 6.8).
+/// Rule by which sub-paths end early (`docs/theory.md`, section 6.8).
 ///
-/// Every vertex tells a probability to [continue](crate::scene::Bsdf::continuation), its albedo. Light sub-paths go on with just that
-/// probability, so that all photons carry the same power. What a camera vertex finds differs by more than its albedo anyway, and first
-/// vertices matter most; so camera sub-paths go on with certainty until the product of their albedos falls below a threshold,
-/// and hold it from then on.
+/// Every vertex tells a probability to [continue](crate::scene::Bsdf::continuation), its albedo. Light
+/// sub-paths go on with just that probability, so that all photons carry the same power. What a camera vertex
+/// finds differs by more than its albedo anyway, and first vertices matter most; so camera sub-paths go on
+/// with certainty until the product of their albedos falls below a threshold, and hold it from then on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Roulette {
     /// Walks end where they leave the scene, or at the greatest length.
@@ -17,8 +17,8 @@ pub enum Roulette {
 }
 
 impl Roulette {
-    /// Whether walks end at all. If so, their densities in weights contain the albedo of every vertex: the threshold depends on
-    /// what a walk went through, which the walk of the other side cannot know.
+    /// Whether walks end at all. If so, their densities in weights contain the albedo of every vertex: the
+    /// threshold depends on what a walk went through, which the walk of the other side cannot know.
     #[inline]
     #[must_use]
     pub const fn is_on(self) -> bool {
@@ -39,7 +39,7 @@ impl Roulette {
 #[derive(Clone, Copy, Debug)]
 pub struct Survival {
     roulette: Roulette,
-    /// What albedos left of the throughput.
+    /// Part of the throughput that albedos left.
     left: f32,
 }
 
@@ -80,7 +80,8 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// The probability to get past some vertices depends on the product of their albedos alone, in whatever order.
+        /// The probability to get past some vertices depends on the product of their albedos alone, in
+        /// whatever order.
         #[test]
         fn what_is_reached_does_not_depend_on_the_order(
             albedos in prop::collection::vec(0.05_f32..1.0, 1..12), least in 0.01_f32..1.0,

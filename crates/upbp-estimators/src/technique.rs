@@ -1,4 +1,4 @@
-//! The techniques and sets of them, with one spelling everywhere.
+//! Techniques and their sets, with one spelling everywhere.
 
 use std::fmt;
 use std::str::FromStr;
@@ -30,7 +30,7 @@ pub enum Technique {
 }
 
 impl Technique {
-    /// All of them, in the order of their bits and layers.
+    /// All techniques, in the order of their bits and layers.
     pub const ALL: [Self; 9] = [
         Self::Hit,
         Self::Nee,
@@ -50,6 +50,12 @@ impl Technique {
             Self::Hit | Self::Nee | Self::Connect | Self::LightTracing => false,
             Self::Surf | Self::Pp3d | Self::Pb2d | Self::Bp2d | Self::Bb1d => true,
         }
+    }
+
+    /// Whether it merges photon beams.
+    #[must_use]
+    pub const fn uses_beams(self) -> bool {
+        matches!(self, Self::Bp2d | Self::Bb1d)
     }
 
     /// The name in settings and reports.
@@ -145,10 +151,10 @@ pub enum Layer {
 }
 
 impl Layer {
-    /// How many layers there are.
+    /// Number of layers.
     pub const COUNT: usize = 6;
 
-    /// All of them, in order.
+    /// All layers, in order.
     pub const ALL: [Self; Self::COUNT] =
         [Self::Bpt, Self::Surf, Self::Pp3d, Self::Pb2d, Self::Bp2d, Self::Bb1d];
 

@@ -11,8 +11,8 @@ const SEGMENTS: usize = 16;
 /// Cells of the histogram of distances.
 const CELLS: usize = 8;
 
-/// Checks the contract of [`Medium`] on random segments inside `bounds`: ranges of all values, that walks pass and
-/// stop as often as `segment` says, and that transmittance is a product over pieces.
+/// Checks the contract of [`Medium`] on random segments inside `bounds`: ranges of all values, that walks
+/// pass and stop as often as `segment` says, and that transmittance is a product over pieces.
 pub fn check_medium(medium: &impl Medium, bounds: &BoundingSphere) -> Check {
     let mut random = Random(13);
     let path = medium.mean_free_path();
@@ -109,7 +109,7 @@ fn check_distances(medium: &impl Medium, segment: &RaySegment, random: &mut Rand
     )
 }
 
-/// Whether so many of the draws fit a probability: within five standard errors and one per cent of quadrature.
+/// Whether a number of draws fits a probability: within five standard errors and one per cent of quadrature.
 fn agree(count: u32, probability: f64) -> bool {
     let mean = DRAWS as f64 * probability;
     (f64::from(count) - mean).abs() <= 5.0 * mean.sqrt() + 0.01 * mean + 3.0

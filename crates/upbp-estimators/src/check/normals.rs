@@ -1,4 +1,4 @@
-//! What a hit tells of its surface: normals, and what is inside.
+//! Check of surfaces from both sides: normals, and the body inside.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use super::{Check, fail, require};
 use crate::Ray;
 use crate::scene::{Bsdf, EmitterId, Hit, Interface, MAX_CROSSINGS, Scene, Walk};
 
-/// A normal that is seen from so many sides, at least, tells about its surface.
+/// Fewest sightings of a normal that tell about its surface.
 const TELLING: u32 = 8;
 
 /// Surfaces that are looked at: those that are met first.
@@ -18,10 +18,11 @@ const SURFACES: usize = 1024;
 /// Surfaces that are told apart: those of a body, those that carry a light, all others.
 type Surface = (Option<BodyId>, Option<EmitterId>);
 
-/// What rays saw of the normals of each surface.
+/// Normals of each surface, as rays have seen them.
 ///
-/// Where boundaries coincide, `intersect` tells of one of them, so that a body may be met first where a ray leaves it; but as many rays then
-/// come the other way, and enter there. Surfaces that coincide may have opposite normals.
+/// Where boundaries coincide, `intersect` tells of one of them, so that a body may be met first where a ray
+/// leaves it; but as many rays then come the other way, and enter there. Surfaces that coincide may have
+/// opposite normals.
 #[derive(Default)]
 pub(super) struct Normals(BTreeMap<Surface, Seen>);
 
@@ -38,8 +39,8 @@ struct Seen {
 }
 
 impl Normals {
-    /// Follows a ray that starts outside of everything through all that it meets, and looks at each surface from the other side, too. What has an
-    /// inside that matters must tell of it.
+    /// Follows a ray that starts outside of everything through all that it meets, and looks at each surface
+    /// from the other side, too. What has an inside that matters must tell of it.
     pub(super) fn look<S: Scene>(&mut self, scene: &S, ray: &Ray) -> Check {
         // Far enough to be beyond rounding, and nearer than anything else.
         let beyond = 1e-4 * scene.bounds().radius;

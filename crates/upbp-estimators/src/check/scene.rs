@@ -7,11 +7,12 @@ use super::{Check, ContractViolation, Random, is_unit, require};
 use crate::scene::{BoundingSphere, Crossing, Emitter, Scene};
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
-/// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside, `trace` and
-/// `is_clear` find what `intersect` does, and the bodies around a point follow from the boundaries on the way to it.
+/// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside,
+/// `trace` and `is_clear` find what `intersect` does, and the bodies around a point follow from the
+/// boundaries on the way to it.
 ///
-/// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the normals of a body one
-/// in ten.
+/// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the
+/// normals of a body one in ten.
 pub fn check_scene(scene: &impl Scene) -> Check {
     let bounds = scene.bounds();
     require(bounds.radius.is_finite() && bounds.radius > 0.0, "bounds have a radius", bounds)?;

@@ -10,7 +10,7 @@ use crate::technique::Technique;
 /// Below this `sin²θ` two beams count as parallel: BB1D neither contributes nor counts in weights.
 pub const PARALLEL_SIN2: f64 = upbp_accel::PARALLEL_SIN2 as f64;
 
-/// How the densities of techniques are turned into weights.
+/// Heuristic that turns the densities of techniques into weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Heuristic {
     /// In proportion to the densities.
@@ -20,7 +20,7 @@ pub enum Heuristic {
     Power,
 }
 
-/// How far beams reach (`docs/theory.md`, section 2.6).
+/// Length of beams (`docs/theory.md`, section 2.6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum BeamExtent {
     /// To the distance that the walk sampled.
@@ -42,7 +42,7 @@ pub struct VolumeMerges {
     pub bb1d: f64,
 }
 
-/// Which merges are possible at a vertex.
+/// The kind of merges that are possible at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MergeSite {
     /// None: an end of the path, or a Dirac lobe.

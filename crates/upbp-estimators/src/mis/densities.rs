@@ -7,8 +7,8 @@ use crate::technique::Technique;
 
 /// A sum of densities of techniques, with their counts, as the heuristic takes them.
 ///
-/// The recursion is linear in the counts, so it can carry the sum of all techniques (`f64`, what a render needs) or every
-/// technique for itself ([`ByTechnique`], from which the weights of any other counts follow).
+/// The recursion is linear in the counts, so it can carry the sum of all techniques (`f64`, what a render
+/// needs) or every technique for itself ([`ByTechnique`], from which the weights of any other counts follow).
 pub trait Densities: Copy + fmt::Debug + Send + Sync + Add<Output = Self> + Mul<f64, Output = Self> {
     /// Of no technique.
     const ZERO: Self;
@@ -34,7 +34,7 @@ impl Densities for f64 {
     }
 }
 
-/// What does not run or does not count does not, whatever the other factor: zero times infinity is zero.
+/// A product in which zero times infinity is zero: a technique that does not run does not count.
 #[inline]
 fn times(density: f64, factor: f64) -> f64 {
     if density == 0.0 || factor == 0.0 { 0.0 } else { density * factor }

@@ -1,14 +1,15 @@
-//! The weights by enumeration: slow, obvious, the oracle of the recursion (`docs/theory.md`, sections 1.2, 2.1 and 3.3).
+//! The weights by enumeration: slow, obvious, the oracle of the recursion (`docs/theory.md`, sections 1.2,
+//! 2.1 and 3.3).
 //!
-//! A path is described whole, every density of both walks at every vertex and edge; the effective density of each
-//! technique is a product over the path, taken in logarithms. Nothing is shared with the recursion but the
-//! constants of the [`MisPlan`].
+//! A path is described whole, every density of both walks at every vertex and edge; the effective density of
+//! each technique is a product over the path, taken in logarithms. Nothing is shared with the recursion but
+//! the constants of the [`MisPlan`].
 
 use upbp_media::MediumId;
 
 use super::counts::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2};
 
-/// What a vertex is.
+/// The kind of a vertex of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum VertexKind {
     /// The light end or the camera end.
@@ -24,9 +25,10 @@ pub enum VertexKind {
 /// A vertex of a path; index 0 is on the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathVertex {
-    /// What it is.
+    /// Its kind.
     pub kind: VertexKind,
-    /// `ρL_i`: solid-angle density (Dirac: probability) of the light walk towards the camera's side, roulette included.
+    /// `ρL_i`: solid-angle density (Dirac: probability) of the light walk towards the camera's side, roulette
+    /// included.
     pub rho_light: f64,
     /// `ρC_i`: the same of the camera walk towards the light's side.
     pub rho_camera: f64,

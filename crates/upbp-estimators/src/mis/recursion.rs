@@ -1,9 +1,9 @@
 //! Two numbers per vertex instead of a walk over the path (`docs/theory.md`, sections 4.1 to 4.6).
 //!
-//! For a sub-path that ends at `u_i`, let `B_i` be the sum of the densities of all techniques that split the path
-//! before `u_i`, relative to the density of "the sub-path ends at `u_i`". It is linear in the one unknown, the density
-//! ρ′ with which the other side's walk would scatter at `u_i`: `B_i = D_i + ρ′ E_i`. A vertex carries `D` and `E`.
-//! The same recursion serves both walks. Oracle: [`super::oracle`].
+//! For a sub-path that ends at `u_i`, let `B_i` be the sum of the densities of all techniques that split the
+//! path before `u_i`, relative to the density of "the sub-path ends at `u_i`". It is linear in the one
+//! unknown, the density ρ′ with which the other side's walk would scatter at `u_i`: `B_i = D_i + ρ′ E_i`. A
+//! vertex carries `D` and `E`. The same recursion serves both walks. Oracle: [`super::oracle`].
 
 use upbp_media::EdgeDensity;
 
@@ -12,7 +12,7 @@ use super::densities::Densities;
 use crate::scene::Walk;
 use crate::technique::Technique;
 
-/// What a sub-path knows of all its techniques on arrival at a vertex.
+/// Densities of all techniques that split a sub-path before a vertex, on arrival there (section 4.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tip<D = f64> {
     /// `D_i`: connecting to this vertex from the one before.
@@ -32,8 +32,9 @@ impl<D: Densities> Tip<D> {
         if rho_opposite > 0.0 { self.connect + self.below * plan.pow(rho_opposite) } else { self.connect }
     }
 
-    /// What a connection to the vertex knows of the sub-path: `site` is the vertex with the direction of the connection, `opposite` the
-    /// distance factor of the other walk that would arrive there, `rho_opposite` the density with which it would then scatter along this sub-path.
+    /// The end of the sub-path for a connection to its vertex: `site` is the vertex with the direction of the
+    /// connection, `opposite` the distance factor of the other walk that would arrive there, `rho_opposite`
+    /// the density with which it would then scatter along this sub-path.
     #[inline]
     #[must_use]
     pub fn end(
@@ -83,11 +84,12 @@ fn merges<D: Densities>(plan: &MisPlan, walk: Walk, site: MergeSite, own: f64, o
 pub struct Pending<D = f64> {
     /// `B_i`, as the heuristic takes it.
     pub before: D,
-    /// Own scattering density towards the next vertex: sr⁻¹, a probability for a Dirac lobe, per area for infinite lights.
+    /// Own scattering density towards the next vertex: sr⁻¹, a probability for a Dirac lobe, per area for
+    /// infinite lights.
     pub rho: f64,
     /// The cosine factor of the outgoing direction; 1 in media and at points.
     pub cos_out: f64,
-    /// Which merges the vertex takes part in.
+    /// The merges that the vertex takes part in.
     pub site: MergeSite,
     /// The distance factor of the edge that arrived at it.
     pub distance_factor: f64,
@@ -134,10 +136,10 @@ impl<D: Densities> Pending<D> {
         }
     }
 
-    /// One step (section 4.3): the tip of the next vertex. `connections` is the number of samples that connect the
-    /// two vertices, as the heuristic takes it: of connections in general, of next events (times `p_nee/L_0`) on a light sub-path's first edge or
-    /// at a camera sub-path's vertex on a light, of light tracing on a camera sub-path's first edge; 0 if the new
-    /// vertex cannot be connected.
+    /// One step (section 4.3): the tip of the next vertex. `connections` is the number of samples that
+    /// connect the two vertices, as the heuristic takes it: of connections in general, of next events (times
+    /// `p_nee/L_0`) on a light sub-path's first edge or at a camera sub-path's vertex on a light, of light
+    /// tracing on a camera sub-path's first edge; 0 if the new vertex cannot be connected.
     #[inline]
     #[must_use]
     pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: D) -> Tip<D> {
@@ -164,7 +166,8 @@ impl<D: Densities> Pending<D> {
 /// An edge between two vertices, walked from the first to the second (section 1.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// Squared distance in scene units; 1 from or to an infinite emitter, whose densities are per solid angle.
+    /// Squared distance in scene units; 1 from or to an infinite emitter, whose densities are per solid
+    /// angle.
     pub distance_squared: f64,
     /// The cosine factor at the second vertex; 1 in media and towards infinity.
     pub cos_in: f64,

@@ -6,7 +6,8 @@ use super::recursion::{End, Tip};
 use crate::technique::Technique;
 
 impl<D: Densities> Weight<D> {
-    /// A merge with factor `factor` (of the sum `merges`) between two sub-paths that end at the same vertex. (4.4)
+    /// A merge with factor `factor` (of the sum `merges`) between two sub-paths that end at the same vertex.
+    /// (4.4)
     #[inline]
     #[must_use]
     pub fn of_merge(factor: f64, merges: D, before_light: D, before_camera: D) -> Self {
@@ -15,8 +16,8 @@ impl<D: Densities> Weight<D> {
 }
 
 impl MisPlan {
-    /// A connection; `light_density` is the density `C` of the light vertex as the camera sub-path would sample it,
-    /// `camera_density` that of the camera vertex, `L`. (4.5)
+    /// A connection; `light_density` is the density `C` of the light vertex as the camera sub-path would
+    /// sample it, `camera_density` that of the camera vertex, `L`. (4.5)
     #[inline]
     #[must_use]
     pub fn connect_weight<D: Densities>(
@@ -40,8 +41,8 @@ impl MisPlan {
         Weight { own, all: D::of(Technique::LightTracing, own) + light.sum(self, light_density) }
     }
 
-    /// Next event estimation. `pdf` is `p_nee`; `pdf_position` is `L_0`; `hit_density` is `C_0`, 0 for a light that cannot
-    /// be hit; `camera_density` is `L_1`.
+    /// Next event estimation. `pdf` is `p_nee`; `pdf_position` is `L_0`; `hit_density` is `C_0`, 0 for a
+    /// light that cannot be hit; `camera_density` is `L_1`.
     #[inline]
     #[must_use]
     pub fn nee_weight<D: Densities>(
@@ -58,8 +59,8 @@ impl MisPlan {
         Weight { own, all: here + camera.sum(self, pdf_position / pdf * camera_density) }
     }
 
-    /// A camera sub-path hit an emitter: `connect` and `below` are the tip on arrival at the light, with next events as
-    /// connections; `pdf_incident` is `p_nee`, the others `L_0` and `ρL_0`.
+    /// A camera sub-path hit an emitter: `connect` and `below` are the tip on arrival at the light, with next
+    /// events as connections; `pdf_incident` is `p_nee`, the others `L_0` and `ρL_0`.
     #[inline]
     #[must_use]
     pub fn hit_weight<D: Densities>(

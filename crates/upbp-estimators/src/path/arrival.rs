@@ -30,7 +30,8 @@ pub(crate) enum Arrival<B> {
     Escaped,
     /// Grazing a surface.
     Absorbed,
-    /// To infinity, but still inside a body: the geometry is not closed. Or to where nothing can be: the scene breaks its contract.
+    /// To infinity, but still inside a body: the geometry is not closed. Or to where nothing can be: the
+    /// scene breaks its contract.
     Lost,
 }
 
@@ -70,7 +71,7 @@ pub(crate) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival
     }
 }
 
-/// What the weights of the next vertex need of one that has scattered.
+/// Densities for the weights of the next vertex, of a vertex that has scattered.
 pub(crate) fn pend<S: Scene, D: Densities>(
     context: &Context<'_, S>,
     tip: &Tip<D>,

@@ -1,4 +1,4 @@
-//! What every walk needs.
+//! Context and buffers of a walk.
 
 use super::edge::Passage;
 use crate::iteration::Plan;
@@ -9,7 +9,7 @@ use crate::scene::{Crossing, Scene};
 pub struct Context<'a, S: Scene> {
     /// The scene, made ready.
     pub world: &'a World<'a, S>,
-    /// What the iteration does.
+    /// The plan of the iteration.
     pub plan: &'a Plan,
 }
 

@@ -1,9 +1,9 @@
-//! The way of a ray from a vertex to the next surface, as a list of stretches inside one medium each, and where on it a walk
-//! stops.
+//! Edges: the way of a ray from a vertex to the next surface, as a list of stretches inside one medium each,
+//! and the distance at which a walk stops.
 //!
-//! Index-matched boundaries are not vertices: they cut an edge into segments (`docs/theory.md`, section 1.7). In a dense
-//! medium a walk stops long before the next surface, so the distance is drawn first and the ray is followed no farther,
-//! unless somebody needs all of it.
+//! Index-matched boundaries are not vertices: they cut an edge into segments (`docs/theory.md`, section 1.7).
+//! In a dense medium a walk stops long before the next surface, so the distance is drawn first and the ray is
+//! followed no farther, unless somebody needs all of it.
 
 use glam::Vec3;
 use upbp_accel::Ray;
@@ -15,10 +15,10 @@ use crate::random::Stream;
 use crate::scene::{Crossing, Hit, MAX_CROSSINGS, Scene};
 use crate::technique::Technique;
 
-/// How much of a ray's way is needed.
+/// Distance along a ray that must be known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// All of it, to the next surface: long beams, emission along the ray, media in which rounding matters.
+    /// To the next surface: long beams, emission along the ray, media in which rounding matters.
     ToSurface,
     /// Until the walk stops: what lies behind is unknown.
     ToStop,
@@ -27,28 +27,29 @@ pub enum Extent {
 /// A stretch of an edge inside one medium.
 #[derive(Clone, Copy, Debug)]
 pub struct Span {
-    /// Where it begins, distance along the ray in scene units.
+    /// Distance along the ray where it begins, scene units.
     pub start: f32,
-    /// Where it ends; may be infinite.
+    /// Distance along the ray where it ends; may be infinite.
     pub end: f32,
     /// The medium, `None` for vacuum.
     pub medium: Option<MediumId>,
-    /// What the edge has accumulated up to `start`.
+    /// Densities of the edge up to `start`.
     pub before: EdgeDensity,
-    /// How many of the passage's crossings lie before it.
+    /// Number of the ray's crossings before it.
     crossings: usize,
 }
 
-/// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a medium.
+/// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a
+/// medium.
 pub struct Passage<B> {
-    /// Where the ray starts.
+    /// Start of the ray.
     pub origin: Vec3,
     /// Its direction.
     pub direction: Vec3,
-    /// Stretches in order, adjoining, from 0 to the surface. With [`Extent::ToStop`] the one in which the walk stops is the
-    /// last, and its end means nothing.
+    /// Stretches in order, adjoining, from 0 to the surface. With [`Extent::ToStop`] the one in which the
+    /// walk stops is the last, and its end means nothing.
     pub spans: Vec<Span>,
-    /// Where the walk stops in a medium: index of the stretch and distance along the ray.
+    /// Stop of the walk in a medium: index of the stretch and distance along the ray.
     pub stop: Option<(usize, f32)>,
     /// The surface; with [`Extent::ToStop`] only if the walk gets there.
     pub hit: Option<Hit<B>>,
@@ -64,16 +65,18 @@ pub struct Passage<B> {
     lost: bool,
 }
 
-/// The medium inside of the bodies of `stack`. One that the scene does not have is vacuum: a broken contract, which
-/// [`check_scene`](crate::check::check_scene) finds.
+/// The medium inside of the bodies of `stack`. One that the scene does not have is vacuum: a broken contract,
+/// which [`check_scene`](crate::check::check_scene) finds.
 pub(crate) fn medium_of<S: Scene>(scene: &S, stack: &MediumStack) -> Option<MediumId> {
     stack.medium().filter(|medium| (medium.0 as usize) < scene.media().len())
 }
 
-/// What must have happened where a ray starts, if `crossing` is the first of its body and contradicts the bodies that the ray
-/// is thought to be in: an index-matched body that is left was entered before, and one that is entered was not.
+/// A crossing that must have happened where a ray starts, if `crossing` is the first of its body and
+/// contradicts the bodies that the ray is thought to be in: an index-matched body that is left was entered
+/// before, and one that is entered was not.
 ///
-/// Vertices within rounding of a boundary come out on the wrong side of it, and cameras and lights may stand on one.
+/// Vertices within rounding of a boundary come out on the wrong side of it, and cameras and lights may stand
+/// on one.
 pub(crate) fn correction(stack: &MediumStack, crossing: &Crossing, earlier: &[Crossing]) -> Option<Crossing> {
     let body = crossing.interior.body;
     let contradicts = !crossing.scatters && stack.contains(body) == crossing.entering;
@@ -94,7 +97,8 @@ pub(crate) fn correction_of_escape(stack: &MediumStack, earlier: &[Crossing]) ->
 /// Bodies at the start of a ray that may turn out to be others than was thought.
 const MAX_CORRECTIONS: usize = 64;
 
-/// Whether a ray is followed again with one more correction, or is lost: a scene that tells of other bodies each time would never end.
+/// Whether a ray is followed again with one more correction, or is lost: a scene that tells of other bodies
+/// each time would never end.
 pub(crate) const fn may_correct(corrections: usize) -> bool {
     corrections < MAX_CORRECTIONS
 }
@@ -107,16 +111,17 @@ struct Flight {
     extent: Extent,
     /// The random numbers that decide in the current stretch.
     decision: Option<[f32; 2]>,
-    /// How far the ray has to be followed if the current medium goes on.
+    /// Distance to which the ray has to be followed if the current medium goes on.
     reach: f32,
-    /// Where the walk stops if the current medium goes on for so long; known only with a finite reach.
+    /// Distance where the walk stops if the current medium goes on; known only if the ray is followed to a
+    /// finite distance.
     stop: f32,
 }
 
-/// What happens at the boundary of a body, given the bodies that a ray is in.
+/// Whether a boundary is hidden by the bodies that a ray is in.
 ///
-/// A boundary inside a stronger body, or of a body that is hidden by one, is no surface: the body is entered or left, and
-/// the ray goes on (`docs/theory.md`, section 1.7).
+/// A boundary inside a stronger body, or of a body that is hidden by one, is no surface: the body is entered
+/// or left, and the ray goes on (`docs/theory.md`, section 1.7).
 pub(crate) fn is_hidden(stack: &MediumStack, interior: &Interior, entering: bool) -> bool {
     if entering {
         interior.priority < stack.priority()
@@ -144,11 +149,11 @@ impl<B: Copy> Passage<B> {
         }
     }
 
-    /// Follows a ray from `origin`, which lies in the bodies of `stack` but for rounding (a boundary that contradicts
-    /// them corrects them), and draws from `stream` where the walk stops.
+    /// Follows a ray from `origin`, which lies in the bodies of `stack` but for rounding (a boundary that
+    /// contradicts them corrects them), and draws from `stream` where the walk stops.
     ///
-    /// The way begins at distance `start`: 0, or −∞ for light that has come from infinity to `origin`, through the medium around everything
-    /// without a stop. It does not stop in its first stretch, then.
+    /// The way begins at distance `start`: 0, or −∞ for light that has come from infinity to `origin`,
+    /// through the medium around everything without a stop. It does not stop in its first stretch, then.
     #[expect(
         clippy::too_many_arguments,
         reason = "a ray, what is known where it starts, and how it is followed"
@@ -195,7 +200,8 @@ impl<B: Copy> Passage<B> {
         self.lost
     }
 
-    /// Follows the ray, after the first crossings, which are corrections. Ends with another one if there must be.
+    /// Follows the ray, after the first crossings, which are corrections. Ends with another one if there must
+    /// be.
     fn follow<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
@@ -212,9 +218,8 @@ impl<B: Copy> Passage<B> {
         let medium = medium_of(scene, &self.start);
         let mut span = Span { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
-        for i in 0..corrections {
-            let correction = self.crossings[i];
-            if self.cross(scene, &mut span, &mut flight, correction, i + 1, stream) {
+        for i in 1..=corrections {
+            if self.cross(scene, &mut span, &mut flight, i, stream) {
                 return None;
             }
         }
@@ -238,8 +243,7 @@ impl<B: Copy> Passage<B> {
                     return correction;
                 }
                 self.crossings.push(crossing);
-                let before = self.crossings.len();
-                if self.cross(scene, &mut span, &mut flight, crossing, before, stream) {
+                if self.cross(scene, &mut span, &mut flight, self.crossings.len(), stream) {
                     return None;
                 }
             }
@@ -251,10 +255,8 @@ impl<B: Copy> Passage<B> {
                     && let entering = self.direction.dot(hit.geometric_normal) < 0.0
                     && is_hidden(&self.end, &interior, entering)
                 {
-                    let crossing = Crossing { t: known, interior, entering, scatters: true };
-                    self.crossings.push(crossing);
-                    let before = self.crossings.len();
-                    if self.cross(scene, &mut span, &mut flight, crossing, before, stream) {
+                    self.crossings.push(Crossing { t: known, interior, entering, scatters: true });
+                    if self.cross(scene, &mut span, &mut flight, self.crossings.len(), stream) {
                         return None;
                     }
                     ray.t_min = known * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
@@ -274,7 +276,8 @@ impl<B: Copy> Passage<B> {
                 self.close(scene, &mut span, &flight, f32::INFINITY);
                 return None;
             } else {
-                // The walk goes on in a thinner medium. A boundary at the end of what is known is still to come.
+                // The walk goes on in a thinner medium. A boundary at the end of what is known is still to
+                // come.
                 ray.t_min = known.next_down();
             }
             ray.t_max = flight.reach;
@@ -302,8 +305,8 @@ impl<B: Copy> Passage<B> {
         }
     }
 
-    /// Ends `span` at `end`, a boundary, a surface or infinity, and decides whether the walk stops inside; whether that
-    /// is all.
+    /// Ends `span` at `end`, a boundary, a surface or infinity, and decides whether the walk stops inside;
+    /// whether that is all.
     fn close<S: Scene<Bsdf = B>>(&mut self, scene: &S, span: &mut Span, flight: &Flight, end: f32) -> bool {
         span.end = end;
         if !(end > span.start || self.spans.is_empty()) {
@@ -314,8 +317,8 @@ impl<B: Copy> Passage<B> {
             && let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize])
             && medium.scatters()
         {
-            // Decided for the segment as it is: the rounding of a distance far from the origin must not carry the stop over
-            // its end.
+            // Decided for the segment as it is: the rounding of a distance far from the origin must not carry
+            // the stop over its end.
             let t = if flight.reach < end {
                 Some(flight.stop)
             } else {
@@ -327,16 +330,16 @@ impl<B: Copy> Passage<B> {
         self.stop.is_some() && flight.extent == Extent::ToStop
     }
 
-    /// Goes on behind a crossing, whether the walk has stopped before; `crossings` lie before what follows.
+    /// Goes on behind the last of the first `crossings` crossings; whether the walk has stopped before.
     fn cross<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
         span: &mut Span,
         flight: &mut Flight,
-        crossing: Crossing,
         crossings: usize,
         stream: &mut Stream,
     ) -> bool {
+        let crossing = self.crossings[crossings - 1];
         if self.end.cross(crossing.interior, crossing.entering) != upbp_media::Crossing::Done {
             self.conflicts += 1;
         }
@@ -362,7 +365,7 @@ impl<B: Copy> Passage<B> {
         false
     }
 
-    /// What the edge accumulates from its start to `t` in `span`.
+    /// Densities of the edge from its start to `t` in `span`.
     #[inline]
     pub fn density_to<S: Scene>(&self, scene: &S, span: &Span, t: f32) -> EdgeDensity {
         let mut density = span.before;
@@ -373,12 +376,13 @@ impl<B: Copy> Passage<B> {
         density
     }
 
-    /// The number of boundaries so far that contradicted the bodies that the ray was in; the count starts anew.
+    /// The number of boundaries so far that contradicted the bodies that the ray was in; the count starts
+    /// anew.
     pub fn take_conflicts(&mut self) -> u64 {
         std::mem::take(&mut self.conflicts)
     }
 
-    /// What the edge accumulates to its end.
+    /// Densities of the whole edge.
     pub fn density<S: Scene>(&self, scene: &S) -> EdgeDensity {
         self.spans.last().map_or(EdgeDensity::EMPTY, |span| self.density_to(scene, span, span.end))
     }
@@ -396,8 +400,8 @@ impl<B: Copy> Passage<B> {
         })
     }
 
-    /// The query beams along a camera edge for merges by `technique`: each with its span and medium. None if no light
-    /// sub-path could complete a path, whose last edge is the `depth`-th from the camera.
+    /// The query beams along a camera edge for merges by `technique`: each with its span and medium. None if
+    /// no light sub-path could complete a path, whose last edge is the `depth`-th from the camera.
     pub(crate) fn query_beams(
         &self,
         plan: &Plan,

@@ -11,7 +11,7 @@ use crate::scene::{Bsdf, Hit, Interface, Scene, Walk};
 /// Directions closer to a tangent plane than this end a walk and forbid a connection, on both sides alike.
 pub(crate) const MIN_COSINE: f32 = 1e-6;
 
-/// Where a path scatters.
+/// A vertex of a path with its scattering: on a surface or in a medium.
 #[derive(Clone, Copy, Debug)]
 pub enum Site<B> {
     /// On a surface.
@@ -23,7 +23,7 @@ pub enum Site<B> {
 /// A point of a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceSite<B> {
-    /// How it scatters.
+    /// Scattering of the surface.
     pub bsdf: B,
     /// Geometric normal, out of a closed body.
     pub geometric_normal: Vec3,
@@ -36,20 +36,21 @@ pub struct SurfaceSite<B> {
 /// The bodies on the two sides of a vertex.
 #[derive(Clone, Debug)]
 pub struct Sides {
-    /// Those on the side that the walk comes from.
+    /// Bodies on the side that the walk comes from.
     near: MediumStack,
     /// The body whose surface the vertex is on, and whether the walk would enter it.
     boundary: Option<(Interior, bool)>,
 }
 
 impl Sides {
-    /// The same bodies all around: a vertex in a medium.
+    /// Bodies around a vertex in a medium, the same on all sides.
     #[must_use]
     pub const fn around(stack: MediumStack) -> Self {
         Self { near: stack, boundary: None }
     }
 
-    /// The bodies on the side that a path goes to, which `crosses` the surface or stays on the side it came from.
+    /// The bodies on the side that a path goes to, which `crosses` the surface or stays on the side it came
+    /// from.
     #[inline]
     #[must_use]
     pub fn towards(&self, crosses: bool) -> MediumStack {
@@ -81,7 +82,7 @@ pub struct Evaluation {
 /// A sampled direction at a vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Scattered {
-    /// Where the walk goes.
+    /// The new direction, a unit vector.
     pub direction: Vec3,
     /// Factor of the throughput, roulette included.
     pub weight: Spectrum,
@@ -107,8 +108,8 @@ fn sine(a: Vec3, b: Vec3) -> f64 {
 }
 
 impl<B: Bsdf> Site<B> {
-    /// The surface of a hit; `before` are the bodies on the side that the ray comes from. `None` if the surface is
-    /// grazed.
+    /// The surface of a hit; `before` are the bodies on the side that the ray comes from. `None` if the
+    /// surface is grazed.
     pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, before: &MediumStack) -> Option<(Self, Sides)> {
         let cos = direction.dot(hit.geometric_normal);
         if cos.abs() < MIN_COSINE {
@@ -173,8 +174,8 @@ impl<B: Bsdf> Site<B> {
         }
     }
 
-    /// Evaluates the smooth scattering of `walk`, which came from `from` and goes to `to`; both directions point
-    /// away from the vertex. `None` if nothing is scattered.
+    /// Evaluates the smooth scattering of `walk`, which came from `from` and goes to `to`; both directions
+    /// point away from the vertex. `None` if nothing is scattered.
     pub fn evaluate<S: Scene<Bsdf = B>>(
         &self,
         scene: &S,
@@ -276,7 +277,8 @@ impl<B: Bsdf> SurfaceSite<B> {
         let (value, correction) = match walk {
             Walk::Camera => (
                 self.bsdf.eval(local_to, local_from, self.interface),
-                // The geometry term has the geometric normal; the light's side is shaded with the other (section 1.6).
+                // The geometry term has the geometric normal; the light's side is shaded with the other
+                // (section 1.6).
                 local_to.z / cos_to,
             ),
             Walk::Light => (self.bsdf.eval(local_from, local_to, self.interface), local_from.z / cos_from),

@@ -1,4 +1,5 @@
-//! Vertices and edges of sub-paths: what light sub-paths leave, and what camera sub-paths meet it with.
+//! Vertices and edges of sub-paths: those that light sub-paths leave, and those where camera sub-paths meet
+//! them.
 
 use glam::Vec3;
 use upbp_accel::Segment;
@@ -6,32 +7,45 @@ use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
 use super::context::Context;
 use super::edge::{Passage, Span};
-use super::interaction::Site;
+use super::interaction::{Evaluation, Site};
 use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, Pending, Tip};
-use crate::scene::{Emitter, EmitterId, EmitterPoint, Scene, Walk};
+use crate::scene::{Bsdf, Emitter, EmitterId, EmitterPoint, Scene, Walk};
 use crate::technique::Technique;
 
 /// A vertex of a light sub-path where camera sub-paths can be connected or merged.
 #[derive(Clone, Copy, Debug)]
 pub struct LightVertex<B, D = f64> {
-    /// Where it is.
+    /// Position, scene units.
     pub position: Vec3,
     /// Direction to the vertex before, towards the light.
     pub towards_light: Vec3,
     /// Flux over density on arrival, before scattering (`docs/theory.md`, section 1.5).
     pub throughput: Spectrum,
-    /// What the weights need.
+    /// Densities for the weights.
     pub tip: Tip<D>,
     /// Edges from the light.
     pub depth: u32,
     /// Index of the sub-path.
     pub path: u32,
-    /// How it scatters.
+    /// Scattering at the vertex.
     pub site: Site<B>,
 }
 
-/// What connects the first vertex of an edge with a vertex somewhere on it, for the weights.
+impl<B: Bsdf, D> LightVertex<B, D> {
+    /// The scattering of the light sub-path towards `to`; `None` if nothing is scattered there.
+    #[inline]
+    pub(crate) fn evaluate<S: Scene<Bsdf = B>>(
+        &self,
+        context: &Context<'_, S>,
+        to: Vec3,
+    ) -> Option<Evaluation> {
+        let (scene, roulette) = (context.world.scene, context.plan.roulette);
+        self.site.evaluate(scene, roulette, Walk::Light, self.position, self.towards_light, to)
+    }
+}
+
+/// The start of an edge, as far as weights depend on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EdgeSource {
     /// The edge starts at an emitter: next event estimation makes the same edge.
@@ -48,7 +62,8 @@ pub enum EdgeSource {
 }
 
 impl EdgeSource {
-    /// The number of samples that connect the edge's start to `position`, as the heuristic takes it (section 4.2).
+    /// The number of samples that connect the edge's start to `position`, as the heuristic takes it (section
+    /// 4.2).
     pub(crate) fn connections<S: Scene, D: Densities>(
         &self,
         context: &Context<'_, S>,
@@ -79,15 +94,15 @@ impl EdgeSource {
 /// The light that a sub-path carries through one medium along one edge.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotonBeam<D = f64> {
-    /// Where it runs; distances from the edge's first vertex.
+    /// The segment in space; distances from the edge's first vertex.
     pub segment: Segment,
     /// The medium.
     pub medium: MediumId,
-    /// What the edge has accumulated up to the segment's start.
+    /// Densities of the edge up to the segment's start.
     pub before: EdgeDensity,
-    /// What the weights need of the edge's first vertex.
+    /// Densities for the weights, at the edge's first vertex.
     pub pending: Pending<D>,
-    /// Where the edge starts.
+    /// The start of the edge.
     pub source: EdgeSource,
     /// Flux over density at the edge's first vertex, after scattering.
     pub throughput: Spectrum,
@@ -147,11 +162,24 @@ pub(crate) struct CameraVertex<B, D> {
     pub(crate) site: Site<B>,
 }
 
+impl<B: Bsdf, D> CameraVertex<B, D> {
+    /// The scattering of the camera sub-path towards `to`; `None` if nothing is scattered there.
+    #[inline]
+    pub(crate) fn evaluate<S: Scene<Bsdf = B>>(
+        &self,
+        context: &Context<'_, S>,
+        to: Vec3,
+    ) -> Option<Evaluation> {
+        let (scene, roulette) = (context.world.scene, context.plan.roulette);
+        self.site.evaluate(scene, roulette, Walk::Camera, self.position, self.towards_camera, to)
+    }
+}
+
 /// An edge of a camera sub-path: a query beam through all its media.
 pub(crate) struct CameraEdge<D> {
     /// Importance over density at the edge's first vertex, after scattering.
     pub(crate) throughput: Spectrum,
-    /// What the weights need of the first vertex.
+    /// Densities for the weights, at the first vertex.
     pub(crate) pending: Pending<D>,
     /// Samples that connect the first vertex to one on this edge, as the heuristic takes them.
     pub(crate) connections: D,
@@ -191,7 +219,7 @@ pub struct Splat {
     pub value: Spectrum,
 }
 
-/// What a number of light sub-paths leave.
+/// Vertices, beams and splats of a number of light sub-paths.
 #[derive(Clone, Debug)]
 pub struct LightChunk<B, D = f64> {
     /// Vertices, in the order of the paths.
@@ -200,7 +228,7 @@ pub struct LightChunk<B, D = f64> {
     pub beams: Vec<PhotonBeam<D>>,
     /// Splats, in the order of the paths.
     pub splats: Vec<Splat>,
-    /// What was done.
+    /// Counters of the walks.
     pub counters: Counters,
 }
 

@@ -1,4 +1,4 @@
-//! What lies between two vertices that are to be connected.
+//! Visibility: the edge between two vertices that are to be connected.
 
 use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
@@ -19,7 +19,7 @@ pub struct Target {
     pub surface: Option<(Vec3, Vec3)>,
 }
 
-/// Where a ray from a vertex starts: off the surface, by no more than rounding requires.
+/// The start of a ray from a vertex: off the surface, by no more than rounding requires.
 pub(crate) fn ray_origin<B>(site: &Site<B>, position: Vec3, direction: Vec3) -> Vec3 {
     match site {
         Site::Surface(surface) => offset_origin(position, surface.geometric_normal, direction),
@@ -27,7 +27,8 @@ pub(crate) fn ray_origin<B>(site: &Site<B>, position: Vec3, direction: Vec3) -> 
     }
 }
 
-/// The densities of the edge from `origin` (off its surface) to `target`, or `None` if a surface is in between.
+/// The densities of the edge from `origin` (off its surface) to `target`, or `None` if a surface is in
+/// between.
 ///
 /// `stack` holds the bodies at the near end, on the side of `target`; the far end has none of its own.
 pub fn clear_edge<S: Scene>(
@@ -40,8 +41,8 @@ pub fn clear_edge<S: Scene>(
     crossings.clear();
     let ray = match target.surface {
         Some((position, normal)) => {
-            // Both ends stand off their surfaces, so that neither blocks the view; the ray ends before it could, by
-            // rounding, meet a surface that it grazes.
+            // Both ends stand off their surfaces, so that neither blocks the view; the ray ends before it
+            // could, by rounding, meet a surface that it grazes.
             let between = offset_origin(position, normal, -target.direction) - origin;
             let length = between.length();
             Ray { origin, direction: between / length, t_min: 0.0, t_max: length * (1.0 - 1e-5) }
@@ -68,7 +69,7 @@ pub fn clear_edge<S: Scene>(
     None
 }
 
-/// What an edge turns out to be.
+/// The result of following an edge.
 enum Edge {
     Clear(EdgeDensity),
     Blocked,

@@ -1,9 +1,9 @@
-//! How a surface scatters light.
+//! Scattering of light by surfaces.
 
 use glam::Vec3;
 use upbp_media::Spectrum;
 
-/// Which way a path is walked: this decides on which side of a surface the light is.
+/// Direction in which a path is walked: this decides on which side of a surface the light is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Walk {
     /// From an emitter: the walk carries flux, and arrives at a vertex from the light's side.
@@ -40,7 +40,7 @@ impl Interface {
     pub const MATCHED: Self = Self { above: 1.0, below: 1.0 };
 }
 
-/// What [`Bsdf::sample`] draws.
+/// A direction drawn by [`Bsdf::sample`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample {
     /// The new direction, local, pointing away from the surface, a unit vector.
@@ -51,7 +51,7 @@ pub struct BsdfSample {
     pub weight: Spectrum,
     /// Smooth lobe: [`Bsdf::pdf`] of this direction, sr⁻¹. Dirac lobe: the discrete probability of it.
     pub pdf: f32,
-    /// The same for the reversed event: arriving from `to` and leaving towards `from`.
+    /// Density or probability of the reversed event: arriving from `to` and leaving towards `from`.
     pub pdf_reverse: f32,
     /// Whether the lobe is a Dirac: mirror reflection or refraction at a smooth surface.
     pub delta: bool,
@@ -64,17 +64,17 @@ pub struct BsdfSample {
 /// **away** from the surface. The walks turn world directions into local ones, reject those on which the
 /// geometric and the shading normal disagree, and apply the adjoint correction for shading normals.
 ///
-/// Contract, checked by [`check_bsdf`](crate::check::check_bsdf): values and densities are finite and
-/// not negative; `pdf` is the density of `sample` and integrates to at most one over the sphere of directions;
+/// Contract, checked by [`check_bsdf`](crate::check::check_bsdf): values and densities are finite and not
+/// negative; `pdf` is the density of `sample` and integrates to at most one over the sphere of directions;
 /// `sample` agrees with `eval` and `pdf`; nothing depends on which thread asks.
 pub trait Bsdf: Copy + Send + Sync {
     /// Value of the smooth lobes, sr⁻¹, without a cosine: radiance scattered `towards_camera` per irradiance
-    /// that arrives from `towards_light`. Includes the compression of radiance at a rough refraction, hence is
-    /// not symmetric there: `f(l, c) / η_c² = f(c, l) / η_l²`.
+    /// that arrives from `towards_light`. Includes the compression of radiance at a rough refraction, hence
+    /// is not symmetric there: `f(l, c) / η_c² = f(c, l) / η_l²`.
     fn eval(&self, towards_light: Vec3, towards_camera: Vec3, interface: Interface) -> Spectrum;
 
-    /// Density, sr⁻¹, with which [`sample`](Self::sample) chooses `to` by a smooth lobe after arriving from `from`,
-    /// the choice of the lobe included.
+    /// Density, sr⁻¹, with which [`sample`](Self::sample) chooses `to` by a smooth lobe after arriving from
+    /// `from`, the choice of the lobe included.
     fn pdf(&self, from: Vec3, to: Vec3, interface: Interface) -> f32;
 
     /// Draws a direction after arriving from `from`. `None`: nothing is scattered.
@@ -91,8 +91,8 @@ pub trait Bsdf: Copy + Send + Sync {
     /// Whether there is a smooth lobe, so that paths can be connected and merged here.
     fn is_connectible(&self) -> bool;
 
-    /// Probability in `(0, 1]` to continue a walk that arrives from `from`: local Russian roulette. It may depend
-    /// on nothing but the point and `from`, since the walk of the other side has to know it.
+    /// Probability in `(0, 1]` to continue a walk that arrives from `from`: local Russian roulette. It may
+    /// depend on nothing but the point and `from`, since the walk of the other side has to know it.
     fn continuation(&self, from: Vec3) -> f32 {
         let _ = from;
         1.0

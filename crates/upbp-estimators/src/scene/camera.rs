@@ -20,7 +20,8 @@ pub struct CameraRay {
 pub struct CameraConnection {
     /// The point on the lens.
     pub lens: Vec3,
-    /// Where the point is imaged, in pixels: pixel (i, j) covers `[i, i+1) × [j, j+1)`, row 0 at the top.
+    /// Place of the point on the film, in pixels: pixel (i, j) covers `[i, i+1) × [j, j+1)`, row 0 at the
+    /// top.
     pub film: Vec2,
     /// [`CameraRay::pdf`] of the direction from the lens point to the point.
     pub pdf: f32,
@@ -53,8 +54,8 @@ pub trait Camera: Send + Sync {
     /// The ray through `film` (in pixels). `u_lens` is uniform in `[0, 1)²`, for the lens point.
     fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Option<CameraRay>;
 
-    /// How the camera sees `point` through the lens point that `u_lens` stands for; `None` if it is not on the film.
-    /// The inverse of [`ray`](Self::ray): the same `u_lens` gives the same lens point.
+    /// The connection of `point` with the camera through the lens point that `u_lens` stands for; `None` if
+    /// it is not on the film. The inverse of [`ray`](Self::ray): the same `u_lens` gives the same lens point.
     fn connect(&self, point: Vec3, u_lens: [f32; 2]) -> Option<CameraConnection>;
 
     /// Whether all rays start in one point, so that the bodies around the camera are looked up only once.

@@ -1,4 +1,4 @@
-//! What shines.
+//! Lights: how they are sampled, and with which densities.
 
 use glam::Vec3;
 use upbp_media::Spectrum;
@@ -12,7 +12,7 @@ pub struct BoundingSphere {
     pub radius: f32,
 }
 
-/// What kind of light an emitter is: in which measure its points are chosen, and whether a path can hit it.
+/// The kind of an emitter: in which measure its points are chosen, and whether a path can hit it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EmitterKind {
     /// A surface of the scene that shines: points by area, can be hit.
@@ -21,8 +21,8 @@ pub enum EmitterKind {
     Point,
     /// Light from one direction, infinitely far: a Dirac in direction, cannot be hit.
     Directional,
-    /// Light from all directions, infinitely far: "points" are directions by solid angle, is hit by every ray that
-    /// escapes.
+    /// Light from all directions, infinitely far: "points" are directions by solid angle, is hit by every ray
+    /// that escapes.
     Environment,
 }
 
@@ -43,26 +43,28 @@ impl EmitterKind {
 /// A point of an emitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmitterPoint {
-    /// Where it is. For an infinite emitter: a point outside of the scene's bounds in that direction, or
-    /// whatever is at hand: only the direction counts.
+    /// Position, scene units. For an infinite emitter: a point outside of the scene's bounds in that
+    /// direction, or whatever is at hand: only the direction counts.
     pub position: Vec3,
     /// The normal of the emitting side for [`EmitterKind::Area`]; of no meaning for the other kinds.
     pub normal: Vec3,
 }
 
-/// A light sub-path's start (`docs/theory.md`, section 2.8). Densities do not include the choice of the emitter.
+/// A light sub-path's start (`docs/theory.md`, section 2.8). Densities do not include the choice of the
+/// emitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emission {
-    /// Where the ray starts.
+    /// Start of the ray.
     pub point: EmitterPoint,
-    /// Where the light goes, a unit vector.
+    /// Direction of the light, a unit vector.
     pub direction: Vec3,
     /// Radiance (area, environment), radiant intensity (point) or irradiance on a perpendicular plane
     /// (directional) in `direction`.
     pub radiance: Spectrum,
     /// `L_0`: per area for a surface, 1 for a Dirac, per solid angle for an environment.
     pub pdf_position: f32,
-    /// `ρL_0`: per solid angle for a finite emitter; per area of the disc that rays start from, `1/(πR²)`, for an infinite one.
+    /// `ρL_0`: per solid angle for a finite emitter; per area of the disc that rays start from, `1/(πR²)`,
+    /// for an infinite one.
     pub pdf_direction: f32,
 }
 
@@ -77,33 +79,36 @@ pub struct Incident {
     pub distance: f32,
     /// As [`Emission::radiance`], towards the receiver.
     pub radiance: Spectrum,
-    /// `p_nee`: density of this choice, in the measure of [`Emission::pdf_position`] (area, 1, or solid angle).
+    /// `p_nee`: density of this choice, in the measure of [`Emission::pdf_position`] (area, 1, or solid
+    /// angle).
     pub pdf: f32,
-    /// What [`Emission::pdf_position`] would be for this point.
+    /// [`Emission::pdf_position`] of this point.
     pub pdf_position: f32,
-    /// What [`Emission::pdf_direction`] would be towards the receiver.
+    /// [`Emission::pdf_direction`] towards the receiver.
     pub pdf_direction: f32,
 }
 
-/// What is needed of an emitter that a path has hit. Densities do not include the choice of the emitter.
+/// Radiance and densities of an emitter that a path has hit. Densities do not include the choice of the
+/// emitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HitDensities {
     /// Radiance towards the receiver.
     pub radiance: Spectrum,
-    /// What [`Incident::pdf`] is for this point and receiver.
+    /// [`Incident::pdf`] of this point and receiver.
     pub pdf_incident: f32,
-    /// What [`Emission::pdf_position`] is for this point.
+    /// [`Emission::pdf_position`] of this point.
     pub pdf_position: f32,
-    /// What [`Emission::pdf_direction`] is towards the receiver.
+    /// [`Emission::pdf_direction`] towards the receiver.
     pub pdf_direction: f32,
 }
 
 /// A light.
 ///
-/// Emitters are chosen in proportion to [`power`](Self::power); the walks multiply that probability in. The radiance of an
-/// emitter that is given here and the one that [`hit`](Self::hit) returns must be the same function.
+/// Emitters are chosen in proportion to [`power`](Self::power); the walks multiply that probability in. The
+/// radiance of an emitter that is given here and the one that [`hit`](Self::hit) returns must be the same
+/// function.
 pub trait Emitter: Send + Sync {
-    /// What kind of light this is.
+    /// The kind of the light.
     fn kind(&self) -> EmitterKind;
 
     /// Power in W (any common factor may be left out): how often the emitter is chosen. For infinite
@@ -121,9 +126,9 @@ pub trait Emitter: Send + Sync {
     /// Chooses a point of the emitter for next event estimation at `receiver`.
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident>;
 
-    /// Radiance and densities for a path from `point` (on a surface that carries this emitter; for an environment
-    /// only `direction` counts) in `direction`, the direction of the light, to `receiver`. `None` for lights that
-    /// cannot be hit, and on a side that does not shine.
+    /// Radiance and densities for a path from `point` (on a surface that carries this emitter; for an
+    /// environment only `direction` counts) in `direction`, the direction of the light, to `receiver`. `None`
+    /// for lights that cannot be hit, and on a side that does not shine.
     fn hit(
         &self,
         bounds: &BoundingSphere,
@@ -132,9 +137,9 @@ pub trait Emitter: Send + Sync {
         receiver: Vec3,
     ) -> Option<HitDensities>;
 
-    /// The density [`Incident::pdf`] with which [`sample_incident`](Self::sample_incident) at `receiver` chooses
-    /// `point`, in direction `direction` of the light. The default serves emitters whose choice does not depend
-    /// on the receiver, so that it equals `pdf_position`.
+    /// The density [`Incident::pdf`] with which [`sample_incident`](Self::sample_incident) at `receiver`
+    /// chooses `point`, in direction `direction` of the light. The default serves emitters whose choice does
+    /// not depend on the receiver, so that it equals `pdf_position`.
     fn pdf_incident(
         &self,
         bounds: &BoundingSphere,

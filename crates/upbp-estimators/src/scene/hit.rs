@@ -1,4 +1,4 @@
-//! What a ray meets.
+//! Hits and crossings of rays with surfaces.
 
 use glam::Vec3;
 use upbp_media::Interior;
@@ -18,7 +18,7 @@ pub struct Hit<B> {
     pub geometric_normal: Vec3,
     /// Unit normal for shading, in the hemisphere of the geometric one.
     pub shading_normal: Vec3,
-    /// How the surface scatters. `None`: an index-matched boundary, which light passes straight.
+    /// Scattering of the surface. `None`: an index-matched boundary, which light passes straight.
     pub bsdf: Option<B>,
     /// The body that the surface encloses, if its inside matters: every null boundary, every refracting body.
     /// Opaque surfaces have none.
@@ -28,7 +28,8 @@ pub struct Hit<B> {
 }
 
 impl<B> Hit<B> {
-    /// Whether a ray from `t_min` on can have met it: it lies ahead, and all its numbers are finite. A walk that meets another is lost.
+    /// Whether a ray from `t_min` on can have met it: it lies ahead, and all its numbers are finite. A walk
+    /// that meets another is lost.
     #[inline]
     #[must_use]
     pub fn is_sound(&self, t_min: f32) -> bool {

@@ -1,4 +1,4 @@
-//! What a renderer must be told of a scene: the traits that a host implements.
+//! Traits that a host implements, to tell a renderer of its scene.
 //!
 //! Geometry, materials, lights and the camera stay the host's own. The walks of this crate ask five
 //! questions: where does a ray go ([`Scene`]), how does a surface scatter ([`Bsdf`]), what does a light
@@ -25,9 +25,9 @@ pub use hit::{Crossing, EmitterId, Hit};
 
 /// A scene to render: the host's geometry and everything on it.
 ///
-/// Required is the nearest hit; what is derived from it may be overridden where the host has something faster or
-/// more exact. Whether two surfaces coincide, where a ray starts inside a body, and so on is the host's to answer
-/// consistently: the walks of both sides rely on it.
+/// Required is the nearest hit; what is derived from it may be overridden where the host has something faster
+/// or more exact. Whether two surfaces coincide, where a ray starts inside a body, and so on is the host's to
+/// answer consistently: the walks of both sides rely on it.
 pub trait Scene: Sync {
     /// Scattering of the host's surfaces.
     type Bsdf: Bsdf;
@@ -53,8 +53,8 @@ pub trait Scene: Sync {
     /// The camera.
     fn camera(&self) -> &Self::Camera;
 
-    /// The medium around everything, `None` for vacuum. Of the light of infinite emitters there is what gets through an infinite length of
-    /// it: nothing, but in channels without extinction.
+    /// The medium around everything, `None` for vacuum. Of the light of infinite emitters there is what gets
+    /// through an infinite length of it: nothing, but in channels without extinction.
     fn outside(&self) -> Option<MediumId> {
         None
     }
@@ -64,18 +64,18 @@ pub trait Scene: Sync {
         true
     }
 
-    /// Whether any surface scatters by Dirac lobes alone. If there is none, or if all lights can be hit, camera sub-paths alone find every
-    /// path, and light sub-paths may be left out.
+    /// Whether any surface scatters by Dirac lobes alone. If there is none, or if all lights can be hit,
+    /// camera sub-paths alone find every path, and light sub-paths may be left out.
     fn has_specular_surfaces(&self) -> bool {
         true
     }
 
-    /// The nearest surface that scatters, and in `crossings` (empty before, sorted by distance after) the null
-    /// boundaries before it, or all along the ray if there is none.
+    /// The nearest surface that scatters, and in `crossings` (empty before, sorted by distance after) the
+    /// null boundaries before it, or all along the ray if there is none.
     ///
-    /// The default asks [`intersect`](Self::intersect) again behind each boundary, and so misses one of two boundaries
-    /// that coincide to rounding; a host with such geometry overrides this. It gives up at [`MAX_CROSSINGS`], and at a hit that is not
-    /// [sound](Hit::is_sound): walks are lost there.
+    /// The default asks [`intersect`](Self::intersect) again behind each boundary, and so misses one of two
+    /// boundaries that coincide to rounding; a host with such geometry overrides this. It gives up at
+    /// [`MAX_CROSSINGS`], and at a hit that is not [sound](Hit::is_sound): walks are lost there.
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Self::Bsdf>> {
         let mut rest = *ray;
         for _ in 0..MAX_CROSSINGS {
@@ -89,9 +89,9 @@ pub trait Scene: Sync {
         None
     }
 
-    /// Whether the segment `(ray.t_min, ray.t_max)` is free of surfaces that end every connection: those that scatter
-    /// and enclose no body. Boundaries of bodies on the way, null or not, go to `crossings`, sorted by distance;
-    /// they are of no interest if the answer is `false`.
+    /// Whether the segment `(ray.t_min, ray.t_max)` is free of surfaces that end every connection: those that
+    /// scatter and enclose no body. Boundaries of bodies on the way, null or not, go to `crossings`, sorted
+    /// by distance; they are of no interest if the answer is `false`.
     fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
         let mut rest = *ray;
         for _ in 0..MAX_CROSSINGS {
@@ -107,8 +107,8 @@ pub trait Scene: Sync {
 
     /// The bodies that `point` lies in.
     ///
-    /// The default follows a ray to infinity: a body is around the point if the ray leaves it more often than it enters. Beyond
-    /// [`MAX_CROSSINGS`] it has found none.
+    /// The default follows a ray to infinity: a body is around the point if the ray leaves it more often than
+    /// it enters. Beyond [`MAX_CROSSINGS`] it has found none.
     fn stack_at(&self, point: Vec3) -> MediumStack {
         // Any direction serves; one without symmetry meets few edges.
         let direction = Vec3::new(0.284_69, 0.867_42, 0.408_03).normalize();
@@ -142,7 +142,8 @@ pub trait Scene: Sync {
     }
 }
 
-/// Boundaries on one ray, at most: a ray that meets so many is lost, and so a host's answers cannot keep a walk for ever.
+/// Most boundaries on one ray: a ray that meets more is lost, so that a host's answers cannot keep a walk for
+/// ever.
 pub const MAX_CROSSINGS: usize = 4096;
 
 /// The next distance that is certainly not the same intersection again.

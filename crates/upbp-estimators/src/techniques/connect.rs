@@ -1,7 +1,7 @@
-//! Connections of a camera vertex to light vertices drawn from all of them.
+//! Connections of a camera vertex to light vertices drawn from all.
 //!
-//! Drawing `M` of the `N_V` stored vertices instead of walking along one light sub-path keeps the cost of a camera vertex
-//! constant, however long light sub-paths are (`docs/theory.md`, section 6.9).
+//! Drawing `M` of the `N_V` stored vertices instead of walking along one light sub-path keeps the cost of a
+//! camera vertex constant, however long light sub-paths are (`docs/theory.md`, section 6.9).
 
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
@@ -53,24 +53,10 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     if !direction.is_finite() {
         return;
     }
-    let Some(camera_side) = vertex.site.evaluate(
-        scene,
-        plan.roulette,
-        Walk::Camera,
-        vertex.position,
-        vertex.towards_camera,
-        direction,
-    ) else {
+    let Some(camera_side) = vertex.evaluate(context, direction) else {
         return;
     };
-    let Some(light_side) = light.site.evaluate(
-        scene,
-        plan.roulette,
-        Walk::Light,
-        light.position,
-        light.towards_light,
-        -direction,
-    ) else {
+    let Some(light_side) = light.evaluate(context, -direction) else {
         return;
     };
     let scattering = camera_side.value * light_side.value;

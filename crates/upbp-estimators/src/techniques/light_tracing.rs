@@ -29,14 +29,7 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let between = view.lens - vertex.position;
     let distance = between.length();
     let direction = between / distance;
-    let Some(scattering) = vertex.site.evaluate(
-        scene,
-        plan.roulette,
-        Walk::Light,
-        vertex.position,
-        vertex.towards_light,
-        direction,
-    ) else {
+    let Some(scattering) = vertex.evaluate(context, direction) else {
         return;
     };
     if scattering.value.is_black() {

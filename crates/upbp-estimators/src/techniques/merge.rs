@@ -1,13 +1,13 @@
 //! Merges of a light vertex and a camera vertex within a kernel: weight and value, the same for all five.
 //!
-//! On a beam the vertex lies somewhere along it, not at the distance that a walk sampled: density and weight are those of
-//! the point where the beams come closest (`docs/theory.md`, sections 2.2 to 2.6 and 4.4).
+//! On a beam the vertex lies somewhere along it, not at the distance that a walk sampled: density and weight
+//! are those of the point where the beams come closest (`docs/theory.md`, sections 2.2 to 2.6 and 4.4).
 
 use crate::film_sample::Output;
 use crate::mis::{Densities, Weight};
 use crate::observer::{Joint, ObservedSample, Observer};
 use crate::path::{CameraVertex, Context, LightVertex, Site};
-use crate::scene::{Scene, Walk};
+use crate::scene::Scene;
 use crate::technique::Technique;
 
 /// Merges two vertices; `kernel` is the kernel's value between them, for beams per sine of the angle.
@@ -19,16 +19,9 @@ pub(super) fn merge<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     kernel: f32,
     out: &mut Output<'_, O>,
 ) {
-    let Context { world, plan } = *context;
+    let plan = context.plan;
     let mis = &plan.mis;
-    let Some(scattering) = camera.site.evaluate(
-        world.scene,
-        plan.roulette,
-        Walk::Camera,
-        camera.position,
-        camera.towards_camera,
-        light.towards_light,
-    ) else {
+    let Some(scattering) = camera.evaluate(context, light.towards_light) else {
         return;
     };
     let (factor, merges) = match camera.site {

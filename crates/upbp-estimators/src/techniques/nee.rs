@@ -51,14 +51,7 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     if !(cos_light >= MIN_COSINE && incident.pdf > 0.0) || incident.radiance.is_black() {
         return;
     }
-    let Some(scattering) = vertex.site.evaluate(
-        scene,
-        plan.roulette,
-        Walk::Camera,
-        vertex.position,
-        vertex.towards_camera,
-        direction,
-    ) else {
+    let Some(scattering) = vertex.evaluate(context, direction) else {
         return;
     };
     if scattering.value.is_black() {

@@ -8,8 +8,8 @@ use crate::path::{CameraVertex, Context, LightVertex, Site, SurfaceSite};
 use crate::scene::Scene;
 use crate::technique::Technique;
 
-/// Photons whose surface faces away by more than this do not lie on the query's surface: cosine of the angle between
-/// the two normals.
+/// Photons whose surface faces away by more than this do not lie on the query's surface: cosine of the angle
+/// between the two normals.
 const MIN_NORMAL_COSINE: f32 = 0.7;
 
 /// Photons farther than this from the tangent plane, relative to the kernel's radius, lie on another surface.
@@ -40,7 +40,8 @@ pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out.observer.turns_to(None);
 }
 
-/// Keeps light from leaking around edges and through thin walls. What it cuts off the kernel vanishes with the radius.
+/// Keeps light from leaking around edges and through thin walls. What it cuts off the kernel vanishes with
+/// the radius.
 fn lies_on<B, D>(
     surface: &SurfaceSite<B>,
     vertex: &CameraVertex<B, D>,

@@ -138,7 +138,8 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return None;
     }
     let kind = light.kind();
-    // With another probability a walk from infinity does not arrive. Those that do have not stopped on the way.
+    // With another probability a walk from infinity does not arrive. Those that do have not stopped on the
+    // way.
     let passes = world.passes_from_infinity();
     if kind.is_infinite() && passes < 1.0 && f64::from(stream.uniform()) >= passes {
         return None;
@@ -219,14 +220,15 @@ fn store_beams<S: Scene, D: Densities>(
 
 /// Lengths that are tried for a beam without an end, each twice the one before.
 const DOUBLINGS: usize = 64;
-/// Part of the light at its start that may get farther than such a beam, in any channel: what single precision does not tell.
+/// Part of the light at its start that may get farther than such a beam, in any channel: what single
+/// precision does not tell.
 const NEGLIGIBLE: f32 = 1e-7;
 
 /// The end of a beam in `span`, whose medium is `medium`, that runs to distance `end` there.
 ///
-/// Where there is none, the beam ends where what is left in every channel is [negligible](NEGLIGIBLE), or is not attenuated any further. So weights
-/// may take it to be without an end.
-/// A beam from infinity has none left before the scene.
+/// Where there is none, the beam ends where what is left in every channel is [negligible](NEGLIGIBLE), or is
+/// not attenuated any further. So weights may take it to be without an end. A beam from infinity has none
+/// left before the scene.
 fn beam_end<S: Scene>(
     world: &World<'_, S>,
     passage: &Passage<S::Bsdf>,
