@@ -104,7 +104,7 @@ pub(crate) const fn may_correct(corrections: usize) -> bool {
 }
 
 /// A distance is followed by this share farther than it was drawn: some roundings.
-const REACH_MARGIN: f32 = 8.0 * f32::EPSILON;
+const DISTANCE_MARGIN: f32 = 8.0 * f32::EPSILON;
 
 /// The decision where a walk stops, while it is followed.
 struct Flight {
@@ -112,7 +112,7 @@ struct Flight {
     /// The random numbers that decide in the current stretch.
     decision: Option<[f32; 2]>,
     /// Distance to which the ray has to be followed if the current medium goes on.
-    reach: f32,
+    max_distance: f32,
     /// Distance where the walk stops if the current medium goes on; known only if the ray is followed to a
     /// finite distance.
     stop: f32,
@@ -214,7 +214,7 @@ impl<B: Copy> Passage<B> {
         self.stop = None;
         self.hit = None;
         self.end.clone_from(&self.start);
-        let mut flight = Flight { extent, decision: None, reach: f32::INFINITY, stop: f32::INFINITY };
+        let mut flight = Flight { extent, decision: None, max_distance: f32::INFINITY, stop: f32::INFINITY };
         let medium = medium_of(scene, &self.start);
         let mut span = Span { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
@@ -223,7 +223,8 @@ impl<B: Copy> Passage<B> {
                 return None;
             }
         }
-        let mut ray = Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.reach };
+        let mut ray =
+            Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.max_distance };
         loop {
             self.found.clear();
             let hit = scene.trace(&ray, &mut self.found);
@@ -235,7 +236,7 @@ impl<B: Copy> Passage<B> {
             }
             for i in 0..self.found.len() {
                 let crossing = self.found[i];
-                if crossing.t > flight.reach {
+                if crossing.t > flight.max_distance {
                     break;
                 }
                 let correction = correction(&self.end, &crossing, &self.crossings);
@@ -249,7 +250,7 @@ impl<B: Copy> Passage<B> {
             }
             let known = hit.as_ref().map_or(ray.t_max, |hit| hit.t);
             if let Some(hit) = hit
-                && known <= flight.reach
+                && known <= flight.max_distance
             {
                 if let Some(interior) = hit.interior
                     && let entering = self.direction.dot(hit.geometric_normal) < 0.0
@@ -266,8 +267,8 @@ impl<B: Copy> Passage<B> {
                     }
                     return None;
                 }
-            } else if flight.reach <= known {
-                if flight.reach == f32::INFINITY && !self.end.is_empty() {
+            } else if flight.max_distance <= known {
+                if flight.max_distance == f32::INFINITY && !self.end.is_empty() {
                     let correction = correction_of_escape(&self.end, &self.crossings);
                     if correction.is_some() {
                         return correction;
@@ -280,13 +281,13 @@ impl<B: Copy> Passage<B> {
                 // come.
                 ray.t_min = known.next_down();
             }
-            ray.t_max = flight.reach;
+            ray.t_max = flight.max_distance;
         }
     }
 
     /// Begins `span`: draws the distance in its medium.
     fn enter<S: Scene<Bsdf = B>>(&self, scene: &S, span: &Span, flight: &mut Flight, stream: &mut Stream) {
-        flight.reach = f32::INFINITY;
+        flight.max_distance = f32::INFINITY;
         if self.stop.is_some() || span.start == f32::NEG_INFINITY {
             return;
         }
@@ -300,7 +301,7 @@ impl<B: Copy> Passage<B> {
             && let Some(t) = medium.sample_distance(&self.segment(span, f32::INFINITY), u[0], u[1])
             && t >= span.start
         {
-            flight.reach = t + REACH_MARGIN * t;
+            flight.max_distance = t + DISTANCE_MARGIN * t;
             flight.stop = t;
         }
     }
@@ -319,7 +320,7 @@ impl<B: Copy> Passage<B> {
         {
             // Decided for the segment as it is: the rounding of a distance far from the origin must not carry
             // the stop over its end.
-            let t = if flight.reach < end {
+            let t = if flight.max_distance < end {
                 Some(flight.stop)
             } else {
                 medium.sample_distance(&self.segment(span, end), u_channel, u_distance)

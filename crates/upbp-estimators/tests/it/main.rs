@@ -1,4 +1,5 @@
-//! Multiple importance sampling against independent computations: weights by enumeration, densities across refraction.
+//! Multiple importance sampling against independent computations: weights by enumeration, densities across
+//! refraction.
 
 mod refraction;
 mod weights;

@@ -141,7 +141,8 @@ fn for_all_ranges(name: &str, mut compare: impl FnMut(&mut Reached, &MisPlan, &P
     }
 }
 
-/// Masks in an order such that every one comes with every mode and many paths: an odd step through a power of two.
+/// Masks in an order such that every one comes with every mode and many paths: an odd step through a power of
+/// two.
 fn masks() -> impl Iterator<Item = u32> {
     (0..).map(|step: u32| step.wrapping_mul(189) % (1 << TECHNIQUES))
 }
