@@ -62,7 +62,7 @@ struct Pair {
 }
 
 impl Pair {
-    /// The values of a pixel in both images, if all of them are finite.
+    /// The values of a pixel in both images, if all are finite.
     fn pixel(&self, index: usize) -> Option<[[f64; 3]; 2]> {
         let pixels = [self.image.pixels[index], self.reference.pixels[index]];
         pixels

@@ -21,7 +21,7 @@ pub(crate) enum Failure {
 const INPUT: u8 = 2;
 const OUTPUT: u8 = 74;
 const INTERRUPTED: u8 = 75;
-/// As shells have it for SIGINT.
+/// Exit code after a second signal: that of shells for SIGINT.
 pub(crate) const AT_ONCE: u8 = 130;
 
 impl Failure {

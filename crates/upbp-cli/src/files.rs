@@ -9,7 +9,7 @@ use upbp_core::{
     write_image, write_png, write_text,
 };
 
-/// Where images go: an OpenEXR image and a PNG beside it, or a PNG alone.
+/// Places of images: an OpenEXR image and a PNG beside it, or a PNG alone.
 #[derive(Clone, Debug)]
 pub(crate) struct Images {
     exr: Option<PathBuf>,

@@ -40,7 +40,7 @@ fn page() -> String {
     page
 }
 
-/// What a command does, and how it is called.
+/// The section of a command: its purpose and its call.
 fn introduction(command: &Command) -> String {
     let about =
         text(command.get_long_about().or(command.get_about())).replace("\n\n", ".\n\n").replace(". ", ".\n");
@@ -73,7 +73,7 @@ fn options(command: &Command) -> String {
     options + &lists("###", command.get_after_long_help())
 }
 
-/// How an argument is written.
+/// The spelling of an argument.
 fn spelling(argument: &Arg) -> String {
     let values: Vec<_> =
         argument.get_value_names().unwrap_or_default().iter().map(ToString::to_string).collect();
@@ -86,7 +86,7 @@ fn spelling(argument: &Arg) -> String {
     }
 }
 
-/// What the help says of an argument.
+/// The help of an argument.
 fn meaning(argument: &Arg) -> String {
     let mut meaning = text(argument.get_long_help().or(argument.get_help()));
     let values = argument.get_possible_values();
@@ -109,7 +109,7 @@ fn text(help: Option<&StyledStr>) -> String {
 
 /// A cell of a table.
 fn cell(text: impl AsRef<str>) -> String {
-    text.as_ref().replace("\n\n", " ").replace('\n', " ").replace('|', "\\|")
+    text.as_ref().replace("\n\n", ". ").replace('\n', " ").replace('|', "\\|")
 }
 
 /// The lists at the end of a help, each below its title.

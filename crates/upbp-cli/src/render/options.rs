@@ -85,10 +85,12 @@ pub(crate) struct Method {
     /// Most edges of a path between light and camera [default: 1000]
     #[arg(long, value_name = "K")]
     max_length: Option<u32>,
-    /// Light sub-paths per iteration [default: at most one per pixel, as pays]
+    /// Light sub-paths per iteration [default: one per pixel, fewer where that pays or where
+    /// memory or time is short]
     #[arg(long, value_name = "N")]
     light_paths: Option<u32>,
-    /// Light sub-paths that leave photon beams, per iteration [default: a few per query beam, as pays]
+    /// Light sub-paths that leave photon beams, per iteration [default: enough to give a query beam about
+    /// one, fewer where that pays]
     #[arg(long, value_name = "N")]
     beams: Option<u32>,
     /// Keep the first radii of kernels instead of shrinking them

@@ -1,4 +1,4 @@
-//! What a newcomer sees: help, completions, and errors that say how to go on.
+//! The first things that a newcomer sees: help, completions, and errors that say how to go on.
 
 use std::path::Path;
 use std::process::Command;

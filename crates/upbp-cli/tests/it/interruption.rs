@@ -63,7 +63,7 @@ fn wait_until(child: &mut Child, what: &str, mut holds: impl FnMut(&Child) -> bo
     }
 }
 
-/// When a file was written, if it is there.
+/// The time at which a file was written, if it is there.
 fn written(path: &Path) -> Option<SystemTime> {
     fs::metadata(path).and_then(|metadata| metadata.modified()).ok()
 }

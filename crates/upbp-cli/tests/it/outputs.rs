@@ -42,7 +42,7 @@ fn run(program: &str, folder: &Path, arguments: &[&str]) -> (Option<i32>, String
     (status.code(), String::from_utf8_lossy(&stderr).into_owned())
 }
 
-/// What renders of the folder have in common, so that they are of one kind and take little time.
+/// Options that renders of the folder have in common, so that they are of one kind and take little time.
 const LITTLE: [&str; 9] =
     ["--techniques", "pt", "--max-length", "3", "--threads", "1", "--deterministic", "--seed", "1"];
 
@@ -80,7 +80,7 @@ fn originals() -> &'static Snapshot {
     })
 }
 
-/// Makes a folder with [`originals`], other names for some of them, and one that is read-only.
+/// Makes a folder with [`originals`], other names for some, and one that is read-only.
 fn prepared(name: &str) -> PathBuf {
     let folder = program::folder(name).canonicalize().expect("the folder");
     fs::create_dir(folder.join("sub")).expect("a folder");
@@ -226,7 +226,7 @@ fn slices_that_cannot_be_merged_are_mentioned() {
     assert!(code == Some(0) && !text.contains(note), "{text}");
 }
 
-/// What a file holds, by its content.
+/// The kind of a file, by its content.
 fn kind(bytes: &[u8]) -> Option<&'static str> {
     let kinds: [(&[u8], &str); 5] = [
         (b"\x76\x2f\x31\x01", "exr"),
@@ -341,7 +341,7 @@ fn read<'a>(program: &str, words: &'a [Words]) -> Vec<&'a str> {
     files
 }
 
-/// What a command that has ended well has written, and the kinds of that.
+/// The files that a command which has ended well has written, with their kinds.
 fn written(command: &str, words: &[Words]) -> Vec<(PathBuf, &'static str)> {
     let mut files = Vec::new();
     if command == "check" {
