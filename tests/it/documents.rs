@@ -187,7 +187,9 @@ fn names_in_documents_exist() {
             // Shorter words may be symbols of a formula.
             let is_name = is_name
                 && (span.contains("::")
-                    || span.len() > 3 && span.starts_with(|c: char| c.is_ascii_uppercase())
+                    || span.len() > 3
+                        && !span.contains('_')
+                        && span.starts_with(|c: char| c.is_ascii_uppercase())
                     || span.len() > 13 && span.contains('_'));
             if !is_name {
                 continue;
