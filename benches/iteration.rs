@@ -14,7 +14,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use upbp_core::{MediumId, Settings, TechniqueSet};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy, VertexKind};
 use upbp_estimators::mis::{
-    BeamExtent, Edge, Heuristic, MergeSite, MisPlan, Pending, Tip, VolumeMerges, Weight,
+    BeamExtent, Edge, EdgeMis, Heuristic, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
 };
 use upbp_estimators::scene::Walk;
 use upbp_scene::ReadyScene;
@@ -106,11 +106,11 @@ fn in_medium(vertex: &PathVertex) -> bool {
     matches!(vertex.kind, VertexKind::Medium(_))
 }
 
-fn site(vertex: &PathVertex) -> MergeSite {
+fn kind(vertex: &PathVertex) -> MergeKind {
     match vertex.kind {
-        VertexKind::Surface => MergeSite::Surface,
-        VertexKind::Medium(medium) => MergeSite::Medium { medium, sin_theta: vertex.sin_theta },
-        VertexKind::End | VertexKind::Delta => MergeSite::None,
+        VertexKind::Surface => MergeKind::Surface,
+        VertexKind::Medium(medium) => MergeKind::Medium { medium, sin_theta: vertex.sin_theta },
+        VertexKind::End | VertexKind::Delta => MergeKind::None,
     }
 }
 
@@ -121,47 +121,47 @@ struct Ends<'a> {
     /// The vertex in fog in the middle, where they merge; a connection joins it to the one before.
     middle: usize,
     /// The light sub-path at `middle − 1` and at `middle − 2`.
-    light: [Pending; 2],
+    light: [EdgeMis; 2],
     /// The camera sub-path at `middle + 1`.
-    camera: Pending,
+    camera: EdgeMis,
 }
 
 impl<'a> Ends<'a> {
     fn new(plan: &'a MisPlan, path: &'a Path) -> Self {
         let (length, v) = (path.length(), &path.vertices);
         let middle = length / 2;
-        let mut pending =
-            Pending::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
-        let mut light = [pending; 2];
+        let mut edge_mis =
+            EdgeMis::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
+        let mut light = [edge_mis; 2];
         for (i, vertex) in v.iter().enumerate().take(middle).skip(1) {
-            let tip = Self::arrive(plan, path, Walk::Light, &pending, i);
-            let before = tip.before(plan, vertex.rho_camera);
-            pending = Self::scatter(vertex, &tip, before, vertex.rho_light, vertex.cos_camera);
-            light = [pending, light[0]];
+            let vertex_mis = Self::arrive(plan, path, Walk::Light, &edge_mis, i);
+            let before = vertex_mis.before(plan, vertex.rho_camera);
+            edge_mis = Self::scatter(vertex, &vertex_mis, before, vertex.rho_light, vertex.cos_camera);
+            light = [edge_mis, light[0]];
         }
-        let mut camera = Pending::at_camera(v[length].rho_camera);
+        let mut camera = EdgeMis::at_camera(v[length].rho_camera);
         for i in (middle + 1..length).rev() {
-            let tip = Self::arrive(plan, path, Walk::Camera, &camera, i);
-            let before = tip.before(plan, v[i].rho_light);
-            camera = Self::scatter(&v[i], &tip, before, v[i].rho_camera, v[i].cos_light);
+            let vertex_mis = Self::arrive(plan, path, Walk::Camera, &camera, i);
+            let before = vertex_mis.before(plan, v[i].rho_light);
+            camera = Self::scatter(&v[i], &vertex_mis, before, v[i].rho_camera, v[i].cos_light);
         }
         Self { plan, path, middle, light, camera }
     }
 
-    fn scatter(vertex: &PathVertex, tip: &Tip, before: f64, rho: f64, cos_out: f64) -> Pending {
-        Pending {
+    fn scatter(vertex: &PathVertex, vertex_mis: &VertexMis, before: f64, rho: f64, cos_out: f64) -> EdgeMis {
+        EdgeMis {
             before,
             rho,
             cos_out,
-            site: site(vertex),
-            distance_factor: tip.distance_factor,
+            kind: kind(vertex),
+            distance_factor: vertex_mis.distance_factor,
             connectible: true,
             in_medium: in_medium(vertex),
         }
     }
 
     /// The arrival of a walk at vertex `i`.
-    fn arrive(plan: &MisPlan, path: &Path, walk: Walk, pending: &Pending, i: usize) -> Tip {
+    fn arrive(plan: &MisPlan, path: &Path, walk: Walk, edge_mis: &EdgeMis, i: usize) -> VertexMis {
         let vertex = &path.vertices[i];
         let (edge, cos_in, connections) = match walk {
             Walk::Light if i == 1 => {
@@ -183,7 +183,7 @@ impl<'a> Ends<'a> {
             pass_probability: edge.pass_probability,
             ends_in_medium: in_medium(vertex),
         };
-        pending.arrive(plan, walk, &edge, connections)
+        edge_mis.arrive(plan, walk, &edge, connections)
     }
 
     /// BB1D where the sub-paths meet.
@@ -210,9 +210,9 @@ impl<'a> Ends<'a> {
         let opposite =
             |walk, vertex, t| plan.distance_factor(walk, in_medium(vertex), edge.pass_probability, t);
         let light_end =
-            light.end(plan, Walk::Light, site(a), opposite(Walk::Camera, a, edge.t_camera), a.rho_camera);
+            light.end(plan, Walk::Light, kind(a), opposite(Walk::Camera, a, edge.t_camera), a.rho_camera);
         let camera_end =
-            camera.end(plan, Walk::Camera, site(b), opposite(Walk::Light, b, edge.t_light), b.rho_light);
+            camera.end(plan, Walk::Camera, kind(b), opposite(Walk::Light, b, edge.t_light), b.rho_light);
         let light_density = b.rho_camera * a.cos_camera / square * edge.t_camera;
         let camera_density = a.rho_light * b.cos_light / square * edge.t_light;
         plan.connect_weight(light_end, light_density, camera_end, camera_density).value()

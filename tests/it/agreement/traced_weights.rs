@@ -8,7 +8,7 @@ use glam::Vec3;
 use upbp_estimators::mis::oracle::{Path, Strategy};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
-use upbp_estimators::path::{Context, Extent, LightChunk, Passage, Scratch, Site};
+use upbp_estimators::path::{Context, EdgeTrace, Extent, LightChunk, Scratch, Site};
 use upbp_estimators::scene::Scene;
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
@@ -436,7 +436,7 @@ fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
     // The fog's boundary runs through the glass, where it is hidden: it changes no medium, but what is behind
     // the glass.
     let scene = ClosedForm::new(CAMERAS[0], 1);
-    let mut passage = Passage::new();
+    let mut edge_trace = EdgeTrace::new();
     let mut random = Stream::new(1, 0, StreamKind::Camera, 0);
     let mut hidden = 0;
     for _ in 0..20_000 {
@@ -444,10 +444,10 @@ fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
         let (from, towards) = (point(), point());
         let direction = (towards - from).normalize();
         let mut walk = Stream::new(2, 0, StreamKind::Camera, 0);
-        passage.trace(&scene, from, direction, &scene.stack_at(from), 0.0, Extent::ToSurface, &mut walk);
-        for span in &passage.spans {
+        edge_trace.trace(&scene, from, direction, &scene.stack_at(from), 0.0, Extent::ToSurface, &mut walk);
+        for span in &edge_trace.spans {
             let t = span.start + (span.end.min(10.0) - span.start) * random.uniform();
-            let found = passage.stack_in(span, t);
+            let found = edge_trace.stack_in(span, t);
             assert_eq!(found, scene.stack_at(from + direction * t), "{from}, {direction}, {t}");
             hidden += usize::from(found.len() > 1 && found.priority() == 10);
         }

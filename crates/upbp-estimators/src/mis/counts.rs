@@ -44,7 +44,7 @@ pub struct VolumeMerges {
 
 /// The kind of merges that are possible at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MergeSite {
+pub enum MergeKind {
     /// None: an end of the path, or a Dirac lobe.
     None,
     /// Surface merging.
@@ -164,11 +164,11 @@ impl MisPlan {
     /// (section 4.1).
     #[inline]
     #[must_use]
-    pub fn merge_sum<D: Densities>(&self, site: MergeSite, c_light: f64, c_camera: f64) -> D {
-        match site {
-            MergeSite::None => D::ZERO,
-            MergeSite::Surface => D::of(Technique::Surf, self.surface_factor()),
-            MergeSite::Medium { medium, sin_theta } => {
+    pub fn merge_sum<D: Densities>(&self, kind: MergeKind, c_light: f64, c_camera: f64) -> D {
+        match kind {
+            MergeKind::None => D::ZERO,
+            MergeKind::Surface => D::of(Technique::Surf, self.surface_factor()),
+            MergeKind::Medium { medium, sin_theta } => {
                 self.volume_factors(medium, c_light, c_camera, sin_theta).sum()
             }
         }

@@ -2,9 +2,9 @@
 //!
 //! The balance heuristic over all techniques that can produce a path, where a merge counts with `n · V_K ·
 //! (distance factors) · (densities of both sub-paths)`: `docs/theory.md`, sections 3 and 4. A sub-path vertex
-//! carries two numbers ([`Tip`]) from which the weight of any technique that ends there follows in constant
-//! time; or two per technique ([`ByTechnique`]), from which the weights of any other sample counts follow.
-//! [`oracle`] enumerates the same weights the slow, obvious way, and the tests hold one to the other.
+//! carries two numbers ([`VertexMis`]) from which the weight of any technique that ends there follows in
+//! constant time; or two per technique ([`ByTechnique`]), from which the weights of any other sample counts
+//! follow. [`oracle`] enumerates the same weights the slow, obvious way, and the tests hold one to the other.
 
 mod counts;
 mod densities;
@@ -12,6 +12,6 @@ pub mod oracle;
 mod recursion;
 mod weights;
 
-pub use counts::{BeamExtent, Heuristic, MergeSite, MisPlan, PARALLEL_SIN2, VolumeMerges};
+pub use counts::{BeamExtent, Heuristic, MergeKind, MisPlan, PARALLEL_SIN2, VolumeMerges};
 pub use densities::{ByTechnique, Densities, Weight};
-pub use recursion::{Edge, End, Pending, Tip};
+pub use recursion::{Edge, EdgeMis, End, VertexMis};

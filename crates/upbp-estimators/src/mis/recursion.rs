@@ -7,14 +7,14 @@
 
 use upbp_media::EdgeDensity;
 
-use super::counts::{BeamExtent, MergeSite, MisPlan};
+use super::counts::{BeamExtent, MergeKind, MisPlan};
 use super::densities::Densities;
 use crate::scene::Walk;
 use crate::technique::Technique;
 
 /// Densities of all techniques that split a sub-path before a vertex, on arrival there (section 4.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tip<D = f64> {
+pub struct VertexMis<D = f64> {
     /// `D_i`: connecting to this vertex from the one before.
     pub connect: D,
     /// `E_i`: everything below the vertex before, per opposite scattering density.
@@ -23,7 +23,7 @@ pub struct Tip<D = f64> {
     pub distance_factor: f64,
 }
 
-impl<D: Densities> Tip<D> {
+impl<D: Densities> VertexMis<D> {
     /// `B_i = D_i + ρ′ E_i` for the opposite scattering density `ρ′`, roulette included, sr⁻¹.
     #[inline]
     #[must_use]
@@ -32,7 +32,7 @@ impl<D: Densities> Tip<D> {
         if rho_opposite > 0.0 { self.connect + self.below * plan.pow(rho_opposite) } else { self.connect }
     }
 
-    /// The end of the sub-path for a connection to its vertex: `site` is the vertex with the direction of the
+    /// The end of the sub-path for a connection to its vertex: `kind` is the vertex with the direction of the
     /// connection, `opposite` the distance factor of the other walk that would arrive there, `rho_opposite`
     /// the density with which it would then scatter along this sub-path.
     #[inline]
@@ -41,12 +41,12 @@ impl<D: Densities> Tip<D> {
         &self,
         plan: &MisPlan,
         walk: Walk,
-        site: MergeSite,
+        kind: MergeKind,
         opposite: f64,
         rho_opposite: f64,
     ) -> End<D> {
         End {
-            merges: merges(plan, walk, site, self.distance_factor, opposite),
+            merges: merges(plan, walk, kind, self.distance_factor, opposite),
             before: self.before(plan, rho_opposite),
         }
     }
@@ -70,10 +70,10 @@ impl<D: Densities> End<D> {
 
 /// The merges at a vertex, from the distance factors of `walk` and of the opposite one.
 #[inline]
-fn merges<D: Densities>(plan: &MisPlan, walk: Walk, site: MergeSite, own: f64, opposite: f64) -> D {
+fn merges<D: Densities>(plan: &MisPlan, walk: Walk, kind: MergeKind, own: f64, opposite: f64) -> D {
     match walk {
-        Walk::Light => plan.merge_sum(site, own, opposite),
-        Walk::Camera => plan.merge_sum(site, opposite, own),
+        Walk::Light => plan.merge_sum(kind, own, opposite),
+        Walk::Camera => plan.merge_sum(kind, opposite, own),
     }
 }
 
@@ -81,7 +81,7 @@ fn merges<D: Densities>(plan: &MisPlan, walk: Walk, site: MergeSite, own: f64, o
 ///
 /// Kept as it is with photon and query beams, whose vertices appear anywhere along them (section 4.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pending<D = f64> {
+pub struct EdgeMis<D = f64> {
     /// `B_i`, as the heuristic takes it.
     pub before: D,
     /// Own scattering density towards the next vertex: sr⁻¹, a probability for a Dirac lobe, per area for
@@ -90,7 +90,7 @@ pub struct Pending<D = f64> {
     /// The cosine factor of the outgoing direction; 1 in media and at points.
     pub cos_out: f64,
     /// The merges that the vertex takes part in.
-    pub site: MergeSite,
+    pub kind: MergeKind,
     /// The distance factor of the edge that arrived at it.
     pub distance_factor: f64,
     /// Whether the vertex can be connected to the next one.
@@ -99,7 +99,7 @@ pub struct Pending<D = f64> {
     pub in_medium: bool,
 }
 
-impl<D: Densities> Pending<D> {
+impl<D: Densities> EdgeMis<D> {
     /// The light end of a light sub-path (section 4.2). `hit` is the count of emission hits, 0 if the emitter
     /// cannot be hit; `pdf_position` and `pdf_direction` are `L_0` and `ρL_0`.
     #[must_use]
@@ -115,7 +115,7 @@ impl<D: Densities> Pending<D> {
             before: D::of(Technique::Hit, plan.pow(hit / pdf_position)),
             rho: pdf_direction,
             cos_out,
-            site: MergeSite::None,
+            kind: MergeKind::None,
             distance_factor: 0.0,
             connectible: true,
             in_medium: false,
@@ -129,25 +129,25 @@ impl<D: Densities> Pending<D> {
             before: D::ZERO,
             rho: pdf,
             cos_out: 1.0,
-            site: MergeSite::None,
+            kind: MergeKind::None,
             distance_factor: 0.0,
             connectible: true,
             in_medium: false,
         }
     }
 
-    /// One step (section 4.3): the tip of the next vertex. `connections` is the number of samples that
+    /// One step (section 4.3): the arrival at the next vertex. `connections` is the number of samples that
     /// connect the two vertices, as the heuristic takes it: of connections in general, of next events (times
     /// `p_nee/L_0`) on a light sub-path's first edge or at a camera sub-path's vertex on a light, of light
     /// tracing on a camera sub-path's first edge; 0 if the new vertex cannot be connected.
     #[inline]
     #[must_use]
-    pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: D) -> Tip<D> {
+    pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: D) -> VertexMis<D> {
         let inverse = 1.0 / (self.rho * edge.cos_in * edge.forward);
         let below = if edge.backward > 0.0 {
             let opposite =
                 plan.distance_factor(walk.other(), self.in_medium, edge.pass_probability, edge.backward);
-            let merges: D = merges(plan, walk, self.site, self.distance_factor, opposite);
+            let merges: D = merges(plan, walk, self.kind, self.distance_factor, opposite);
             (merges + self.before) * plan.pow(inverse * self.cos_out * edge.backward)
         } else {
             D::ZERO
@@ -159,7 +159,7 @@ impl<D: Densities> Pending<D> {
         };
         let distance_factor =
             plan.distance_factor(walk, edge.ends_in_medium, edge.pass_probability, edge.forward);
-        Tip { connect, below, distance_factor }
+        VertexMis { connect, below, distance_factor }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::counts::MisPlan;
 use super::densities::{Densities, Weight};
-use super::recursion::{End, Tip};
+use super::recursion::{End, VertexMis};
 use crate::technique::Technique;
 
 impl<D: Densities> Weight<D> {
@@ -59,21 +59,21 @@ impl MisPlan {
         Weight { own, all: here + camera.sum(self, pdf_position / pdf * camera_density) }
     }
 
-    /// A camera sub-path hit an emitter: `connect` and `below` are the tip on arrival at the light, with next
+    /// A camera sub-path hit an emitter: `connect` and `below` are those on arrival at the light, with next
     /// events as connections; `pdf_incident` is `p_nee`, the others `L_0` and `ρL_0`.
     #[inline]
     #[must_use]
     pub fn hit_weight<D: Densities>(
         &self,
-        tip: &Tip<D>,
+        vertex: &VertexMis<D>,
         pdf_incident: f64,
         pdf_position: f64,
         pdf_direction: f64,
     ) -> Weight<D> {
         let own = self.pow(self.hit);
         let all = D::of(Technique::Hit, own)
-            + tip.connect * self.pow(pdf_incident)
-            + tip.below * self.pow(pdf_position * pdf_direction);
+            + vertex.connect * self.pow(pdf_incident)
+            + vertex.below * self.pow(pdf_position * pdf_direction);
         Weight { own, all }
     }
 }

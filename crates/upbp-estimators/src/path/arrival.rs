@@ -4,9 +4,9 @@ use glam::Vec3;
 use upbp_media::EdgeDensity;
 
 use super::context::Context;
-use super::edge::Passage;
-use super::interaction::{Scattered, Sides, Site};
-use crate::mis::{Densities, MergeSite, Pending, Tip};
+use super::edge::EdgeTrace;
+use super::interaction::{MediumInterface, Scattered, Site};
+use crate::mis::{Densities, EdgeMis, MergeKind, VertexMis};
 use crate::scene::Scene;
 
 /// The end of an edge.
@@ -16,7 +16,7 @@ pub(crate) struct Arrived<B> {
     pub(crate) density: EdgeDensity,
     pub(crate) site: Site<B>,
     /// The bodies around it.
-    pub(crate) sides: Sides,
+    pub(crate) sides: MediumInterface,
 }
 
 #[expect(
@@ -35,35 +35,35 @@ pub(crate) enum Arrival<B> {
     Lost,
 }
 
-pub(crate) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival<S::Bsdf> {
-    if passage.is_lost() {
+pub(crate) fn arrive<S: Scene>(scene: &S, edge_trace: &EdgeTrace<S::Bsdf>) -> Arrival<S::Bsdf> {
+    if edge_trace.is_lost() {
         return Arrival::Lost;
     }
-    if let Some((i, t)) = passage.stop {
-        let span = &passage.spans[i];
+    if let Some((i, t)) = edge_trace.stop {
+        let span = &edge_trace.spans[i];
         let Some(medium) = span.medium else { return Arrival::Lost };
-        let position = passage.origin + t * passage.direction;
+        let position = edge_trace.origin + t * edge_trace.direction;
         if !(t >= span.start && position.is_finite()) {
             return Arrival::Lost;
         }
         return Arrival::Vertex(Arrived {
             position,
             distance: t,
-            density: passage.density_to(scene, span, t),
+            density: edge_trace.density_to(scene, span, t),
             site: Site::Medium(medium),
-            sides: Sides::around(passage.stack_in(span, t)),
+            sides: MediumInterface::around(edge_trace.stack_in(span, t)),
         });
     }
-    let stack = passage.stack_at_end();
-    let Some(hit) = &passage.hit else {
+    let stack = edge_trace.stack_at_end();
+    let Some(hit) = &edge_trace.hit else {
         return if stack.is_empty() { Arrival::Escaped } else { Arrival::Lost };
     };
     let Some(bsdf) = hit.bsdf else { return Arrival::Lost };
-    match Site::at_hit(hit, bsdf, passage.direction, stack) {
+    match Site::at_hit(hit, bsdf, edge_trace.direction, stack) {
         Some((site, sides)) => Arrival::Vertex(Arrived {
             position: hit.position,
             distance: hit.t,
-            density: passage.density(scene),
+            density: edge_trace.density(scene),
             site,
             sides,
         }),
@@ -72,19 +72,19 @@ pub(crate) fn arrive<S: Scene>(scene: &S, passage: &Passage<S::Bsdf>) -> Arrival
 }
 
 /// Densities for the weights of the next vertex, of a vertex that has scattered.
-pub(crate) fn pend<S: Scene, D: Densities>(
+pub(crate) fn scatter<S: Scene, D: Densities>(
     context: &Context<'_, S>,
-    tip: &Tip<D>,
+    mis: &VertexMis<D>,
     site: &Site<S::Bsdf>,
     scattered: &Scattered,
-) -> Pending<D> {
-    let smooth = if scattered.delta { Tip { connect: D::ZERO, ..*tip } } else { *tip };
-    Pending {
+) -> EdgeMis<D> {
+    let smooth = if scattered.delta { VertexMis { connect: D::ZERO, ..*mis } } else { *mis };
+    EdgeMis {
         before: smooth.before(&context.plan.mis, scattered.rho_opposite),
         rho: scattered.rho_own,
         cos_out: scattered.cos,
-        site: if scattered.delta { MergeSite::None } else { site.merge_site(scattered.sin_theta) },
-        distance_factor: tip.distance_factor,
+        kind: if scattered.delta { MergeKind::None } else { site.merge_kind(scattered.sin_theta) },
+        distance_factor: mis.distance_factor,
         connectible: !scattered.delta,
         in_medium: site.in_medium(),
     }

@@ -1,6 +1,6 @@
 //! Context and buffers of a walk.
 
-use super::edge::Passage;
+use super::edge::EdgeTrace;
 use crate::iteration::Plan;
 use crate::prepared::World;
 use crate::scene::{Crossing, Scene};
@@ -23,12 +23,12 @@ impl<S: Scene> Copy for Context<'_, S> {}
 
 /// Buffers of one thread, kept from path to path.
 pub struct Scratch<B> {
-    pub(crate) passage: Passage<B>,
+    pub(crate) edge_trace: EdgeTrace<B>,
     pub(crate) crossings: Vec<Crossing>,
 }
 
 impl<B: Copy> Default for Scratch<B> {
     fn default() -> Self {
-        Self { passage: Passage::new(), crossings: Vec::new() }
+        Self { edge_trace: EdgeTrace::new(), crossings: Vec::new() }
     }
 }

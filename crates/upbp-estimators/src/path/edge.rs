@@ -26,7 +26,7 @@ pub enum Extent {
 
 /// A stretch of an edge inside one medium.
 #[derive(Clone, Copy, Debug)]
-pub struct Span {
+pub struct MediumSpan {
     /// Distance along the ray where it begins, scene units.
     pub start: f32,
     /// Distance along the ray where it ends; may be infinite.
@@ -41,14 +41,14 @@ pub struct Span {
 
 /// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a
 /// medium.
-pub struct Passage<B> {
+pub struct EdgeTrace<B> {
     /// Start of the ray.
     pub origin: Vec3,
     /// Its direction.
     pub direction: Vec3,
     /// Stretches in order, adjoining, from 0 to the surface. With [`Extent::ToStop`] the one in which the
     /// walk stops is the last, and its end means nothing.
-    pub spans: Vec<Span>,
+    pub spans: Vec<MediumSpan>,
     /// Stop of the walk in a medium: index of the stretch and distance along the ray.
     pub stop: Option<(usize, f32)>,
     /// The surface; with [`Extent::ToStop`] only if the walk gets there.
@@ -130,7 +130,7 @@ pub(crate) fn is_hidden(stack: &MediumStack, interior: &Interior, entering: bool
     }
 }
 
-impl<B: Copy> Passage<B> {
+impl<B: Copy> EdgeTrace<B> {
     /// An empty one; [`trace`](Self::trace) fills it, again and again without allocation.
     #[must_use]
     pub fn new() -> Self {
@@ -216,7 +216,7 @@ impl<B: Copy> Passage<B> {
         self.end.clone_from(&self.start);
         let mut flight = Flight { extent, decision: None, max_distance: f32::INFINITY, stop: f32::INFINITY };
         let medium = medium_of(scene, &self.start);
-        let mut span = Span { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
+        let mut span = MediumSpan { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
         for i in 1..=corrections {
             if self.cross(scene, &mut span, &mut flight, i, stream) {
@@ -286,7 +286,13 @@ impl<B: Copy> Passage<B> {
     }
 
     /// Begins `span`: draws the distance in its medium.
-    fn enter<S: Scene<Bsdf = B>>(&self, scene: &S, span: &Span, flight: &mut Flight, stream: &mut Stream) {
+    fn enter<S: Scene<Bsdf = B>>(
+        &self,
+        scene: &S,
+        span: &MediumSpan,
+        flight: &mut Flight,
+        stream: &mut Stream,
+    ) {
         flight.max_distance = f32::INFINITY;
         if self.stop.is_some() || span.start == f32::NEG_INFINITY {
             return;
@@ -308,7 +314,13 @@ impl<B: Copy> Passage<B> {
 
     /// Ends `span` at `end`, a boundary, a surface or infinity, and decides whether the walk stops inside;
     /// whether that is all.
-    fn close<S: Scene<Bsdf = B>>(&mut self, scene: &S, span: &mut Span, flight: &Flight, end: f32) -> bool {
+    fn close<S: Scene<Bsdf = B>>(
+        &mut self,
+        scene: &S,
+        span: &mut MediumSpan,
+        flight: &Flight,
+        end: f32,
+    ) -> bool {
         span.end = end;
         if !(end > span.start || self.spans.is_empty()) {
             return false;
@@ -335,7 +347,7 @@ impl<B: Copy> Passage<B> {
     fn cross<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
-        span: &mut Span,
+        span: &mut MediumSpan,
         flight: &mut Flight,
         crossings: usize,
         stream: &mut Stream,
@@ -368,7 +380,7 @@ impl<B: Copy> Passage<B> {
 
     /// Densities of the edge from its start to `t` in `span`.
     #[inline]
-    pub fn density_to<S: Scene>(&self, scene: &S, span: &Span, t: f32) -> EdgeDensity {
+    pub fn density_to<S: Scene>(&self, scene: &S, span: &MediumSpan, t: f32) -> EdgeDensity {
         let mut density = span.before;
         match span.medium {
             Some(medium) => density.push(&scene.media()[medium.0 as usize].segment(&self.segment(span, t))),
@@ -389,7 +401,7 @@ impl<B: Copy> Passage<B> {
     }
 
     /// The spans that a beam along the edge runs through, each with the distance where the beam ends in it.
-    pub fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&Span, f32)> {
+    pub fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&MediumSpan, f32)> {
         let stop = match extent {
             BeamExtent::Short => self.stop,
             BeamExtent::Long => None,
@@ -408,7 +420,7 @@ impl<B: Copy> Passage<B> {
         plan: &Plan,
         depth: u32,
         technique: Technique,
-    ) -> impl Iterator<Item = (&Span, MediumId, Ray)> {
+    ) -> impl Iterator<Item = (&MediumSpan, MediumId, Ray)> {
         // The photon's side has at least one edge.
         let completes = depth < plan.lengths.max;
         let spans = completes.then(|| self.beam_spans(plan.mis.query_beams)).into_iter().flatten();
@@ -422,7 +434,7 @@ impl<B: Copy> Passage<B> {
     /// The part of `span` before `t`.
     #[inline]
     #[must_use]
-    pub fn segment(&self, span: &Span, t: f32) -> RaySegment {
+    pub fn segment(&self, span: &MediumSpan, t: f32) -> RaySegment {
         RaySegment { origin: self.origin, direction: self.direction, start: span.start, end: t }
     }
 
@@ -430,7 +442,7 @@ impl<B: Copy> Passage<B> {
     ///
     /// A span may hold crossings of its own: boundaries hidden in a stronger body, which change no medium.
     #[must_use]
-    pub fn stack_in(&self, span: &Span, t: f32) -> MediumStack {
+    pub fn stack_in(&self, span: &MediumSpan, t: f32) -> MediumStack {
         let mut stack = self.start.clone();
         for (i, crossing) in self.crossings.iter().enumerate() {
             if i >= span.crossings && crossing.t > t {
@@ -448,7 +460,7 @@ impl<B: Copy> Passage<B> {
     }
 }
 
-impl<B: Copy> Default for Passage<B> {
+impl<B: Copy> Default for EdgeTrace<B> {
     fn default() -> Self {
         Self::new()
     }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use upbp_media::{Interior, Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
 
-use crate::mis::MergeSite;
+use crate::mis::MergeKind;
 use crate::random::Stream;
 use crate::roulette::{Roulette, Survival};
 use crate::scene::{Bsdf, Hit, Interface, Scene, Walk};
@@ -15,14 +15,14 @@ pub(crate) const MIN_COSINE: f32 = 1e-6;
 #[derive(Clone, Copy, Debug)]
 pub enum Site<B> {
     /// On a surface.
-    Surface(SurfaceSite<B>),
+    Surface(SurfaceInteraction<B>),
     /// In a medium.
     Medium(MediumId),
 }
 
 /// A point of a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfaceSite<B> {
+pub struct SurfaceInteraction<B> {
     /// Scattering of the surface.
     pub bsdf: B,
     /// Geometric normal, out of a closed body.
@@ -35,14 +35,14 @@ pub struct SurfaceSite<B> {
 
 /// The bodies on the two sides of a vertex.
 #[derive(Clone, Debug)]
-pub struct Sides {
+pub struct MediumInterface {
     /// Bodies on the side that the walk comes from.
     near: MediumStack,
     /// The body whose surface the vertex is on, and whether the walk would enter it.
     boundary: Option<(Interior, bool)>,
 }
 
-impl Sides {
+impl MediumInterface {
     /// Bodies around a vertex in a medium, the same on all sides.
     #[must_use]
     pub const fn around(stack: MediumStack) -> Self {
@@ -110,18 +110,25 @@ fn sine(a: Vec3, b: Vec3) -> f64 {
 impl<B: Bsdf> Site<B> {
     /// The surface of a hit; `before` are the bodies on the side that the ray comes from. `None` if the
     /// surface is grazed.
-    pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, before: &MediumStack) -> Option<(Self, Sides)> {
+    pub fn at_hit(
+        hit: &Hit<B>,
+        bsdf: B,
+        direction: Vec3,
+        before: &MediumStack,
+    ) -> Option<(Self, MediumInterface)> {
         let cos = direction.dot(hit.geometric_normal);
         if cos.abs() < MIN_COSINE {
             return None;
         }
         let entering = cos < 0.0;
-        let sides =
-            Sides { near: before.clone(), boundary: hit.interior.map(|interior| (interior, entering)) };
+        let sides = MediumInterface {
+            near: before.clone(),
+            boundary: hit.interior.map(|interior| (interior, entering)),
+        };
         let near = before.ior();
         let far = if sides.boundary.is_some() { sides.towards(true).ior() } else { near };
         let (above, below) = if entering { (near, far) } else { (far, near) };
-        let site = SurfaceSite {
+        let site = SurfaceInteraction {
             bsdf,
             geometric_normal: hit.geometric_normal,
             shading_normal: hit.shading_normal,
@@ -167,10 +174,10 @@ impl<B: Bsdf> Site<B> {
 
     /// The merges that a path with this pair of lines takes part in.
     #[inline]
-    pub const fn merge_site(&self, sin_theta: f64) -> MergeSite {
+    pub const fn merge_kind(&self, sin_theta: f64) -> MergeKind {
         match self {
-            Self::Surface(_) => MergeSite::Surface,
-            Self::Medium(medium) => MergeSite::Medium { medium: *medium, sin_theta },
+            Self::Surface(_) => MergeKind::Surface,
+            Self::Medium(medium) => MergeKind::Medium { medium: *medium, sin_theta },
         }
     }
 
@@ -248,7 +255,7 @@ fn continuation<M: Medium>(medium: &M, position: Vec3, roulette: Roulette) -> f3
     if roulette.is_on() { medium.continuation(position) } else { 1.0 }
 }
 
-impl<B: Bsdf> SurfaceSite<B> {
+impl<B: Bsdf> SurfaceInteraction<B> {
     /// The basis in which the BSDF is asked: columns are the two tangents and the shading normal.
     fn local(&self, direction: Vec3) -> Vec3 {
         let (s, t) = orthonormal_basis(self.shading_normal);

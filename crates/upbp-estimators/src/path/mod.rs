@@ -7,11 +7,11 @@ mod interaction;
 mod vertex;
 mod visibility;
 
-pub(crate) use arrival::{Arrival, Arrived, arrive, pend};
+pub(crate) use arrival::{Arrival, Arrived, arrive, scatter};
 pub use context::{Context, Scratch};
-pub use edge::{Extent, Passage, Span};
+pub use edge::{EdgeTrace, Extent, MediumSpan};
 pub(crate) use interaction::MIN_COSINE;
-pub use interaction::{Evaluation, Scattered, Sides, Site, SurfaceSite};
+pub use interaction::{Evaluation, MediumInterface, Scattered, Site, SurfaceInteraction};
 pub(crate) use vertex::{CameraEdge, CameraVertex};
 pub use vertex::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
 pub(crate) use visibility::ray_origin;

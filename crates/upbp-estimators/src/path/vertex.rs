@@ -6,10 +6,10 @@ use upbp_accel::Segment;
 use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
 use super::context::Context;
-use super::edge::{Passage, Span};
+use super::edge::{EdgeTrace, MediumSpan};
 use super::interaction::{Evaluation, Site};
 use crate::counters::Counters;
-use crate::mis::{BeamExtent, Densities, Edge, Pending, Tip};
+use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, VertexMis};
 use crate::scene::{Bsdf, Emitter, EmitterId, EmitterPoint, Scene, Walk};
 use crate::technique::Technique;
 
@@ -23,7 +23,7 @@ pub struct LightVertex<B, D = f64> {
     /// Flux over density on arrival, before scattering (`docs/theory.md`, section 1.5).
     pub throughput: Spectrum,
     /// Densities for the weights.
-    pub tip: Tip<D>,
+    pub mis: VertexMis<D>,
     /// Edges from the light.
     pub depth: u32,
     /// Index of the sub-path.
@@ -101,7 +101,7 @@ pub struct PhotonBeam<D = f64> {
     /// Densities of the edge up to the segment's start.
     pub before: EdgeDensity,
     /// Densities for the weights, at the edge's first vertex.
-    pub pending: Pending<D>,
+    pub mis: EdgeMis<D>,
     /// The start of the edge.
     pub source: EdgeSource,
     /// Flux over density at the edge's first vertex, after scattering.
@@ -126,7 +126,7 @@ impl<D: Densities> PhotonBeam<D> {
         let segment = RaySegment { origin, direction, start, end: t };
         let density = self.before.with(&world.scene.media()[self.medium.0 as usize].segment(&segment));
         let distance = if self.from_infinity { f64::INFINITY } else { f64::from(t) };
-        let edge = Edge::new(&density, distance, 1.0, self.pending.in_medium, true);
+        let edge = Edge::new(&density, distance, 1.0, self.mis.in_medium, true);
         if !(edge.forward > 0.0) {
             return None;
         }
@@ -136,7 +136,7 @@ impl<D: Densities> PhotonBeam<D> {
             position,
             towards_light: -direction,
             throughput: self.throughput * transmitted(&density, plan.mis.photon_beams),
-            tip: self.pending.arrive(&plan.mis, Walk::Light, &edge, connections),
+            mis: self.mis.arrive(&plan.mis, Walk::Light, &edge, connections),
             depth: self.depth,
             path: self.path,
             site: Site::Medium(self.medium),
@@ -156,7 +156,7 @@ pub(crate) struct CameraVertex<B, D> {
     pub(crate) towards_camera: Vec3,
     /// Importance over density on arrival, before scattering.
     pub(crate) throughput: Spectrum,
-    pub(crate) tip: Tip<D>,
+    pub(crate) mis: VertexMis<D>,
     /// Edges from the camera.
     pub(crate) depth: u32,
     pub(crate) site: Site<B>,
@@ -180,7 +180,7 @@ pub(crate) struct CameraEdge<D> {
     /// Importance over density at the edge's first vertex, after scattering.
     pub(crate) throughput: Spectrum,
     /// Densities for the weights, at the first vertex.
-    pub(crate) pending: Pending<D>,
+    pub(crate) mis: EdgeMis<D>,
     /// Samples that connect the first vertex to one on this edge, as the heuristic takes them.
     pub(crate) connections: D,
     /// Edges from the camera to a vertex on this edge.
@@ -192,18 +192,18 @@ impl<D: Densities> CameraEdge<D> {
     pub(crate) fn vertex_at<S: Scene>(
         &self,
         context: &Context<'_, S>,
-        passage: &Passage<S::Bsdf>,
-        (span, medium): (&Span, MediumId),
+        edge_trace: &EdgeTrace<S::Bsdf>,
+        (span, medium): (&MediumSpan, MediumId),
         t: f32,
     ) -> Option<CameraVertex<S::Bsdf, D>> {
         let Context { world, plan } = *context;
-        let density = passage.density_to(world.scene, span, t);
-        let edge = Edge::new(&density, f64::from(t), 1.0, self.pending.in_medium, true);
+        let density = edge_trace.density_to(world.scene, span, t);
+        let edge = Edge::new(&density, f64::from(t), 1.0, self.mis.in_medium, true);
         (edge.forward > 0.0).then(|| CameraVertex {
-            position: passage.origin + passage.direction * t,
-            towards_camera: -passage.direction,
+            position: edge_trace.origin + edge_trace.direction * t,
+            towards_camera: -edge_trace.direction,
             throughput: self.throughput * transmitted(&density, plan.mis.query_beams),
-            tip: self.pending.arrive(&plan.mis, Walk::Camera, &edge, self.connections),
+            mis: self.mis.arrive(&plan.mis, Walk::Camera, &edge, self.connections),
             depth: self.depth,
             site: Site::Medium(medium),
         })

@@ -4,7 +4,7 @@ use super::merge::merge;
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::Observer;
-use crate::path::{CameraEdge, Context, Passage};
+use crate::path::{CameraEdge, Context, EdgeTrace};
 use crate::scene::Scene;
 use crate::technique::Technique;
 
@@ -12,20 +12,20 @@ use crate::technique::Technique;
 pub(crate) fn bb1d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
-    passage: &Passage<S::Bsdf>,
+    edge_trace: &EdgeTrace<S::Bsdf>,
     edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
     let kernel = &plan.kernels.bb1d;
-    for (span, medium, ray) in passage.query_beams(plan, edge.depth, Technique::Bb1d) {
+    for (span, medium, ray) in edge_trace.query_beams(plan, edge.depth, Technique::Bb1d) {
         out.observer.turns_to(Some(Technique::Bb1d));
         map.beam_tree.around_ray(&ray, kernel.radius(), |index, approach| {
             let beam = &map.beams[index as usize];
             if beam.medium == medium
                 && plan.lengths.contain(edge.depth + beam.depth)
                 && let Some(light) = beam.vertex_at(context, approach.t_segment)
-                && let Some(vertex) = edge.vertex_at(context, passage, (span, medium), approach.t_ray)
+                && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), approach.t_ray)
             {
                 let kernel = kernel.value(approach.distance * approach.distance) / approach.sin_theta;
                 merge(context, Technique::Bb1d, &light, &vertex, kernel, out);

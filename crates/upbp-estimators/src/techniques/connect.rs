@@ -6,7 +6,9 @@
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::{Joint, ObservedSample, Observer};
-use crate::path::{CameraVertex, Context, LightVertex, Sides, Site, Target, clear_edge, ray_origin};
+use crate::path::{
+    CameraVertex, Context, LightVertex, MediumInterface, Site, Target, clear_edge, ray_origin,
+};
 use crate::random::Stream;
 use crate::scene::{Crossing, Scene, Walk};
 use crate::technique::Technique;
@@ -16,7 +18,7 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
     vertex: &CameraVertex<S::Bsdf, O::Densities>,
-    sides: &Sides,
+    sides: &MediumInterface,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -39,7 +41,7 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &CameraVertex<S::Bsdf, O::Densities>,
-    sides: &Sides,
+    sides: &MediumInterface,
     light: &LightVertex<S::Bsdf, O::Densities>,
     factor: f64,
     crossings: &mut Vec<Crossing>,
@@ -80,17 +82,17 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let light_density = camera_side.rho_own * light_side.cos / distance2 * density.forward(far);
     let camera_density = light_side.rho_own * camera_side.cos / distance2 * density.backward(near);
     let factor_of = |walk, in_medium, t| mis.distance_factor(walk, in_medium, density.pass_probability, t);
-    let camera_end = vertex.tip.end(
+    let camera_end = vertex.mis.end(
         mis,
         Walk::Camera,
-        vertex.site.merge_site(camera_side.sin_theta),
+        vertex.site.merge_kind(camera_side.sin_theta),
         factor_of(Walk::Light, near, density.backward(near)),
         camera_side.rho_opposite,
     );
-    let light_end = light.tip.end(
+    let light_end = light.mis.end(
         mis,
         Walk::Light,
-        light.site.merge_site(light_side.sin_theta),
+        light.site.merge_kind(light_side.sin_theta),
         factor_of(Walk::Camera, far, density.forward(far)),
         light_side.rho_opposite,
     );

@@ -7,7 +7,7 @@ use crate::film_sample::Output;
 use crate::mis::{Densities, Edge, Weight};
 use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
 use crate::path::Context;
-use crate::path::{CameraEdge, Passage};
+use crate::path::{CameraEdge, EdgeTrace};
 use crate::scene::{Emitter, EmitterId, EmitterPoint, Hit, Scene, Walk};
 use crate::technique::Technique;
 
@@ -16,7 +16,7 @@ use crate::technique::Technique;
 /// No other technique starts a path in a medium, so the weight is one.
 pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    passage: &Passage<S::Bsdf>,
+    edge_trace: &EdgeTrace<S::Bsdf>,
     edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
@@ -24,11 +24,11 @@ pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     if plan.mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
         return;
     }
-    for span in &passage.spans {
+    for span in &edge_trace.spans {
         let Some(medium) = span.medium else { continue };
         let medium = &world.scene.media()[medium.0 as usize];
         if medium.emits() {
-            let emitted = medium.emitted(&passage.segment(span, span.end));
+            let emitted = medium.emitted(&edge_trace.segment(span, span.end));
             let value = edge.throughput * span.before.transmittance * emitted;
             let weight = Weight::<O::Densities>::alone(Technique::Hit);
             out.record(&ObservedSample {
@@ -63,7 +63,7 @@ pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 /// The camera sub-path has left the scene.
 pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    passage: &Passage<S::Bsdf>,
+    edge_trace: &EdgeTrace<S::Bsdf>,
     edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
@@ -71,16 +71,26 @@ pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     if world.environments().is_empty() {
         return;
     }
-    let density = passage.density(world.scene);
+    let density = edge_trace.density(world.scene);
     let throughput = edge.throughput * density.transmittance / density.pass_probability as f32;
     if throughput.is_black() || !throughput.is_finite() {
         return;
     }
-    let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.pending.in_medium, false);
-    let away = world.bounds.centre + passage.direction * (2.0 * world.bounds.radius);
-    let point = EmitterPoint { position: away, normal: -passage.direction };
+    let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.mis.in_medium, false);
+    let away = world.bounds.centre + edge_trace.direction * (2.0 * world.bounds.radius);
+    let point = EmitterPoint { position: away, normal: -edge_trace.direction };
     for &emitter in world.environments() {
-        shine(context, emitter, &point, -passage.direction, passage.origin, &mis_edge, throughput, edge, out);
+        shine(
+            context,
+            emitter,
+            &point,
+            -edge_trace.direction,
+            edge_trace.origin,
+            &mis_edge,
+            throughput,
+            edge,
+            out,
+        );
     }
 }
 
@@ -109,14 +119,10 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         Weight::alone(Technique::Hit)
     } else {
         // On arrival at a light the vertex before is connected by next event estimation.
-        let tip = edge.pending.arrive(
-            mis,
-            Walk::Camera,
-            mis_edge,
-            O::Densities::of(Technique::Nee, mis.pow(mis.nee)),
-        );
+        let vertex_mis =
+            edge.mis.arrive(mis, Walk::Camera, mis_edge, O::Densities::of(Technique::Nee, mis.pow(mis.nee)));
         mis.hit_weight(
-            &tip,
+            &vertex_mis,
             f64::from(world.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
             f64::from(world.emission_probability(emitter)) * f64::from(densities.pdf_position),
             f64::from(densities.pdf_direction),

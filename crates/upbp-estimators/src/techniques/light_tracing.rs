@@ -1,7 +1,7 @@
 //! Light tracing: a light vertex and the lens.
 
 use crate::observer::{Joint, ObservedSample, Observer};
-use crate::path::{Context, LightChunk, LightVertex, Sides, Splat, Target, clear_edge, ray_origin};
+use crate::path::{Context, LightChunk, LightVertex, MediumInterface, Splat, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Camera, Crossing, Scene, Walk};
 use crate::technique::Technique;
@@ -10,7 +10,7 @@ use crate::technique::Technique;
 pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &LightVertex<S::Bsdf, O::Densities>,
-    sides: &Sides,
+    sides: &MediumInterface,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut LightChunk<S::Bsdf, O::Densities>,
@@ -50,8 +50,8 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let mis = &plan.mis;
     let opposite =
         mis.distance_factor(Walk::Camera, in_medium, density.pass_probability, density.backward(in_medium));
-    let site = vertex.site.merge_site(scattering.sin_theta);
-    let end = vertex.tip.end(mis, Walk::Light, site, opposite, scattering.rho_opposite);
+    let site = vertex.site.merge_kind(scattering.sin_theta);
+    let end = vertex.mis.end(mis, Walk::Light, site, opposite, scattering.rho_opposite);
     let weight = mis.light_tracing_weight(end, light_density);
     let value = vertex.throughput
         * scattering.value

@@ -30,13 +30,13 @@ pub(super) fn merge<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             (factor, O::Densities::of(technique, factor))
         }
         Site::Medium(medium) => {
-            let (c_light, c_camera) = (light.tip.distance_factor, camera.tip.distance_factor);
+            let (c_light, c_camera) = (light.mis.distance_factor, camera.mis.distance_factor);
             let factors = mis.volume_factors(medium, c_light, c_camera, scattering.sin_theta);
             (factors.of(technique), factors.sum())
         }
     };
-    let before_light = light.tip.before(mis, scattering.rho_own);
-    let before_camera = camera.tip.before(mis, scattering.rho_opposite);
+    let before_light = light.mis.before(mis, scattering.rho_own);
+    let before_camera = camera.mis.before(mis, scattering.rho_opposite);
     let per_photon = kernel * plan.per_photon(technique);
     out.record(&ObservedSample {
         technique,

@@ -2,7 +2,7 @@
 
 use crate::film_sample::Output;
 use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
-use crate::path::{CameraVertex, Context, MIN_COSINE, Sides, Target, clear_edge, ray_origin};
+use crate::path::{CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
@@ -11,7 +11,7 @@ use crate::technique::Technique;
 pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &CameraVertex<S::Bsdf, O::Densities>,
-    sides: &Sides,
+    sides: &MediumInterface,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -30,7 +30,7 @@ pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &CameraVertex<S::Bsdf, O::Densities>,
-    sides: &Sides,
+    sides: &MediumInterface,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -80,8 +80,8 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         f64::from(incident.pdf_direction) * scattering.cos / distance2 * density.backward(in_medium);
     let opposite =
         mis.distance_factor(Walk::Light, in_medium, density.pass_probability, density.backward(in_medium));
-    let site = vertex.site.merge_site(scattering.sin_theta);
-    let end = vertex.tip.end(mis, Walk::Camera, site, opposite, scattering.rho_opposite);
+    let site = vertex.site.merge_kind(scattering.sin_theta);
+    let end = vertex.mis.end(mis, Walk::Camera, site, opposite, scattering.rho_opposite);
     let weight = mis.nee_weight(pdf, pdf_position, hit_density, end, camera_density);
     let value = vertex.throughput
         * scattering.value

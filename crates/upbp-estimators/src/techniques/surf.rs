@@ -4,7 +4,7 @@ use super::merge::merge;
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::Observer;
-use crate::path::{CameraVertex, Context, LightVertex, Site, SurfaceSite};
+use crate::path::{CameraVertex, Context, LightVertex, Site, SurfaceInteraction};
 use crate::scene::Scene;
 use crate::technique::Technique;
 
@@ -20,7 +20,7 @@ pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities>,
     vertex: &CameraVertex<S::Bsdf, O::Densities>,
-    surface: &SurfaceSite<S::Bsdf>,
+    surface: &SurfaceInteraction<S::Bsdf>,
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
@@ -43,7 +43,7 @@ pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 /// Keeps light from leaking around edges and through thin walls. What it cuts off the kernel vanishes with
 /// the radius.
 fn lies_on<B, D>(
-    surface: &SurfaceSite<B>,
+    surface: &SurfaceInteraction<B>,
     vertex: &CameraVertex<B, D>,
     photon: &LightVertex<B, D>,
     radius: f32,

@@ -6,10 +6,10 @@ use upbp_media::Spectrum;
 use crate::counters::Counters;
 use crate::film_sample::{CameraWalk, Output};
 use crate::light_map::LightMap;
-use crate::mis::{Densities, Edge, Pending};
+use crate::mis::{Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, CameraEdge, CameraVertex, Context, Extent, Scratch, Site, arrive, pend, ray_origin,
+    Arrival, CameraEdge, CameraVertex, Context, Extent, Scratch, Site, arrive, ray_origin, scatter,
 };
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
@@ -51,7 +51,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let mut direction = ray.direction;
     let mut edge = CameraEdge {
         throughput: Spectrum::ONE,
-        pending: Pending::at_camera(f64::from(ray.pdf)),
+        mis: EdgeMis::at_camera(f64::from(ray.pdf)),
         connections: O::Densities::of(Technique::LightTracing, plan.mis.pow(plan.mis.light_tracing)),
         depth: 1,
     };
@@ -60,17 +60,17 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
         edge.depth = depth;
-        scratch.passage.trace(scene, origin, direction, &stack, 0.0, extent, &mut stream);
-        out.counters.boundary_conflicts += scratch.passage.take_conflicts();
-        let passage = &scratch.passage;
-        techniques::emission_along(context, passage, &edge, &mut out);
-        techniques::pb2d(context, map, passage, &edge, &mut out);
-        techniques::bb1d(context, map, passage, &edge, &mut out);
+        scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, &mut stream);
+        out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
+        let edge_trace = &scratch.edge_trace;
+        techniques::emission_along(context, edge_trace, &edge, &mut out);
+        techniques::pb2d(context, map, edge_trace, &edge, &mut out);
+        techniques::bb1d(context, map, edge_trace, &edge, &mut out);
 
-        let arrived = match arrive(scene, passage) {
+        let arrived = match arrive(scene, edge_trace) {
             Arrival::Vertex(arrived) => arrived,
             Arrival::Escaped => {
-                techniques::environment(context, passage, &edge, &mut out);
+                techniques::environment(context, edge_trace, &edge, &mut out);
                 break;
             }
             Arrival::Absorbed => break,
@@ -90,10 +90,10 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             &arrived.density,
             f64::from(arrived.distance),
             arrived.site.cosine(from),
-            edge.pending.in_medium,
+            edge.mis.in_medium,
             in_medium,
         );
-        if !in_medium && let Some(hit) = &passage.hit {
+        if !in_medium && let Some(hit) = &edge_trace.hit {
             techniques::emitter_hit(context, hit, direction, origin, &mis_edge, throughput, &edge, &mut out);
         }
         if depth == plan.lengths.max {
@@ -101,7 +101,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             break;
         }
         let (connectible, sides) = (arrived.site.is_connectible(), &arrived.sides);
-        let tip = edge.pending.arrive(
+        let mis = edge.mis.arrive(
             &plan.mis,
             Walk::Camera,
             &mis_edge,
@@ -111,7 +111,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             position: arrived.position,
             towards_camera: from,
             throughput,
-            tip,
+            mis,
             depth,
             site: arrived.site,
         };
@@ -149,7 +149,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         stack = sides.towards(scattered.transmitted);
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
-            pending: pend(context, &vertex.tip, &vertex.site, &scattered),
+            mis: scatter(context, &vertex.mis, &vertex.site, &scattered),
             connections: plan.mis.connections(),
             depth,
         };

@@ -5,11 +5,11 @@ use upbp_accel::{Segment, offset_origin};
 use upbp_media::{Medium, MediumId, MediumStack, Spectrum};
 
 use crate::counters::Counters;
-use crate::mis::{BeamExtent, Densities, Edge, Pending};
+use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, Context, EdgeSource, Extent, LightChunk, LightVertex, MIN_COSINE, Passage, PhotonBeam,
-    Scratch, Span, arrive, pend, ray_origin,
+    Arrival, Arrived, Context, EdgeSource, EdgeTrace, Extent, LightChunk, LightVertex, MIN_COSINE,
+    MediumSpan, PhotonBeam, Scratch, arrive, ray_origin, scatter,
 };
 use crate::prepared::World;
 use crate::random::{Stream, StreamKind};
@@ -23,7 +23,7 @@ struct Flight<D> {
     origin: Vec3,
     direction: Vec3,
     stack: MediumStack,
-    pending: Pending<D>,
+    mis: EdgeMis<D>,
     source: EdgeSource,
     throughput: Spectrum,
     infinite: bool,
@@ -51,15 +51,15 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     // The shortest completion adds one edge, by light tracing or a merge on the camera's first edge.
     for depth in 1..plan.lengths.max {
         out.counters.light_edges += 1;
-        let passage = &mut scratch.passage;
+        let edge_trace = &mut scratch.edge_trace;
         let start = if flight.infinite { f32::NEG_INFINITY } else { 0.0 };
-        passage.trace(scene, flight.origin, flight.direction, &flight.stack, start, extent, &mut stream);
-        out.counters.boundary_conflicts += passage.take_conflicts();
+        edge_trace.trace(scene, flight.origin, flight.direction, &flight.stack, start, extent, &mut stream);
+        out.counters.boundary_conflicts += edge_trace.take_conflicts();
         if leaves_beams {
-            store_beams(context, passage, &flight, depth, index, out);
+            store_beams(context, edge_trace, &flight, depth, index, out);
         }
 
-        let arrival = match arrive(scene, passage) {
+        let arrival = match arrive(scene, edge_trace) {
             Arrival::Vertex(arrival) => arrival,
             Arrival::Escaped | Arrival::Absorbed => return,
             Arrival::Lost => {
@@ -80,7 +80,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             &density,
             if flight.infinite { f64::INFINITY } else { f64::from(distance) },
             site.cosine(from),
-            flight.pending.in_medium,
+            flight.mis.in_medium,
             in_medium,
         );
         let connections = if connectible {
@@ -88,8 +88,8 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         } else {
             O::Densities::ZERO
         };
-        let tip = flight.pending.arrive(&plan.mis, Walk::Light, &edge, connections);
-        let vertex = LightVertex { position, towards_light: from, throughput, tip, depth, path: index, site };
+        let mis = flight.mis.arrive(&plan.mis, Walk::Light, &edge, connections);
+        let vertex = LightVertex { position, towards_light: from, throughput, mis, depth, path: index, site };
         if connectible {
             if plan.mis.light_tracing > 0.0 && plan.lengths.contain(depth + 1) {
                 observer.turns_to(Some(Technique::LightTracing));
@@ -114,7 +114,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             origin: ray_origin(&site, position, scattered.direction),
             direction: scattered.direction,
             stack: sides.towards(scattered.transmitted),
-            pending: pend(context, &tip, &site, &scattered),
+            mis: scatter(context, &mis, &site, &scattered),
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,
             infinite: false,
@@ -174,7 +174,7 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         origin,
         direction: emission.direction,
         stack,
-        pending: Pending::at_light(
+        mis: EdgeMis::at_light(
             &context.plan.mis,
             kind.is_hittable(),
             f64::from(cos),
@@ -189,26 +189,31 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 
 fn store_beams<S: Scene, D: Densities>(
     context: &Context<'_, S>,
-    passage: &Passage<S::Bsdf>,
+    edge_trace: &EdgeTrace<S::Bsdf>,
     flight: &Flight<D>,
     depth: u32,
     path: u32,
     out: &mut LightChunk<S::Bsdf, D>,
 ) {
     let Context { world, plan } = *context;
-    for (span, end) in passage.beam_spans(plan.mis.photon_beams) {
+    for (span, end) in edge_trace.beam_spans(plan.mis.photon_beams) {
         let Some(medium) = span.medium else { continue };
         let merges = plan.mis.merges_in(medium);
         if !(merges.bb1d > 0.0 || merges.bp2d > 0.0) {
             continue;
         }
-        let Some(end) = beam_end(world, passage, span, medium, end) else { continue };
+        let Some(end) = beam_end(world, edge_trace, span, medium, end) else { continue };
         out.counters.photon_beams += 1;
         out.beams.push(PhotonBeam {
-            segment: Segment { origin: passage.origin, direction: passage.direction, start: span.start, end },
+            segment: Segment {
+                origin: edge_trace.origin,
+                direction: edge_trace.direction,
+                start: span.start,
+                end,
+            },
             medium,
             before: span.before,
-            pending: flight.pending,
+            mis: flight.mis,
             source: flight.source,
             throughput: flight.throughput,
             from_infinity: flight.infinite,
@@ -231,8 +236,8 @@ const NEGLIGIBLE: f32 = 1e-7;
 /// left before the scene.
 fn beam_end<S: Scene>(
     world: &World<'_, S>,
-    passage: &Passage<S::Bsdf>,
-    span: &Span,
+    edge_trace: &EdgeTrace<S::Bsdf>,
+    span: &MediumSpan,
     medium: MediumId,
     end: f32,
 ) -> Option<f32> {
@@ -240,7 +245,7 @@ fn beam_end<S: Scene>(
         return (end > span.start && span.start.is_finite()).then_some(end);
     }
     let medium = &world.scene.media()[medium.0 as usize];
-    let transmittance = |end| medium.segment(&passage.segment(span, end)).transmittance;
+    let transmittance = |end| medium.segment(&edge_trace.segment(span, end)).transmittance;
     let left = transmittance(f32::INFINITY);
     let ends = std::iter::successors(Some(world.bounds.radius), |length| Some(2.0 * length))
         .map(|length| (span.start + length).min(f32::MAX));

@@ -2,7 +2,7 @@
 //! Jacobian of refraction by finite differences.
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
-use upbp_estimators::path::{Scattered, Site, SurfaceSite};
+use upbp_estimators::path::{Scattered, Site, SurfaceInteraction};
 use upbp_estimators::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
     EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
@@ -156,7 +156,7 @@ fn transmitted(site: &Site<Glass>, walk: Walk, from: Vec3) -> Option<Scattered> 
 /// Compares all incident directions under one pair of normals; returns how many were refracted.
 fn compare(geometric_normal: Vec3, shading_normal: Vec3) -> u32 {
     let interface = Interface { above: 1.1, below: 1.6 };
-    let site = Site::Surface(SurfaceSite { bsdf: Glass, geometric_normal, shading_normal, interface });
+    let site = Site::Surface(SurfaceInteraction { bsdf: Glass, geometric_normal, shading_normal, interface });
     let mut refracted = 0;
     for i in 0..200_u32 {
         // A spiral over the sphere.

@@ -2,7 +2,9 @@
 
 use upbp_estimators::Technique;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
-use upbp_estimators::mis::{Densities, Edge, End, MergeSite, MisPlan, Pending, Tip, VolumeMerges, Weight};
+use upbp_estimators::mis::{
+    Densities, Edge, EdgeMis, End, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
+};
 use upbp_estimators::scene::Walk;
 
 /// Weights by the recursion, with exactly the calls that the walks make.
@@ -10,10 +12,10 @@ pub(crate) struct Recursion<'a, D> {
     plan: &'a MisPlan,
     path: &'a Path,
     /// By vertex; those that a walk does not arrive at stay empty.
-    pub(crate) light: Vec<Tip<D>>,
-    pub(crate) camera: Vec<Tip<D>>,
+    pub(crate) light: Vec<VertexMis<D>>,
+    pub(crate) camera: Vec<VertexMis<D>>,
     /// On arrival of the camera walk at the light, with next events as connections.
-    pub(crate) at_light: Tip<D>,
+    pub(crate) at_light: VertexMis<D>,
 }
 
 pub(crate) fn is_ok(vertex: &PathVertex) -> bool {
@@ -24,11 +26,11 @@ fn in_medium(vertex: &PathVertex) -> bool {
     matches!(vertex.kind, VertexKind::Medium(_))
 }
 
-fn site(vertex: &PathVertex) -> MergeSite {
+fn kind(vertex: &PathVertex) -> MergeKind {
     match vertex.kind {
-        VertexKind::Surface => MergeSite::Surface,
-        VertexKind::Medium(medium) => MergeSite::Medium { medium, sin_theta: vertex.sin_theta },
-        VertexKind::End | VertexKind::Delta => MergeSite::None,
+        VertexKind::Surface => MergeKind::Surface,
+        VertexKind::Medium(medium) => MergeKind::Medium { medium, sin_theta: vertex.sin_theta },
+        VertexKind::End | VertexKind::Delta => MergeKind::None,
     }
 }
 
@@ -37,21 +39,21 @@ fn distance_squared(edge: &PathEdge) -> f64 {
 }
 
 /// What a vertex passes on after it has scattered.
-fn pend<D: Densities>(
+fn scatter<D: Densities>(
     plan: &MisPlan,
     vertex: &PathVertex,
-    tip: &Tip<D>,
+    vertex_mis: &VertexMis<D>,
     rho: f64,
     rho_opposite: f64,
     cos_out: f64,
-) -> Pending<D> {
-    let tip = if is_ok(vertex) { *tip } else { Tip { connect: D::ZERO, ..*tip } };
-    Pending {
-        before: tip.before(plan, rho_opposite),
+) -> EdgeMis<D> {
+    let vertex_mis = if is_ok(vertex) { *vertex_mis } else { VertexMis { connect: D::ZERO, ..*vertex_mis } };
+    EdgeMis {
+        before: vertex_mis.before(plan, rho_opposite),
         rho,
         cos_out,
-        site: site(vertex),
-        distance_factor: tip.distance_factor,
+        kind: kind(vertex),
+        distance_factor: vertex_mis.distance_factor,
         connectible: is_ok(vertex),
         in_medium: in_medium(vertex),
     }
@@ -60,10 +62,10 @@ fn pend<D: Densities>(
 impl<'a, D: Densities> Recursion<'a, D> {
     pub(crate) fn new(plan: &'a MisPlan, path: &'a Path) -> Self {
         let (k, v) = (path.length(), &path.vertices);
-        let nowhere = Tip { connect: D::ZERO, below: D::ZERO, distance_factor: 0.0 };
+        let nowhere = VertexMis { connect: D::ZERO, below: D::ZERO, distance_factor: 0.0 };
         let mut light = vec![nowhere; k + 1];
-        let mut pending =
-            Pending::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
+        let mut edge_mis =
+            EdgeMis::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
         for i in 1..k {
             let e = &path.edges[i - 1];
             let edge = Edge {
@@ -81,12 +83,12 @@ impl<'a, D: Densities> Recursion<'a, D> {
             } else {
                 plan.connections()
             };
-            light[i] = pending.arrive(plan, Walk::Light, &edge, connections);
-            pending = pend(plan, &v[i], &light[i], v[i].rho_light, v[i].rho_camera, v[i].cos_camera);
+            light[i] = edge_mis.arrive(plan, Walk::Light, &edge, connections);
+            edge_mis = scatter(plan, &v[i], &light[i], v[i].rho_light, v[i].rho_camera, v[i].cos_camera);
         }
         let mut camera = vec![nowhere; k + 1];
         let mut at_light = nowhere;
-        let mut pending = Pending::at_camera(v[k].rho_camera);
+        let mut edge_mis = EdgeMis::at_camera(v[k].rho_camera);
         for i in (0..k).rev() {
             let e = &path.edges[i];
             let edge = Edge {
@@ -99,7 +101,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
             };
             if i == 0 {
                 let next_events = D::of(Technique::Nee, plan.pow(plan.nee));
-                at_light = pending.arrive(plan, Walk::Camera, &edge, next_events);
+                at_light = edge_mis.arrive(plan, Walk::Camera, &edge, next_events);
                 break;
             }
             let connections = if !is_ok(&v[i]) {
@@ -109,8 +111,8 @@ impl<'a, D: Densities> Recursion<'a, D> {
             } else {
                 plan.connections()
             };
-            camera[i] = pending.arrive(plan, Walk::Camera, &edge, connections);
-            pending = pend(plan, &v[i], &camera[i], v[i].rho_camera, v[i].rho_light, v[i].cos_light);
+            camera[i] = edge_mis.arrive(plan, Walk::Camera, &edge, connections);
+            edge_mis = scatter(plan, &v[i], &camera[i], v[i].rho_camera, v[i].rho_light, v[i].cos_light);
         }
         Self { plan, path, light, camera, at_light }
     }
@@ -120,7 +122,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i]);
         let opposite =
             self.plan.distance_factor(Walk::Camera, in_medium(vertex), edge.pass_probability, edge.t_camera);
-        self.light[i].end(self.plan, Walk::Light, site(vertex), opposite, vertex.rho_camera)
+        self.light[i].end(self.plan, Walk::Light, kind(vertex), opposite, vertex.rho_camera)
     }
 
     /// The end of the camera sub-path at vertex `i`, with the edge that the light's side would arrive by.
@@ -128,7 +130,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i - 1]);
         let opposite =
             self.plan.distance_factor(Walk::Light, in_medium(vertex), edge.pass_probability, edge.t_light);
-        self.camera[i].end(self.plan, Walk::Camera, site(vertex), opposite, vertex.rho_light)
+        self.camera[i].end(self.plan, Walk::Camera, kind(vertex), opposite, vertex.rho_light)
     }
 
     /// `L_i`, given that vertex `i − 1` scatters towards it.
