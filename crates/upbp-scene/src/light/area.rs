@@ -12,7 +12,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::geometry::direction_and_distance;
+use super::finite::direction_and_distance;
 use crate::sampling;
 
 /// Nearer to the centre of a sphere than this many radii (squared), the cone of directions is too close to a

@@ -8,7 +8,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::geometry::{beyond, disc_area, start_on_disc};
+use super::infinite::{Parallel, disc_area};
 use crate::sampling;
 
 /// A constant environment.
@@ -20,6 +20,13 @@ pub struct ConstantEnvironment {
 
 /// Density of a uniform direction, sr⁻¹.
 const PDF_UNIFORM: f32 = 0.25 * FRAC_1_PI;
+
+impl ConstantEnvironment {
+    /// The light that goes in a direction.
+    fn along(&self, direction: Vec3) -> Parallel {
+        Parallel { direction, radiance: self.radiance, pdf: PDF_UNIFORM }
+    }
+}
 
 impl Emitter for ConstantEnvironment {
     fn kind(&self) -> EmitterKind {
@@ -33,39 +40,23 @@ impl Emitter for ConstantEnvironment {
     fn sample_emission(
         &self,
         bounds: &BoundingSphere,
-        u_position: [f32; 2],
+        u: [f32; 2],
         u_direction: [f32; 2],
     ) -> Option<Emission> {
-        let direction = sampling::sphere(u_direction);
-        let position = start_on_disc(bounds, direction, u_position);
-        Some(Emission {
-            point: EmitterPoint { position, normal: direction },
-            direction,
-            radiance: self.radiance,
-            pdf_position: PDF_UNIFORM,
-            pdf_direction: 1.0 / disc_area(bounds),
-        })
+        Some(self.along(sampling::sphere(u_direction)).emission(bounds, u))
     }
 
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
-        let towards_light = sampling::sphere(u);
-        Some(Incident {
-            point: beyond(bounds, receiver, towards_light),
-            towards_light,
-            distance: f32::INFINITY,
-            radiance: self.radiance,
-            pdf: PDF_UNIFORM,
-            pdf_position: PDF_UNIFORM,
-            pdf_direction: 1.0 / disc_area(bounds),
-        })
+        Some(self.along(-sampling::sphere(u)).incident(bounds, receiver))
     }
 
-    fn hit(&self, bounds: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> {
-        Some(HitDensities {
-            radiance: self.radiance,
-            pdf_incident: PDF_UNIFORM,
-            pdf_position: PDF_UNIFORM,
-            pdf_direction: 1.0 / disc_area(bounds),
-        })
+    fn hit(
+        &self,
+        bounds: &BoundingSphere,
+        _: &EmitterPoint,
+        direction: Vec3,
+        _: Vec3,
+    ) -> Option<HitDensities> {
+        Some(self.along(direction).hit(bounds))
     }
 }

@@ -6,7 +6,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::geometry::{beyond, disc_area, start_on_disc};
+use super::infinite::{Parallel, disc_area};
 
 /// A directional light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +15,12 @@ pub struct DirectionalLight {
     pub direction: Vec3,
     /// Irradiance on a plane perpendicular to the direction, W m⁻².
     pub irradiance: Spectrum,
+}
+
+impl DirectionalLight {
+    fn parallel(&self) -> Parallel {
+        Parallel { direction: self.direction, radiance: self.irradiance, pdf: 1.0 }
+    }
 }
 
 impl Emitter for DirectionalLight {
@@ -26,33 +32,12 @@ impl Emitter for DirectionalLight {
         disc_area(bounds) * self.irradiance.mean()
     }
 
-    fn sample_emission(
-        &self,
-        bounds: &BoundingSphere,
-        u_position: [f32; 2],
-        _: [f32; 2],
-    ) -> Option<Emission> {
-        let position = start_on_disc(bounds, self.direction, u_position);
-        Some(Emission {
-            point: EmitterPoint { position, normal: self.direction },
-            direction: self.direction,
-            radiance: self.irradiance,
-            pdf_position: 1.0,
-            pdf_direction: 1.0 / disc_area(bounds),
-        })
+    fn sample_emission(&self, bounds: &BoundingSphere, u: [f32; 2], _: [f32; 2]) -> Option<Emission> {
+        Some(self.parallel().emission(bounds, u))
     }
 
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, _: [f32; 2]) -> Option<Incident> {
-        let towards_light = -self.direction;
-        Some(Incident {
-            point: beyond(bounds, receiver, towards_light),
-            towards_light,
-            distance: f32::INFINITY,
-            radiance: self.irradiance,
-            pdf: 1.0,
-            pdf_position: 1.0,
-            pdf_direction: 1.0 / disc_area(bounds),
-        })
+        Some(self.parallel().incident(bounds, receiver))
     }
 
     fn hit(&self, _: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> {

@@ -17,7 +17,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::geometry::{beyond, disc_area, start_on_disc};
+use super::infinite::{Parallel, disc_area};
 use crate::description::Fnv1a;
 
 /// The most pixels that an environment may have: 16384 × 8192.
@@ -259,10 +259,15 @@ impl ImageEnvironment {
     }
 
     /// Draws a direction; none in the rare case that rounding moves it into a black pixel.
-    fn sample(&self, u: [f32; 2]) -> Option<(Vec3, Spectrum, f32)> {
-        let towards_light = self.rotation.apply(self.image.sample(u)).normalize();
-        let (radiance, pdf) = self.radiance_and_pdf(towards_light);
-        (pdf > 0.0).then_some((towards_light, radiance, pdf))
+    fn sample(&self, u: [f32; 2]) -> Option<Parallel> {
+        let light = self.along(-self.rotation.apply(self.image.sample(u)).normalize());
+        (light.pdf > 0.0).then_some(light)
+    }
+
+    /// The light that goes in a direction.
+    fn along(&self, direction: Vec3) -> Parallel {
+        let (radiance, pdf) = self.radiance_and_pdf(-direction);
+        Parallel { direction, radiance, pdf }
     }
 }
 
@@ -279,32 +284,14 @@ impl Emitter for ImageEnvironment {
     fn sample_emission(
         &self,
         bounds: &BoundingSphere,
-        u_position: [f32; 2],
+        u: [f32; 2],
         u_direction: [f32; 2],
     ) -> Option<Emission> {
-        let (towards_light, radiance, pdf_position) = self.sample(u_direction)?;
-        let direction = -towards_light;
-        let position = start_on_disc(bounds, direction, u_position);
-        Some(Emission {
-            point: EmitterPoint { position, normal: direction },
-            direction,
-            radiance,
-            pdf_position,
-            pdf_direction: 1.0 / disc_area(bounds),
-        })
+        Some(self.sample(u_direction)?.emission(bounds, u))
     }
 
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
-        let (towards_light, radiance, pdf) = self.sample(u)?;
-        Some(Incident {
-            point: beyond(bounds, receiver, towards_light),
-            towards_light,
-            distance: f32::INFINITY,
-            radiance,
-            pdf,
-            pdf_position: pdf,
-            pdf_direction: 1.0 / disc_area(bounds),
-        })
+        Some(self.sample(u)?.incident(bounds, receiver))
     }
 
     fn hit(
@@ -314,12 +301,6 @@ impl Emitter for ImageEnvironment {
         direction: Vec3,
         _: Vec3,
     ) -> Option<HitDensities> {
-        let (radiance, pdf) = self.radiance_and_pdf(-direction);
-        Some(HitDensities {
-            radiance,
-            pdf_incident: pdf,
-            pdf_position: pdf,
-            pdf_direction: 1.0 / disc_area(bounds),
-        })
+        Some(self.along(direction).hit(bounds))
     }
 }

@@ -6,8 +6,9 @@
 mod area;
 mod constant;
 mod directional;
-mod geometry;
+mod finite;
 mod image;
+mod infinite;
 mod point;
 mod spot;
 

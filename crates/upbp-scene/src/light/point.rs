@@ -8,7 +8,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::geometry::direction_and_distance;
+use super::finite::direction_and_distance;
 use crate::sampling;
 
 /// An isotropic point light.

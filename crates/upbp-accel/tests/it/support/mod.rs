@@ -19,6 +19,7 @@ impl Random {
     }
 
     /// Uniform in `[0, 1)²`.
+    #[cfg(feature = "geometry")]
     pub(crate) fn square(&mut self) -> [f32; 2] {
         [self.unit(), self.unit()]
     }

@@ -1,0 +1,75 @@
+//! Light from infinitely far away, as it arrives along one direction.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use upbp_estimators::scene::{BoundingSphere, Emission, EmitterPoint, HitDensities, Incident};
+use upbp_media::{Spectrum, orthonormal_basis};
+
+use crate::sampling;
+
+/// Light that arrives along one direction from infinitely far away.
+pub(super) struct Parallel {
+    /// Direction of propagation, a unit vector.
+    pub(super) direction: Vec3,
+    /// Radiance in W m⁻² sr⁻¹, or irradiance in W m⁻² of light with a single direction.
+    pub(super) radiance: Spectrum,
+    /// Density of the direction, sr⁻¹, or the probability 1 of a single one.
+    pub(super) pdf: f32,
+}
+
+impl Parallel {
+    pub(super) fn emission(&self, bounds: &BoundingSphere, u: [f32; 2]) -> Emission {
+        let position = start_on_disc(bounds, self.direction, u);
+        Emission {
+            point: EmitterPoint { position, normal: self.direction },
+            direction: self.direction,
+            radiance: self.radiance,
+            pdf_position: self.pdf,
+            pdf_direction: 1.0 / disc_area(bounds),
+        }
+    }
+
+    pub(super) fn incident(&self, bounds: &BoundingSphere, receiver: Vec3) -> Incident {
+        let towards_light = -self.direction;
+        Incident {
+            point: beyond(bounds, receiver, towards_light),
+            towards_light,
+            distance: f32::INFINITY,
+            radiance: self.radiance,
+            pdf: self.pdf,
+            pdf_position: self.pdf,
+            pdf_direction: 1.0 / disc_area(bounds),
+        }
+    }
+
+    pub(super) fn hit(&self, bounds: &BoundingSphere) -> HitDensities {
+        HitDensities {
+            radiance: self.radiance,
+            pdf_incident: self.pdf,
+            pdf_position: self.pdf,
+            pdf_direction: 1.0 / disc_area(bounds),
+        }
+    }
+}
+
+/// Area of the disc that parallel light starts from, square scene units.
+pub(super) fn disc_area(bounds: &BoundingSphere) -> f32 {
+    PI * bounds.radius * bounds.radius
+}
+
+/// Draws the start of a ray in `direction`, uniformly over a disc in front of the scene that is as wide as
+/// its bounds.
+fn start_on_disc(bounds: &BoundingSphere, direction: Vec3, u: [f32; 2]) -> Vec3 {
+    let across = sampling::disc(u) * bounds.radius;
+    let (tangent, bitangent) = orthonormal_basis(direction);
+    // Ten per cent outside, so that no rounding puts the start behind a surface on the bounds.
+    let back = direction * (1.1 * bounds.radius);
+    bounds.centre - back + tangent * across.x + bitangent * across.y
+}
+
+/// A point outside of the scene in the direction of an infinite light.
+fn beyond(bounds: &BoundingSphere, receiver: Vec3, towards_light: Vec3) -> EmitterPoint {
+    let distance = 2.0 * bounds.radius + receiver.distance(bounds.centre);
+    EmitterPoint { position: receiver + towards_light * distance, normal: -towards_light }
+}
