@@ -121,7 +121,7 @@ fn series(
         for set in sets {
             let settings = Settings { techniques: set.techniques, seed, ..settings.clone() };
             let renderer = measure::prepare(subject, settings)?;
-            let fixed = (!set.is_auto()).then(|| renderer.census().techniques);
+            let fixed = (!set.is_auto()).then(|| renderer.support().techniques);
             let same = places.iter().find(|(other, _)| fixed.is_some() && *other == fixed);
             let place = same.map_or(renderers.len(), |(_, place)| *place);
             if place == renderers.len() {

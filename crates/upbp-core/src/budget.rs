@@ -1,14 +1,13 @@
-//! How long the preparation of a render may take.
-//!
-//! What is looked at before the first iteration is a sample of the scene, and any size of it will do: so it is made to fit. A small run
-//! tells what a larger one takes.
+//! Cancellation, deadlines, and the part of a render that its preparation may take.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Stops a render from any thread, its preparation included: within the time of a few sub-paths. Of the iteration in hand the sets of
-/// pixels that are done stay on the film.
+use crate::error::RenderError;
+
+/// Stops a render from any thread, its preparation included: within the time of a few sub-paths. Of the
+/// iteration in hand the sets of pixels that are done stay on the film.
 ///
 /// It may be made before the render ([`Start`](crate::Start)); all copies stop the same renders.
 #[derive(Clone, Debug, Default)]
@@ -27,7 +26,7 @@ impl Canceller {
     }
 }
 
-/// When work has to stop: asked between sub-paths.
+/// End of work, asked for between sub-paths.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Halt<'a> {
     pub(crate) canceller: &'a Canceller,
@@ -41,51 +40,114 @@ impl Halt<'_> {
     }
 }
 
-/// A time that preparations may take, and whether they are to end at once.
-#[derive(Clone, Copy, Debug)]
+/// Rules by which a render stops: as soon as any of them holds. Without rules a render goes on until it is
+/// cancelled.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stop {
+    /// Number of iterations on the film.
+    pub iterations: Option<u64>,
+    /// Seconds of rendering, those before a resumption and those of the preparation included: at the end of
+    /// the iteration that comes closest, or in the middle of one that would take longer than a twentieth
+    /// more, or than one second more if that is more.
+    pub seconds: Option<f64>,
+    /// Largest upper end of [`Film::estimated_error`](crate::Film::estimated_error). Asked for after 8, 10,
+    /// 12, 14, 16, 20, 24, 28, 32, 40 iterations and so on: who asks after each stops at the luckiest answer.
+    pub error: Option<f64>,
+}
+
+/// A step of the preparation of a render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preparing {
+    /// Name of the step.
+    pub step: &'static str,
+    /// Part of the steps that are done, in `[0, 1)`.
+    pub fraction: f64,
+}
+
+/// Progress, cancellation and limits of a preparation.
+///
+/// A preparation takes samples of the scene, and any number of samples will do: so they are made to fit.
 pub(crate) struct Budget<'a> {
+    pub(crate) canceller: Canceller,
+    /// The rules by which the render is going to end.
+    pub(crate) stop: Stop,
+    pub(crate) progress: Option<&'a mut (dyn FnMut(Preparing) + Send)>,
+}
+
+/// Part of the render's time that its preparation may take.
+const PREPARATION: f64 = 0.05;
+
+impl Budget<'_> {
+    /// Says what comes next.
+    ///
+    /// # Errors
+    /// [`RenderError::Cancelled`], when it is time to end.
+    pub(crate) fn step(&mut self, step: &'static str, fraction: f64) -> Result<(), RenderError> {
+        if let Some(progress) = &mut self.progress {
+            progress(Preparing { step, fraction });
+        }
+        if self.canceller.is_cancelled() { Err(RenderError::Cancelled) } else { Ok(()) }
+    }
+
+    /// A part of the time for the preparation. Unlimited if the render's time is.
+    pub(crate) fn part(&self, part: f64) -> Allowance<'_> {
+        let seconds = self.stop.seconds.map(|seconds| part * PREPARATION * seconds);
+        Allowance::new(&self.canceller, seconds)
+    }
+}
+
+/// The time that one step of a preparation may take.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Allowance<'a> {
     canceller: &'a Canceller,
+    start: Instant,
     /// None: as long as it takes.
     time: Option<Duration>,
 }
 
-impl<'a> Budget<'a> {
-    pub(crate) fn new(canceller: &'a Canceller, seconds: Option<f64>) -> Self {
+impl<'a> Allowance<'a> {
+    fn new(canceller: &'a Canceller, seconds: Option<f64>) -> Self {
         // What is longer than a clock can tell is no limit.
-        Self { canceller, time: seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()) }
+        let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+        Self { canceller, start: Instant::now(), time }
     }
 
-    /// A part of the time.
-    pub(crate) fn part(&self, part: f64) -> Self {
-        Self { time: self.time.map(|time| time.mul_f64(part)), ..*self }
+    /// Whether there is a limit of time.
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.time.is_some()
     }
 
-    /// The largest run that fits: `run` is given the part of the full work that it is to do, and may end with `None` when it is halted.
-    /// Small runs come first, each of which tells what there is time for. The result of the last one that has ended; `None` if there is
-    /// none, which happens to those who `need` something only if they are cancelled.
+    /// The end of work that takes longer than it was expected to.
+    pub(crate) fn halt(&self) -> Halt<'a> {
+        /// Factor by which work may take longer than there is time for.
+        const PATIENCE: u32 = 2;
+        let deadline = self.time.and_then(|time| self.start.checked_add(PATIENCE * time));
+        Halt { canceller: self.canceller, deadline }
+    }
+
+    /// Whether there is time for work that takes `times` as long as all that was done so far.
+    pub(crate) fn has_time_for(&self, times: f64) -> bool {
+        let spent = self.start.elapsed().as_secs_f64();
+        self.time.is_none_or(|time| (1.0 + times) * spent <= time.as_secs_f64())
+    }
+
+    /// The largest run that there is time for: `run` is given the part of the full work that it is to do, and
+    /// may end with `None` when it is halted. Small runs come first, each of which tells what there is time
+    /// for. The result of the last one that has ended; `None` only if it was cancelled.
     ///
     /// Without a limit it is the full work, at once.
-    pub(crate) fn largest<T>(
-        &self,
-        need: bool,
-        mut run: impl FnMut(f64, &Halt<'_>) -> Option<T>,
-    ) -> Option<T> {
+    pub(crate) fn largest<T>(&self, mut run: impl FnMut(f64, &Halt<'_>) -> Option<T>) -> Option<T> {
         /// The first part.
         const FIRST: f64 = 1.0 / 128.0;
-        /// What takes longer than expected may go on for so many times as long as there was time for.
-        const PATIENCE: u32 = 2;
-        let canceller = self.canceller;
-        let Some(time) = self.time else { return run(1.0, &Halt { canceller, deadline: None }) };
-        let start = Instant::now();
-        let deadline = start.checked_add(PATIENCE * time);
+        let unlimited = Halt { canceller: self.canceller, deadline: None };
+        let Some(time) = self.time else { return run(1.0, &unlimited) };
         let (mut part, mut best) = (FIRST, None);
         loop {
-            let unlimited = need && best.is_none();
-            let halt = Halt { canceller, deadline: if unlimited { None } else { deadline } };
+            let halt = if best.is_none() { unlimited } else { self.halt() };
             let began = Instant::now();
             let Some(result) = run(part, &halt) else { return best };
             best = Some(result);
-            let left = time.saturating_sub(start.elapsed()).as_secs_f64();
+            let left = time.saturating_sub(self.start.elapsed()).as_secs_f64();
             let affordable = part * left / began.elapsed().as_secs_f64().max(1e-9);
             let next = affordable.min(1.0);
             if part >= 1.0 || next < 2.0 * part {
@@ -93,6 +155,23 @@ impl<'a> Budget<'a> {
             }
             part = next;
         }
+    }
+}
+
+/// A stop watch.
+pub(crate) struct Clock(Instant);
+
+impl Clock {
+    pub(crate) fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Time since the last call.
+    pub(crate) fn lap(&mut self) -> Duration {
+        let now = Instant::now();
+        let time = now.duration_since(self.0);
+        self.0 = now;
+        time
     }
 }
 
@@ -104,20 +183,20 @@ mod tests {
     fn without_a_limit_all_is_done_at_once() {
         let mut parts = Vec::new();
         let canceller = Canceller::default();
-        let result = Budget::new(&canceller, None).largest(true, |part, halt| {
+        let result = Allowance::new(&canceller, None).largest(|part, halt| {
             parts.push(part);
             assert!(!halt.now());
             Some(part)
         });
         assert_eq!((result, parts.as_slice()), (Some(1.0), [1.0].as_slice()));
-        assert_eq!(Budget::new(&canceller, Some(f64::INFINITY)).time, None);
+        assert_eq!(Allowance::new(&canceller, Some(f64::INFINITY)).time, None);
     }
 
     #[test]
     fn no_time_is_enough_for_something() {
         let canceller = Canceller::default();
         let mut runs = 0;
-        let result = Budget::new(&canceller, Some(0.0)).largest(true, |part, _| {
+        let result = Allowance::new(&canceller, Some(0.0)).largest(|part, _| {
             runs += 1;
             Some(part)
         });
@@ -127,21 +206,25 @@ mod tests {
     #[test]
     fn what_costs_nothing_is_done_in_full() {
         let canceller = Canceller::default();
-        let result = Budget::new(&canceller, Some(1e9)).largest(true, |part, _| Some(part));
+        let result = Allowance::new(&canceller, Some(1e9)).largest(|part, _| Some(part));
         assert_eq!(result, Some(1.0));
     }
 
     #[test]
-    fn what_is_not_needed_is_left_when_time_is_up() {
+    fn more_is_done_as_long_as_there_is_time() {
         let canceller = Canceller::default();
-        let run = |part, halt: &Halt<'_>| (!halt.now()).then_some(part);
-        assert_eq!(Budget::new(&canceller, Some(0.0)).largest(false, run), None);
+        assert!(Allowance::new(&canceller, None).has_time_for(1e9));
+        assert!(Allowance::new(&canceller, Some(1e9)).has_time_for(2.0));
+        let none = Allowance::new(&canceller, Some(0.0));
+        assert!(none.halt().now() && none.is_limited());
+        std::thread::sleep(Duration::from_millis(1));
+        assert!(!none.has_time_for(0.0));
     }
 
     #[test]
     fn an_end_at_once_leaves_what_there_is() {
         let canceller = Canceller::default();
-        let result = Budget::new(&canceller, Some(1e9)).largest(true, |part, halt| {
+        let result = Allowance::new(&canceller, Some(1e9)).largest(|part, halt| {
             let ended = !halt.now();
             canceller.cancel();
             ended.then_some(part)

@@ -1,4 +1,4 @@
-//! What can go wrong, for people.
+//! Errors, with messages for people.
 
 use std::path::PathBuf;
 
@@ -11,9 +11,9 @@ use upbp_estimators::WorldError;
 pub struct SettingsError {
     /// Name of the setting.
     pub name: &'static str,
-    /// What would have been right.
+    /// The values that are allowed.
     pub expected: &'static str,
-    /// What was there.
+    /// The value that was given.
     pub found: String,
 }
 
@@ -22,27 +22,19 @@ pub struct SettingsError {
 #[non_exhaustive]
 pub enum RenderError {
     /// A plan whose light sub-paths leave more than the memory budget has room for.
-    #[error(
-        "plan, stage from iteration {from}: needs {needed} MiB, the setting `memory` (--memory) allows {budget}"
-    )]
+    #[error("plan: needs {needed} MiB, the setting `memory` (--memory) allows {budget}")]
     PlanMemory {
-        /// The first iteration of the stage.
-        from: u64,
         /// MiB that an iteration needs.
         needed: u64,
         /// MiB that are allowed.
         budget: u64,
     },
     /// A plan that does not go with the scene or the settings.
-    #[error(
-        "plan, stage from iteration {from}: {extra} cannot be used here, expected techniques of {techniques}"
-    )]
+    #[error("plan: {extra} cannot be used here, expected techniques of {techniques}")]
     Plan {
-        /// The first iteration of the stage.
-        from: u64,
         /// The techniques that are ruled out.
         extra: TechniqueSet,
-        /// Those that are not.
+        /// The techniques that are not ruled out.
         techniques: TechniqueSet,
     },
     /// Its canceller was used before there was anything to show.
@@ -53,7 +45,7 @@ pub enum RenderError {
     NoLight {
         /// The techniques that were chosen.
         chosen: TechniqueSet,
-        /// Those that can; none if nothing can be seen in the scene at all.
+        /// The techniques that can; none if nothing can be seen in the scene at all.
         possible: TechniqueSet,
         /// Why not.
         reasons: String,
@@ -74,7 +66,7 @@ pub enum RenderError {
         width: u32,
         /// Height in pixels.
         height: u32,
-        /// What the film takes.
+        /// MiB that the film takes.
         needed: u64,
         /// The setting.
         budget: u64,
@@ -112,13 +104,13 @@ pub enum StateError {
     Damaged {
         /// The part of the file.
         place: String,
-        /// What is wrong there.
+        /// Description of the damage.
         reason: String,
     },
     /// Two states, or a state and a render, are not of the same scene and settings.
     #[error("of another render: {}", list(differences))]
     Different {
-        /// What differs, with both values.
+        /// Names of all differences, with both values.
         differences: Vec<String>,
     },
     /// Iterations would count twice.
@@ -133,7 +125,7 @@ pub enum StateError {
 
 /// The first few, since one cause has many effects.
 fn list(differences: &[String]) -> String {
-    /// How many are shown.
+    /// Differences that are shown.
     const SHOWN: usize = 4;
     let text = differences.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("; ");
     match differences.len().saturating_sub(SHOWN) {
@@ -181,11 +173,11 @@ pub enum OutputError {
     /// Writing a file would destroy another one that is read or written.
     #[error("{role}, {}, and {other_role}, {}, are the same file", path.display(), other_path.display())]
     SameFile {
-        /// What would be written.
+        /// Name of the output that would be written.
         role: String,
-        /// Where.
+        /// Its path.
         path: PathBuf,
-        /// What else the file is.
+        /// Name of the other role of the file.
         other_role: String,
         /// Its name in that role.
         other_path: PathBuf,
@@ -193,11 +185,11 @@ pub enum OutputError {
     /// Something else would be overwritten.
     #[error("{role}: {} is there and is not {expected}; remove it, or choose another name", path.display())]
     Overwrites {
-        /// What would be written.
+        /// Name of the output that would be written.
         role: String,
         /// The file.
         path: PathBuf,
-        /// What may be overwritten.
+        /// Kind of files that may be overwritten.
         expected: String,
     },
 }

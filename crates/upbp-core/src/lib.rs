@@ -17,8 +17,8 @@ pub use glam;
 /// Participating media, phase functions, spectra.
 pub use upbp_media as media;
 
-pub use auto::support::Census;
-pub use budget::Canceller;
+pub use auto::support::TechniqueSupport;
+pub use budget::{Canceller, Preparing, Stop};
 pub use error::{OutputError, RenderError, SettingsError, StateError};
 pub use files::{
     Content, Output, check_outputs, check_writable, open_exr, open_file, read_text, remove_leftovers,
@@ -26,14 +26,14 @@ pub use files::{
 };
 pub use film::{Doubt, ErrorEstimate, ErrorMap, Film, HalfImage, Image, IterationSet, MAX_ITERATIONS, Pixel};
 pub use output::{Metadata, ToneCurve, ToneMapping, read_exr, write_exr, write_image, write_png};
-pub use plan::{RenderPlan, Stage};
+pub use plan::Plan;
 pub use radius::{Radii, Radius, RadiusSchedule};
-pub use render::{Outcome, Preparing, Progress, Renderer, Start, Stop, StopReason};
-pub use report::{ErrorPoint, ErrorSeries, PassSeconds, Report};
+pub use render::{Outcome, Progress, Renderer, Start, StopReason};
+pub use report::Report;
 pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTechniques};
-pub use state::{Identity, State};
+pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic};
 pub use upbp_estimators::{
-    BodyId, Counters, Interior, Layer, MediumId, MediumStack, Ray, Roulette, Spectrum, Technique,
-    TechniqueSet, check, offset_origin, scene,
+    BodyId, Counters, Interior, Layer, LookUps, MediumId, MediumStack, Plan as IterationPlan, Ray, Roulette,
+    Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
 };

@@ -1,43 +1,79 @@
-//! What a render runs: stages, each from some iteration on.
+//! The plan of a render: a decision that is made once, before the first iteration.
 
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use upbp_estimators::{LookUps, Roulette, Technique, TechniqueSet};
 
 use crate::radius::RadiusSchedule;
 
-/// How many samples of a technique a camera vertex may have on average.
+/// Samples of a technique that a camera vertex may have on average.
 pub(crate) const PER_VERTEX: RangeInclusive<f32> = 0.001..=1000.0;
 
-/// What iterations run, from the one with index `from` until the next stage.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Stage {
-    /// Index of the first iteration.
-    pub from: u64,
+/// Techniques, sample counts and radii of all iterations of a render.
+///
+/// What iterations compute depends on it, on the scene, on the settings and on their index, and on nothing
+/// else. So a plan that is written to a file and read on many machines makes their iterations fit together.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self", deny_unknown_fields)]
+pub struct Plan {
     /// The techniques that run.
     pub techniques: TechniqueSet,
     /// Light sub-paths per iteration; 0 if no technique uses any.
     pub light_paths: u32,
-    /// Of them with photon beams.
+    /// Light sub-paths that leave photon beams, at most `light_paths`.
     pub beam_paths: u32,
     /// Light vertices that every camera vertex is connected to, on average.
     pub connections: f32,
     /// Points on lights that every camera vertex is connected to, on average.
     pub next_events: f32,
-    /// When walks end by Russian roulette.
+    /// Russian roulette.
     pub roulette: Roulette,
-    /// In which iterations photons are looked up.
+    /// Periods of photon queries, in iterations.
     pub look_ups: LookUps,
-    /// Connectible vertices per light sub-path, as the pilot found.
+    /// Connectible vertices per light sub-path, by the statistics before the first iteration.
     pub vertices_per_light_path: f64,
     /// First radii and how they shrink.
     pub radii: RadiusSchedule,
 }
 
-impl Stage {
+impl Plan {
+    /// Reads a plan from RON text, as [`to_ron`](Self::to_ron) writes it.
+    ///
+    /// # Errors
+    /// Line, column and reason of what is not understood or cannot be.
+    pub fn from_ron(text: &str) -> Result<Self, ron::error::SpannedError> {
+        ron::from_str(text)
+    }
+
+    /// The plan as RON text, which begins with `Plan(`.
+    #[must_use]
+    pub fn to_ron(&self) -> String {
+        // Numbers and names: there is nothing that RON cannot spell.
+        let fields = ron::ser::to_string_pretty(self, ron::ser::PrettyConfig::default()).unwrap_or_default();
+        format!("Plan{fields}")
+    }
+
+    /// Whether any technique uses light sub-paths.
+    pub(crate) fn uses_light_paths(&self) -> bool {
+        !self.techniques.without(TechniqueSet::PT).is_empty()
+    }
+
+    /// The light sub-paths that the samples of a technique come from.
+    pub(crate) const fn paths_of(&self, technique: Technique) -> u32 {
+        match technique {
+            Technique::Bp2d | Technique::Bb1d => self.beam_paths,
+            _ => self.light_paths,
+        }
+    }
+
+    /// The part of the iterations that make the queries of a technique.
+    pub(crate) fn active_part(&self, technique: Technique) -> f64 {
+        1.0 / f64::from(self.look_ups.period(technique))
+    }
+
     fn validate(&self) -> Result<(), String> {
         let radii = &self.radii;
         let lengths = [radii.surf, radii.pp3d, radii.pb2d, radii.bp2d, radii.bb1d];
@@ -68,9 +104,9 @@ impl Stage {
     }
 }
 
-impl fmt::Display for Stage {
+impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "from iteration {}: {}", self.from, self.techniques)?;
+        write!(f, "{}", self.techniques)?;
         if self.light_paths > 0 {
             write!(f, ", {} light sub-paths", self.light_paths)?;
         }
@@ -94,80 +130,18 @@ impl fmt::Display for Stage {
     }
 }
 
-/// The stages of a render so far. What iterations compute depends on it, on the scene, on the settings and on their index, and
-/// on nothing else: so a plan that is written to a file and read on many machines makes their iterations fit together.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<Stage>", into = "Vec<Stage>")]
-pub struct RenderPlan {
-    /// Not empty; the first is from iteration 0, and they ascend.
-    stages: Vec<Stage>,
-}
-
-impl RenderPlan {
-    /// One stage for all iterations.
-    pub(crate) fn new(mut first: Stage) -> Self {
-        first.from = 0;
-        Self { stages: vec![first] }
-    }
-
-    /// The stages, in order.
-    #[must_use]
-    pub fn stages(&self) -> &[Stage] {
-        &self.stages
-    }
-
-    /// The techniques of all stages.
-    #[must_use]
-    pub fn techniques(&self) -> TechniqueSet {
-        self.stages.iter().flat_map(|stage| stage.techniques.iter()).collect()
-    }
-
-    /// What an iteration runs, as far as it has been decided.
-    #[must_use]
-    pub fn stage(&self, iteration: u64) -> &Stage {
-        &self.stages[self.stages.partition_point(|stage| stage.from <= iteration).max(1) - 1]
-    }
-
-    /// Another stage, which begins after those that there are.
-    pub(crate) fn push(&mut self, stage: Stage) {
-        self.stages.push(stage);
-    }
-
-    /// Reads a plan from RON text, as its display writes it.
-    ///
-    /// # Errors
-    /// Line, column and reason of what is not understood or cannot be.
-    pub fn from_ron(text: &str) -> Result<Self, ron::error::SpannedError> {
-        ron::from_str(text)
+/// Written and read as its fields, and checked when it is read.
+impl Serialize for Plan {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, serializer)
     }
 }
 
-impl fmt::Display for RenderPlan {
-    /// As RON text, which [`from_ron`](RenderPlan::from_ron) reads.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let style = ron::ser::PrettyConfig::default();
-        f.write_str(&ron::ser::to_string_pretty(self, style).map_err(|_| fmt::Error)?)
-    }
-}
-
-impl TryFrom<Vec<Stage>> for RenderPlan {
-    type Error = String;
-
-    fn try_from(stages: Vec<Stage>) -> Result<Self, String> {
-        let starts_at_zero = stages.first().is_some_and(|stage| stage.from == 0);
-        if !starts_at_zero || !stages.is_sorted_by(|a, b| a.from < b.from) {
-            return Err("expected stages with ascending `from`, the first from 0".into());
-        }
-        for (index, stage) in stages.iter().enumerate() {
-            stage.validate().map_err(|reason| format!("stage {index}: {reason}"))?;
-        }
-        Ok(Self { stages })
-    }
-}
-
-impl From<RenderPlan> for Vec<Stage> {
-    fn from(plan: RenderPlan) -> Self {
-        plan.stages
+impl<'de> Deserialize<'de> for Plan {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let plan = Self::deserialize(deserializer)?;
+        plan.validate().map_err(D::Error::custom)?;
+        Ok(plan)
     }
 }
 
@@ -177,9 +151,8 @@ mod tests {
 
     use super::*;
 
-    fn stage(from: u64) -> Stage {
-        Stage {
-            from,
+    fn plan() -> Plan {
+        Plan {
             techniques: TechniqueSet::PT.with(Technique::Surf),
             light_paths: 1000,
             beam_paths: 0,
@@ -202,33 +175,29 @@ mod tests {
 
     #[test]
     fn a_plan_survives_its_spelling() {
-        let mut plan = RenderPlan::new(stage(0));
-        plan.push(stage(512));
-        assert_eq!(RenderPlan::from_ron(&plan.to_string()), Ok(plan.clone()));
-        assert_eq!([0, 511, 512, 9999].map(|i| plan.stage(i).from), [0, 0, 512, 512]);
+        assert_eq!(Plan::from_ron(&plan().to_ron()), Ok(plan()));
         assert_eq!(
-            plan.stages()[1].to_string(),
-            "from iteration 512: hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, surf in one of 4 iterations"
+            plan().to_string(),
+            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, surf in one of 4 iterations"
         );
     }
 
     #[test]
     fn what_cannot_be_is_refused() {
-        let refused = |stages: Vec<Stage>| RenderPlan::try_from(stages).unwrap_err();
-        assert!(refused(vec![]).contains("from 0"));
-        assert!(refused(vec![stage(3)]).contains("from 0"));
-        assert!(refused(vec![stage(0), stage(0)]).contains("ascending"));
-        let wrong = |change: fn(&mut Stage)| {
-            let mut second = stage(7);
-            change(&mut second);
-            refused(vec![stage(0), second])
+        let wrong = |change: fn(&mut Plan)| {
+            let mut plan = plan();
+            change(&mut plan);
+            Plan::from_ron(&plan.to_ron()).unwrap_err().to_string()
         };
-        assert!(wrong(|s| s.roulette = Roulette::Below(0.0)).contains("stage 1: roulette"));
-        assert!(wrong(|s| s.light_paths = 0).contains("light_paths"));
-        assert!(wrong(|s| s.beam_paths = 2000).contains("beam_paths"));
-        assert!(wrong(|s| s.radii.pb2d = f32::NAN).contains("radii"));
-        assert!(wrong(|s| s.techniques = TechniqueSet::EMPTY).contains("techniques"));
-        assert!(wrong(|s| s.next_events = 5000.0).contains("next_events"));
-        assert!(wrong(|s| s.vertices_per_light_path = f64::INFINITY).contains("vertices"));
+        assert!(wrong(|p| p.roulette = Roulette::Below(0.0)).contains("roulette"));
+        assert!(wrong(|p| p.light_paths = 0).contains("light_paths"));
+        assert!(wrong(|p| p.beam_paths = 2000).contains("beam_paths"));
+        assert!(wrong(|p| p.radii.pb2d = f32::NAN).contains("radii"));
+        // This one cannot even be spelled.
+        let without = Plan { techniques: TechniqueSet::EMPTY, ..plan() };
+        assert!(without.validate().unwrap_err().contains("techniques"));
+        assert!(wrong(|p| p.next_events = 5000.0).contains("next_events"));
+        assert!(wrong(|p| p.vertices_per_light_path = f64::INFINITY).contains("vertices"));
+        assert!(Plan::from_ron("(techniques: \"pt\", from: 0)").is_err());
     }
 }

@@ -33,8 +33,8 @@ pub struct Radii {
 
 /// Radii over iterations: `r_i = r_0 (1 + i)^−γ`.
 ///
-/// `γ = 1/(d + 4)` for a kernel of `d` dimensions balances variance and squared bias of what merges alone can find, and
-/// is consistent, since `0 < γ < 1/d` (section 5.1).
+/// `γ = 1/(d + 4)` for a kernel of `d` dimensions balances variance and squared bias of what merges alone can
+/// find, and is consistent, since `0 < γ < 1/d` (section 5.1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RadiusSchedule {
     /// Radius of each technique in iteration 0, scene units; 0 where it is off.
@@ -68,8 +68,7 @@ impl RadiusSchedule {
     }
 
     /// The kernels of an iteration.
-    #[must_use]
-    pub fn kernels(&self, iteration: u64) -> Kernels {
+    pub(crate) fn kernels(&self, iteration: u64) -> Kernels {
         let kernel = |first: f32, dimension: i32, make: fn(f32) -> Kernel| {
             let radius = self.at(first, dimension, iteration);
             if radius > 0.0 { make(radius) } else { Kernel::NONE }

@@ -1,119 +1,22 @@
-//! What a render did, for people and for scripts.
+//! The report of a render, for people and for scripts.
 
 use std::fmt;
-use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use upbp_estimators::{Counters, Technique};
 
-use crate::auto::support::Census;
-use crate::film::ErrorEstimate;
-use crate::film::IterationSet;
-use crate::plan::RenderPlan;
-use crate::state::State;
+use crate::auto::support::TechniqueSupport;
+use crate::film::{ErrorEstimate, IterationSet};
+use crate::plan::Plan;
+use crate::state::{ErrorSeries, PassSeconds, State};
 
-/// Wall seconds of the passes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct PassSeconds {
-    /// The pilot.
-    pub pilot: f64,
-    /// Light sub-paths.
-    pub light: f64,
-    /// Building look-up structures.
-    pub build: f64,
-    /// Camera sub-paths, with all look-ups.
-    pub camera: f64,
-    /// Splats and film.
-    pub film: f64,
-}
-
-impl PassSeconds {
-    /// All passes together.
-    #[must_use]
-    pub fn total(&self) -> f64 {
-        self.pilot + self.light + self.build + self.camera + self.film
-    }
-}
-
-/// Wall time of the passes, in whole nanoseconds: sums do not depend on the order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct PassTimes {
-    pub(crate) pilot: Duration,
-    pub(crate) light: Duration,
-    pub(crate) build: Duration,
-    pub(crate) camera: Duration,
-    pub(crate) film: Duration,
-}
-
-impl PassTimes {
-    pub(crate) fn add(&mut self, other: &Self) {
-        let sum = |a: &mut Duration, b| *a = a.saturating_add(b);
-        sum(&mut self.pilot, other.pilot);
-        sum(&mut self.light, other.light);
-        sum(&mut self.build, other.build);
-        sum(&mut self.camera, other.camera);
-        sum(&mut self.film, other.film);
-    }
-
-    pub(crate) fn seconds(&self) -> PassSeconds {
-        PassSeconds {
-            pilot: self.pilot.as_secs_f64(),
-            light: self.light.as_secs_f64(),
-            build: self.build.as_secs_f64(),
-            camera: self.camera.as_secs_f64(),
-            film: self.film.as_secs_f64(),
-        }
-    }
-}
-
-/// The error at some moment of a render, against a reference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ErrorPoint {
-    /// Seconds of rendering, without evaluation of the error.
-    pub seconds: f64,
-    /// Iterations done.
-    pub iterations: u64,
-    /// Mean of `(x − r)² / (r² + 0.01)`.
-    pub relative_mse: f64,
-    /// Root mean squared difference.
-    pub rmse: f64,
-}
-
-/// Errors over time, of any length of a render in bounded space: every iteration up to the hundredth, then one per hundredth
-/// of the number of iterations, and the latest.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct ErrorSeries(Vec<ErrorPoint>);
-
-impl ErrorSeries {
-    /// Least ratio of the numbers of iterations of two points that are kept.
-    const SPACING: f64 = 1.01;
-
-    /// Adds a point with more iterations than those before.
-    pub fn push(&mut self, point: ErrorPoint) {
-        if let [.., before, last] = self.0.as_mut_slice()
-            && (last.iterations as f64) < Self::SPACING * before.iterations as f64
-        {
-            *last = point;
-        } else {
-            self.0.push(point);
-        }
-    }
-
-    /// The points that were kept.
-    #[must_use]
-    pub fn points(&self) -> &[ErrorPoint] {
-        &self.0
-    }
-}
-
-/// What a render did.
+/// Report of a render.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Version of the renderer.
     pub version: String,
-    /// What the scene can use.
-    pub census: Census,
+    /// Techniques that the scene can use.
+    pub support: TechniqueSupport,
     /// Width and height of the picture.
     pub resolution: [u32; 2],
     /// Seed.
@@ -126,14 +29,10 @@ pub struct Report {
     pub film_fingerprint: String,
     /// Seconds of rendering by pass.
     pub seconds: PassSeconds,
-    /// Whether techniques, if they were chosen, were so by a model of costs; else time was measured.
+    /// Whether limits of time and of the machine's memory had no influence on the plan.
     pub deterministic: bool,
-    /// What iterations ran, from which on.
-    pub plan: RenderPlan,
-    /// Light sub-paths of the iteration with the largest index.
-    pub light_paths: u32,
-    /// Of them with photon beams.
-    pub beam_paths: u32,
+    /// Techniques, sample counts and first radii.
+    pub plan: Plan,
     /// Radii of the iteration with the largest index: `surf`, `pp3d`, `pb2d`, `bp2d`, `bb1d`.
     pub last_radii: [f32; 5],
     /// Counts over all iterations.
@@ -144,22 +43,30 @@ pub struct Report {
     pub map_bytes: u64,
     /// Bytes that the render was expected to need: the film, and an iteration or the writing of an image.
     pub expected_bytes: u64,
-    /// Estimated relMSE of the image, without the bias of kernels and light that no technique finds; `None` before there are two halves.
+    /// Estimated relMSE of the image, without the bias of kernels and light that no technique finds; `None`
+    /// before there are two halves.
     pub estimated_error: Option<ErrorEstimate>,
     /// Error against a reference over time, if there is one.
     pub series: ErrorSeries,
 }
 
+impl State {
+    /// A summary of all that was done so far.
+    #[must_use]
+    pub fn report(&self) -> Report {
+        Report::new(self)
+    }
+}
+
 impl Report {
-    pub(crate) fn new(state: &State) -> Self {
+    fn new(state: &State) -> Self {
         let State { identity, record, film } = state;
         let last = film.iteration_set().last().unwrap_or(0);
-        let stage = identity.plan.stage(last);
-        let radii = stage.radii.kernels(last);
+        let radii = identity.plan.radii.kernels(last);
         let error = film.error_map().map(|map| map.estimate());
         Self {
             version: identity.version.clone(),
-            census: identity.census.clone(),
+            support: identity.support.clone(),
             resolution: [film.rect().width, film.rect().height],
             seed: identity.settings.seed,
             iterations: film.iterations(),
@@ -167,9 +74,7 @@ impl Report {
             film_fingerprint: film.fingerprint(),
             seconds: record.times.seconds(),
             deterministic: identity.settings.deterministic,
-            plan: identity.plan.clone(),
-            light_paths: stage.light_paths,
-            beam_paths: stage.beam_paths,
+            plan: identity.plan,
             last_radii: [
                 radii.surf.radius(),
                 radii.pp3d.radius(),
@@ -190,10 +95,7 @@ impl Report {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [width, height] = self.resolution;
-        writeln!(f, "{}", self.census)?;
-        for stage in self.plan.stages() {
-            writeln!(f, "{stage}")?;
-        }
+        writeln!(f, "{}\nplan: {}", self.support, self.plan)?;
         let s = &self.seconds;
         writeln!(
             f,

@@ -600,26 +600,21 @@ fn cancelled_at_any_ray_it_ends_at_once_and_what_is_done_is_not_lost() {
 }
 
 #[test]
-fn a_choice_that_is_cancelled_is_made_anew() {
-    /// Iterations before the plan is chosen again.
-    const FIRST: u64 = 512;
-    let iterate_to = |renderer: &mut Renderer<'_>, count| {
-        while renderer.film().iterations() < count && renderer.iterate() {}
-    };
+fn a_render_that_is_resumed_does_not_choose_again() {
     let scene = Hostile::new(F::None);
-    let mut whole = begin(&scene).expect("a good scene");
-    iterate_to(&mut whole, FIRST);
-    let before = scene.rays.load(Ordering::Relaxed);
-    iterate_to(&mut whole, FIRST + 1);
-    assert_eq!(whole.report().plan.stages().len(), 2);
+    let mut first = begin(&scene).expect("a good scene");
+    let of_choice = scene.rays.load(Ordering::Relaxed);
+    assert!(first.iterate() && first.iterate());
+    let state = first.state().clone();
 
-    let cancelled = Hostile { end: Some((before + 50, Canceller::default())), ..Hostile::new(F::None) };
-    let mut renderer = begin(&cancelled).expect("a good scene");
-    iterate_to(&mut renderer, FIRST + 1);
-    assert_eq!((renderer.film().iterations(), renderer.report().plan.stages().len()), (FIRST, 1));
-    let mut resumed = begin(&scene).expect("a good scene");
-    resumed.resume(renderer.state().clone()).expect("the same render");
-    iterate_to(&mut resumed, FIRST + 1);
-    assert!(resumed.film() == whole.film());
-    assert_eq!(resumed.report().plan, whole.report().plan);
+    let again = Hostile::new(F::None);
+    let settings = Settings { deterministic: true, max_length: 20, ..Settings::default() };
+    let start = Start { plan: Some(state.identity().plan), ..Start::default() };
+    let mut resumed =
+        Renderer::start(&again, settings.validate().expect("good settings"), start).expect("a good scene");
+    let rays = again.rays.load(Ordering::Relaxed);
+    assert!(2 * rays < of_choice, "{rays} rays, {of_choice} with a choice");
+    resumed.resume(state).expect("the same render");
+    assert!(resumed.iterate() && first.iterate());
+    assert!(resumed.film() == first.film());
 }

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use upbp_core::{LightPaths, Radii, Radius, RenderPlan, Settings, Start, TechniqueSet, Techniques, read_exr};
+use upbp_core::{LightPaths, Plan, Radii, Radius, Settings, Start, Stop, TechniqueSet, Techniques, read_exr};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::{Count, Film};
 use upbp_testing::{Estimate, assert_same, channels, renderer};
@@ -13,7 +13,7 @@ fn settings() -> Settings {
 }
 
 /// By a plan that is given.
-fn by(plan: RenderPlan) -> Start<'static> {
+fn by(plan: Plan) -> Start<'static> {
     Start { plan: Some(plan), ..Start::default() }
 }
 
@@ -40,14 +40,14 @@ const MATT: &str = r#"(
 fn camera_sub_paths_alone_where_they_suffice() {
     let scene = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
     let mut auto = renderer(&scene, settings());
-    let roulette = Some(auto.report().plan.stages()[0].roulette);
+    let roulette = Some(auto.report().plan.roulette);
     let techniques = Techniques::Set(TechniqueSet::PT);
     let mut paths = renderer(&scene, Settings { techniques, roulette, ..settings() });
     for _ in 0..8 {
         assert!(auto.iterate() && paths.iterate());
     }
     let report = auto.report();
-    assert_eq!(report.plan.stages()[0].techniques, TechniqueSet::PT, "{report}");
+    assert_eq!(report.plan.techniques, TechniqueSet::PT, "{report}");
     let counters = report.counters;
     assert_eq!(
         [counters.light_edges, counters.light_vertices, counters.photon_beams, report.map_bytes],
@@ -63,8 +63,8 @@ fn camera_sub_paths_alone_where_they_suffice() {
 fn light_that_only_merges_find_is_not_lost() {
     let scene = shipped("suite/surface_caustic");
     for seed in 0..4 {
-        let stage = renderer(&scene, Settings { seed, ..settings() }).report().plan.stages()[0].clone();
-        assert!(stage.techniques.has(upbp_core::Technique::Surf) && stage.light_paths > 0, "{stage}");
+        let plan = renderer(&scene, Settings { seed, ..settings() }).report().plan;
+        assert!(plan.techniques.has(upbp_core::Technique::Surf) && plan.light_paths > 0, "{plan}");
     }
 }
 
@@ -77,7 +77,7 @@ fn surface_photons_blur_what_a_pixel_blurs() {
         let side = Count::new(side).expect("a positive number");
         let film = Film { width: side, height: side, crop: None };
         let scene = ReadyScene::load_with(&path, |description| description.film = film);
-        renderer(&scene.expect("a valid scene"), settings).report().plan.stages()[0].radii.surf
+        renderer(&scene.expect("a valid scene"), settings).report().plan.radii.surf
     };
     let fixed = || Settings { techniques: "bpt+surf".parse().expect("names"), ..settings() };
     let usual = first(fixed(), 96);
@@ -108,7 +108,7 @@ fn unbiased(name: &str, folder: &str) {
             for _ in 0..ITERATIONS {
                 assert!(renderer.iterate());
             }
-            plans.insert(renderer.report().plan.stages()[0].to_string());
+            plans.insert(renderer.report().plan.to_string());
             renderer.film().image().mean()
         })
         .collect();
@@ -133,10 +133,9 @@ fn no_bias_in_a_forward_scattering_box() {
 fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
     const SEEDS: u64 = 16;
     let scene = shipped("reference/forward_hg_box");
-    let plans: Vec<RenderPlan> = (0..=SEEDS)
-        .map(|seed| renderer(&scene, Settings { seed, ..settings() }).report().plan.clone())
-        .collect();
-    let render = |seed, plan: &RenderPlan| {
+    let plans: Vec<Plan> =
+        (0..=SEEDS).map(|seed| renderer(&scene, Settings { seed, ..settings() }).report().plan).collect();
+    let render = |seed, plan: &Plan| {
         let settings = Settings { seed, ..settings() }.validate().expect("valid settings");
         let mut renderer = scene.start_renderer(settings, by(plan.clone())).expect("a plan of this scene");
         for _ in 0..8 {
@@ -164,7 +163,7 @@ fn a_frozen_plan_makes_the_same_iterations() {
     for _ in 0..4 {
         assert!(first.iterate());
     }
-    let plan = RenderPlan::from_ron(&first.state().identity().plan.to_string()).expect("a plan");
+    let plan = Plan::from_ron(&first.state().identity().plan.to_ron()).expect("a plan");
     let checked = || measured.clone().validate().expect("valid settings");
     let part = |range: std::ops::Range<u64>| {
         let mut renderer = scene.start_renderer(checked(), by(plan.clone())).expect("the plan fits");
@@ -184,29 +183,25 @@ fn a_frozen_plan_makes_the_same_iterations() {
     assert_eq!(resumed.report().plan, plan);
 }
 
-/// Time that was measured may choose otherwise when a render is taken up again: what its state says counts,
-/// whatever that is. The scene has two lights, whose shares depend on whether there are light sub-paths.
+/// A plan that the render would not have chosen is kept when it is resumed, whatever its limits are then. The
+/// scene has two lights, whose shares depend on whether there are light sub-paths.
 #[test]
-fn a_state_is_taken_up_whatever_was_chosen_since() {
+fn a_render_that_is_resumed_keeps_its_plan() {
     let scene = shipped("reference/chromatic_sphere");
     let auto = || Settings::default().validate().expect("valid settings");
     for names in ["hit+nee", "bpt", "bpt+surf+pb2d"] {
         let techniques = names.parse::<TechniqueSet>().expect("names").into();
-        let mut plan = renderer(&scene, Settings { techniques, ..settings() }).report().plan;
-        if names == "hit+nee" {
-            // A later stage has light sub-paths.
-            let bpt = Settings { techniques: TechniqueSet::BPT.into(), ..settings() };
-            let later = renderer(&scene, bpt).report().plan.to_string().replace("from: 0", "from: 3");
-            let both = format!("{}{}", plan.to_string().trim_end_matches(']'), later.trim_start_matches('['));
-            plan = RenderPlan::from_ron(&both).expect("two stages");
-        }
+        let plan = renderer(&scene, Settings { techniques, ..settings() }).report().plan;
         let run = |iterations| {
-            let mut renderer = scene.start_renderer(auto(), by(plan.clone())).expect("a plan for it");
+            let mut renderer = scene.start_renderer(auto(), by(plan)).expect("a plan for it");
             (0..iterations).for_each(|_| assert!(renderer.iterate()));
             renderer
         };
-        let mut resumed = scene.renderer(auto()).expect("a valid render");
-        resumed.resume(run(2).state().clone()).expect("the same render");
+        let state = run(2).state().clone();
+        let stop = Stop { iterations: Some(5), ..Stop::default() };
+        let start = Start { stop, ..by(state.identity().plan) };
+        let mut resumed = scene.start_renderer(auto(), start).expect("a valid render");
+        resumed.resume(state).expect("the same render");
         (0..3).for_each(|_| assert!(resumed.iterate()));
         assert_eq!(resumed.film().fingerprint(), run(5).film().fingerprint(), "{names}");
     }
@@ -221,10 +216,10 @@ fn a_plan_that_does_not_fit_is_refused() {
         let settings = Settings { memory: Some(2048), ..settings() };
         settings.validate().expect("valid settings")
     };
-    let greedy = plan.to_string().replace("light_paths: 4096,", "light_paths: 4000000000,");
-    let greedy = RenderPlan::from_ron(&greedy).expect("a plan");
+    let greedy = plan.to_ron().replace("light_paths: 4096,", "light_paths: 4000000000,");
+    let greedy = Plan::from_ron(&greedy).expect("a plan");
     let error = fog.start_renderer(checked(), by(greedy)).map(|_| ()).expect_err("too much").to_string();
-    assert!(error.starts_with("plan, stage from iteration 0: needs") && error.contains("2048"), "{error}");
+    assert!(error.starts_with("plan: needs") && error.contains("2048"), "{error}");
     let matt = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
     let error = matt.start_renderer(checked(), by(plan)).map(|_| ()).expect_err("no media here").to_string();
     assert!(error.contains("pb2d") && error.contains("cannot be used"), "{error}");

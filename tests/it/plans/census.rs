@@ -24,7 +24,7 @@ fn census(parts: &str, settings: &Settings) -> Result<String, RenderError> {
     );
     let scene = ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let settings = settings.clone().validate().expect("valid settings");
-    scene.renderer(settings).map(|renderer| renderer.census().to_string())
+    scene.renderer(settings).map(|renderer| renderer.support().to_string())
 }
 
 fn techniques(names: &str) -> Settings {

@@ -97,7 +97,7 @@ fn the_last_iterations_are_as_good_as_the_first() {
         renderer.set_range(MAX_ITERATIONS - 20..u64::MAX);
         while renderer.iterate() {}
         assert_eq!(renderer.film().iterations(), 20, "{what}: the range ends at the last iteration");
-        let plan = renderer.plan(MAX_ITERATIONS - 1);
+        let plan = renderer.iteration_plan(MAX_ITERATIONS - 1);
         let kernels =
             [plan.kernels.surf, plan.kernels.pp3d, plan.kernels.pb2d, plan.kernels.bp2d, plan.kernels.bb1d];
         for kernel in kernels {

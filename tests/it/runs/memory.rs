@@ -51,7 +51,7 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
         };
         // A pilot first: what it leaves with the allocator and the threads does not grow with what is
         // rendered.
-        let paths = vertices / renderer(1000, 100).state().identity().plan.stage(0).vertices_per_light_path;
+        let paths = vertices / renderer(1000, 100).state().identity().plan.vertices_per_light_path;
         let before = status("VmRSS");
         let mut renderer = renderer(paths as u32, memory);
         assert!(renderer.iterate() && renderer.iterate());

@@ -8,8 +8,8 @@ mod progress;
 use std::path::Path;
 
 use upbp_core::{
-    Canceller, CheckedSettings, Image, OutputError, Preparing, RenderError, RenderPlan, Renderer, Start,
-    State, StateError, StopReason, check_outputs, check_writable, read_exr, read_text, remove_leftovers,
+    Canceller, CheckedSettings, Image, OutputError, Plan, Preparing, RenderError, Renderer, Start, State,
+    StateError, Stop, StopReason, check_outputs, check_writable, read_exr, read_text, remove_leftovers,
     write_text,
 };
 use upbp_scene::{ReadyScene, SceneError};
@@ -51,7 +51,7 @@ pub(crate) fn check(options: &Options) -> Result<(), Failure> {
         let canceller = interrupt::install().map_err(Failure::input)?;
         let job = Job::read(options)?;
         let renderer = job.start(options, canceller, &Bar::on_stderr(true))?;
-        say(&format!("{}: no problems; {}", options.scene.display(), renderer.census()))
+        say(&format!("{}: no problems; {}", options.scene.display(), renderer.support()))
     })
 }
 
@@ -66,7 +66,7 @@ struct Job {
     scene: ReadyScene,
     settings: CheckedSettings,
     reference: Option<Image>,
-    plan: Option<RenderPlan>,
+    plan: Option<Plan>,
 }
 
 impl Job {
@@ -87,8 +87,12 @@ impl Job {
     /// Prepares the render, and goes on from its state if there is one.
     fn start(&self, options: &Options, canceller: Canceller, bar: &Bar) -> Result<Renderer<'_>, Failure> {
         let mut show = |now: Preparing| bar.prepare(now.step);
-        let seconds = options.stop().seconds;
-        let start = Start { plan: self.plan.clone(), canceller, seconds, progress: Some(&mut show) };
+        let state = options.saving.state.as_deref();
+        let state = state.map(read_state).transpose().map_err(Failure::input)?.flatten();
+        // A render that goes on does not choose again.
+        let plan = self.plan.or(state.as_ref().map(|state| state.identity().plan));
+        let stop = Stop { iterations: options.range().map(|range| range.end), ..options.stop() };
+        let start = Start { plan, canceller, stop, progress: Some(&mut show) };
         let renderer = self.scene.start_renderer(self.settings.clone(), start);
         let mut renderer = renderer.map_err(|error| match error {
             RenderError::Cancelled => Failure::Interrupted(format!("interrupted: {error}")),
@@ -109,8 +113,9 @@ impl Job {
                 reference.height
             )));
         }
-        if let Some(state) = &options.saving.state {
-            resume(&mut renderer, state).map_err(Failure::input)?;
+        if let (Some(state), Some(path)) = (state, &options.saving.state) {
+            let resumed = renderer.resume(state);
+            resumed.map_err(|source| Failure::input(OutputError::State { path: path.clone(), source }))?;
         }
         if let Some(range) = options.range() {
             renderer.set_range(range);
@@ -129,23 +134,20 @@ fn load(options: &Options) -> Result<ReadyScene, SceneError> {
     })
 }
 
-fn read_plan(path: &Path) -> Result<RenderPlan, String> {
+fn read_plan(path: &Path) -> Result<Plan, String> {
     let text = read_text(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    RenderPlan::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))
+    Plan::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))
 }
 
-/// Goes on from a state file, if there is one.
-fn resume(renderer: &mut Renderer<'_>, path: &Path) -> Result<(), OutputError> {
+/// Reads a state file, if there is one.
+fn read_state(path: &Path) -> Result<Option<State>, OutputError> {
     match State::load(path) {
         Err(OutputError::State { source: StateError::Io(error), .. })
             if error.kind() == std::io::ErrorKind::NotFound =>
         {
-            Ok(())
+            Ok(None)
         }
-        Err(error) => Err(error),
-        Ok(state) => {
-            renderer.resume(state).map_err(|source| OutputError::State { path: path.to_owned(), source })
-        }
+        state => state.map(Some),
     }
 }
 
@@ -158,7 +160,7 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
         attempt(state.save(path));
     }
     if let Some(path) = &options.method.save_plan {
-        attempt(write_text(path, &state.identity().plan.to_string()));
+        attempt(write_text(path, &state.identity().plan.to_ron()));
     }
     let (report, images) = (state.report(), options.images());
     // Before the first pixels there is no picture.

@@ -72,14 +72,14 @@ pub(crate) struct Method {
     /// Techniques: `auto`, those that pay in the scene, or names joined by `+` [default: auto]
     #[arg(long, value_name = "LIST")]
     techniques: Option<Techniques>,
-    /// Choose techniques by a model of costs instead of measured time: every run chooses the same. Goes
-    /// without saying for A..B
+    /// Choose techniques as if the render had no limit: every run chooses the same. Goes without saying for
+    /// A..B
     #[arg(long)]
     deterministic: bool,
     /// Run what a plan says that another render has saved
     #[arg(long, value_name = "FILE.ron", value_hint = ValueHint::FilePath)]
     pub(crate) plan: Option<PathBuf>,
-    /// Save the plan: what iterations run, as far as it was decided; `.ron` or `.plan`
+    /// Save the plan: techniques, sample counts and first radii; `.ron` or `.plan`
     #[arg(long, value_name = "FILE.ron", value_parser = files::path(files::plan), value_hint = ValueHint::FilePath)]
     pub(crate) save_plan: Option<PathBuf>,
     /// Most edges of a path between light and camera [default: 1000]

@@ -40,7 +40,7 @@ fn list(folder: &Path) -> Vec<PathBuf> {
 fn a_good_scene_renders_and_writes_its_files() {
     let folder = folder("good");
     fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
-    // A plan by measured costs could differ in the second render.
+    // A plan by a limit of time could differ in the second render.
     let render = |image: &str, more: &[&str]| {
         let mut arguments = vec!["scene.ron", "--deterministic", "--iterations", "2", "-o", image];
         arguments.extend(more);

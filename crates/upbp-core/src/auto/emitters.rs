@@ -1,86 +1,82 @@
-//! Which emitters are worth samples: measured before the first iteration.
+//! Probabilities of emitters, by the samples that they are worth.
 //!
-//! By power, a sky takes most of the light sub-paths and next events of a room with a window, and most of them are lost:
-//! the light goes past the scene, or emission hits find it anyway. So a small run counts the weighted contributions that
-//! come from each emitter, by next events and by light sub-paths, as far as no other technique would find them, and emitters
-//! are then chosen in proportion (`docs/theory.md`, section 6(h)). Weights are exact for any choice, and the choice is
-//! fixed before any sample of the image.
+//! By power, a sky takes most of the light sub-paths and next events of a room with a window, and most of
+//! them are lost: the light goes past the scene, or emission hits find it anyway. So a small run counts the
+//! weighted contributions that come from each emitter, by next events and by light sub-paths, as far as no
+//! other technique would find them, and emitters are then chosen in proportion (`docs/theory.md`, section
+//! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image.
 
-use rayon::prelude::*;
 use upbp_estimators::observer::{DynObserver, Joint, LightEnd, ObservedSample, Observer};
-use upbp_estimators::path::{Context, LightChunk, Scratch};
+use upbp_estimators::path::{Context, LightChunk};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
-use upbp_estimators::{Counters, EmitterShares, LightMap, Plan, StreamKind, World};
+use upbp_estimators::{
+    Counters, EmitterShares, LightMap, Plan as IterationPlan, StreamKind, TechniqueSet,
+    World as PreparedScene,
+};
 
-use crate::budget::Budget;
-use crate::budget::Halt;
+use super::full_plan::{iteration_plan, plan_with};
+use super::pieces::{in_pieces, pixel};
+use super::statistics;
+use crate::budget::{Budget, Halt};
+use crate::error::RenderError;
+use crate::settings::CheckedSettings;
 
 /// Camera sub-paths, if there are many emitters.
-const CAMERA_PATHS: u64 = 2048;
+const CAMERA_PATHS: u32 = 2048;
 /// Light sub-paths, unless they are long or emitters are few.
 const LIGHT_PATHS: u32 = 4096;
-/// So many emitters are many; of less, less is to be told.
+/// Emitters from which on the number of sub-paths does not grow any more.
 const MANY: usize = 8;
 /// Light vertices that are enough.
 const LIGHT_VERTICES: f64 = 2e5;
-/// Sub-paths per piece of work.
-const CHUNK: u32 = 256;
 /// Steps towards probabilities that reproduce themselves.
 const ROUNDS: u32 = 16;
 
-/// The number of light sub-paths for sub-paths of `vertices` vertices.
-pub(crate) fn light_paths(vertices: f64) -> u32 {
-    (LIGHT_VERTICES / vertices.max(1.0)).clamp(64.0, f64::from(LIGHT_PATHS)) as u32
-}
+/// Part of the time of a preparation that this may take.
+const PART: f64 = 0.2;
+/// Part of this that a quick look at the length of light sub-paths may take.
+const QUICK_LOOK: f64 = 0.2;
 
-/// Light sub-paths of `vertices` vertices that tell enough of so many emitters.
-pub(crate) fn light_paths_for(emitters: usize, vertices: f64) -> u32 {
-    (enough(emitters) * f64::from(light_paths(vertices))) as u32
-}
-
-/// The part of all sub-paths that tells enough of so many emitters.
+/// The part of all sub-paths that tells enough of a number of emitters.
 fn enough(emitters: usize) -> f64 {
     emitters.clamp(2, MANY) as f64 / MANY as f64
 }
 
-/// How emitters are chosen in the iterations of a render.
-pub(crate) struct EmitterChoices {
-    by_light_paths: EmitterShares,
-    next_event: EmitterShares,
-    /// Of stages without light sub-paths: next events have to find what those would have found.
-    next_event_alone: EmitterShares,
+/// Lets the scene choose its emitters by what they contribute under a plan with `techniques`, if it has
+/// several. The scene has to be as it was prepared, with emitters chosen by power.
+///
+/// # Errors
+/// [`RenderError::Cancelled`].
+pub(crate) fn choose<S: Scene>(
+    scene: &mut PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    budget: &Budget<'_>,
+) -> Result<(), RenderError> {
+    let emitters = scene.scene.emitters().len();
+    if emitters < 2 {
+        return Ok(());
+    }
+    let quick = budget.part(QUICK_LOOK * PART);
+    let statistics = statistics::measure(scene, settings, techniques, statistics::FEW_LIGHT_PATHS, &quick)?;
+    let vertices = statistics.vertices_per_path.max(1.0);
+    let light_paths = (LIGHT_VERTICES / vertices).clamp(64.0, f64::from(LIGHT_PATHS)) * enough(emitters);
+    let light_paths = light_paths as u32;
+    let plan = plan_with(scene, settings, techniques, &statistics, [light_paths, light_paths / 8]);
+    let plan = iteration_plan(scene, settings, &plan, 0);
+    let run = |part, halt: &Halt<'_>| measure(scene, &plan, part, halt);
+    let (emission, next_event) =
+        budget.part((1.0 - QUICK_LOOK) * PART).largest(run).ok_or(RenderError::Cancelled)?;
+    scene.choose_emitters_by(&emission, &next_event);
+    Ok(())
 }
 
-impl EmitterChoices {
-    /// Measured under a plan, and under one without light sub-paths if there may be such stages. `None` if it was cancelled.
-    pub(crate) fn measure<S: Scene>(
-        world: &World<'_, S>,
-        plan: &Plan,
-        alone: Option<&Plan>,
-        budget: &Budget<'_>,
-    ) -> Option<Self> {
-        let budget = if alone.is_some() { budget.part(0.5) } else { *budget };
-        let measure = |plan| budget.largest(true, |part, halt| measure(world, plan, part, halt));
-        let (by_light_paths, next_event) = measure(plan)?;
-        let next_event_alone = match alone {
-            Some(plan) => measure(plan)?.1,
-            None => next_event.clone(),
-        };
-        Some(Self { by_light_paths, next_event, next_event_alone })
-    }
-
-    /// Chooses emitters as a stage with or without light sub-paths does.
-    pub(crate) fn apply<S: Scene>(&self, world: &mut World<'_, S>, has_light_paths: bool) {
-        let next_event = if has_light_paths { &self.next_event } else { &self.next_event_alone };
-        world.choose_emitters_by(&self.by_light_paths, next_event);
-    }
-}
-
-/// What every emitter brings under `plan`: by light sub-paths, by next events. A part of the sub-paths is traced. `None` if it was halted.
+/// The contribution of every emitter under `plan`, by light sub-paths and by next events. A part of the
+/// sub-paths is traced. `None` if it was halted.
 fn measure<S: Scene>(
-    world: &World<'_, S>,
-    plan: &Plan,
+    scene: &PreparedScene<'_, S>,
+    plan: &IterationPlan,
     part: f64,
     halt: &Halt<'_>,
 ) -> Option<(EmitterShares, EmitterShares)> {
@@ -89,87 +85,64 @@ fn measure<S: Scene>(
     let fewer = |count: u32| (part * f64::from(count)).ceil() as u32;
     (plan.light_paths, plan.beam_paths) = (fewer(plan.light_paths), fewer(plan.beam_paths));
     let plan = &plan;
-    let context = Context { world, plan };
+    let context = Context { world: scene, plan };
     // The whole film: a crop shows the same camera samples.
-    let (width, height) = world.scene.camera().resolution();
+    let (width, height) = scene.scene.camera().resolution();
     let film = PixelRect { x: 0, y: 0, width, height };
     let pixels = u64::from(width) * u64::from(height);
-    let emitters = world.scene.emitters().len();
-    let mut emission = Tally::new(emitters, |emitter| world.emission_probability(emitter));
-    let mut next_event = Tally::new(emitters, |emitter| world.next_event_probability(emitter));
-    let mut by_path = |seen: &[(u32, Contribution)], starts: &[Option<u32>], scale| {
-        for &(path, contribution) in seen {
-            if let Some(emitter) = starts[path as usize] {
-                emission.add(emitter, contribution, scale);
-            }
-        }
-    };
+    let emitters = scene.scene.emitters().len();
+    let mut emission = Tally::new(emitters, |emitter| scene.emission_probability(emitter));
+    let mut next_event = Tally::new(emitters, |emitter| scene.next_event_probability(emitter));
 
     let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
-    let chunks: Vec<_> = (0..paths.div_ceil(CHUNK))
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, chunk| {
-            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(paths);
-            let mut seen = Seen { first: range.start, starts: vec![None; range.len()], ..Seen::default() };
-            let mut out = LightChunk::default();
-            for index in range {
-                if halt.now() {
-                    return None;
-                }
-                let observer: &mut DynObserver<'_, S::Bsdf> = &mut seen;
-                trace_light_path(&context, StreamKind::PilotLight, index, scratch, &mut out, observer);
-            }
-            Some((out, seen))
-        })
-        .collect::<Option<_>>()?;
-    let mut starts = Vec::with_capacity(paths as usize);
-    let mut vertices = Vec::new();
-    let mut beams = Vec::new();
-    for (out, seen) in chunks {
+    let kind = StreamKind::PilotLight;
+    let pieces = in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_>, Seen)| {
+        let observer: &mut DynObserver<'_, S::Bsdf> = seen;
+        trace_light_path(&context, kind, index, scratch, out, observer);
+        true
+    })?;
+    let mut starts = vec![None; paths as usize];
+    let (mut vertices, mut beams) = (Vec::new(), Vec::new());
+    let mut seen = Seen::default();
+    for (out, own) in pieces {
         vertices.extend(out.vertices);
         beams.extend(out.beams);
-        starts.extend(seen.starts);
-        by_path(&seen.emission, &starts, 1.0);
+        seen.append(own);
+    }
+    for &(path, emitter) in &seen.starts {
+        starts[path as usize] = Some(emitter);
     }
     let map = if plan.stores_vertices() || plan.stores_beams() {
         LightMap::build(plan, vertices, beams)
     } else {
         LightMap::empty()
     };
-
-    let camera_paths = (part * enough(emitters) * CAMERA_PATHS as f64).ceil() as u64;
-    let walks: Vec<_> = (0..camera_paths.div_ceil(u64::from(CHUNK)))
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, chunk| {
-            let mut seen = Seen::default();
-            for index in chunk * u64::from(CHUNK)..((chunk + 1) * u64::from(CHUNK)).min(camera_paths) {
-                if halt.now() {
-                    return None;
-                }
-                let (pixel, counters) = (pixel(film, index), &mut Counters::default());
-                let kind = StreamKind::PilotCamera;
-                let observer: &mut DynObserver<'_, S::Bsdf> = &mut seen;
-                trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);
+    let mut by_path = |seen: &[(u32, Contribution)], scale| {
+        for &(path, contribution) in seen {
+            if let Some(emitter) = starts[path as usize] {
+                emission.add(emitter, contribution, scale);
             }
-            Some(seen)
-        })
-        .collect::<Option<_>>()?;
+        }
+    };
+    by_path(&seen.emission, 1.0);
+
+    let camera_paths = (part * enough(emitters) * f64::from(CAMERA_PATHS)).ceil() as u32;
+    let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
+        let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
+        let observer: &mut DynObserver<'_, S::Bsdf> = seen;
+        let counters = &mut Counters::default();
+        trace_camera_path(&context, &map, kind, pixel(film, index), index, scratch, counters, observer);
+        true
+    })?;
     // Light tracing fills the whole picture, camera sub-paths a part of it.
-    let scale = pixels as f64 / camera_paths as f64;
+    let scale = pixels as f64 / f64::from(camera_paths);
     for seen in walks {
-        by_path(&seen.emission, &starts, scale);
+        by_path(&seen.emission, scale);
         for (emitter, contribution) in seen.next_event {
             next_event.add(emitter, contribution, scale);
         }
     }
     Some((emission.shares(), next_event.shares()))
-}
-
-/// A pixel of a sequence that is spread over the picture by a step that is prime to almost every width.
-pub(crate) fn pixel(crop: PixelRect, index: u64) -> [u32; 2] {
-    let width = u64::from(crop.width);
-    let place = (index * 7919) % (width * u64::from(crop.height));
-    [crop.x + (place % width) as u32, crop.y + (place / width) as u32]
 }
 
 /// Weighted contributions by emitter.
@@ -200,8 +173,9 @@ impl Tally {
         self.samples.push(Sample { emitter, value: scale * seen.value * p, others });
     }
 
-    /// What the emitters bring that nothing else would: contributions times the square of their weights, at the probabilities
-    /// that follow from just that. A sky that emission hits find anyway so fades out of the next events.
+    /// The light of each emitter that no other technique would find: contributions times the square of their
+    /// weights, at the probabilities that follow from just that. A sky that emission hits find anyway so
+    /// fades out of the next events.
     fn shares(&self) -> EmitterShares {
         let mut p = self.chosen.clone();
         let mut light = vec![0.0; p.len()];
@@ -226,17 +200,23 @@ impl Tally {
     }
 }
 
-/// What one piece of work saw.
+/// Contributions that sub-paths of one piece of work made.
 #[derive(Default)]
 struct Seen {
-    /// The first light sub-path.
-    first: u32,
-    /// The emitter of each light sub-path.
-    starts: Vec<Option<u32>>,
+    /// Light sub-paths with their emitters.
+    starts: Vec<(u32, u32)>,
     /// By light sub-path.
     emission: Vec<(u32, Contribution)>,
     /// By emitter.
     next_event: Vec<(u32, Contribution)>,
+}
+
+impl Seen {
+    fn append(&mut self, mut more: Self) {
+        self.starts.append(&mut more.starts);
+        self.emission.append(&mut more.emission);
+        self.next_event.append(&mut more.next_event);
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -250,7 +230,7 @@ impl<B> Observer<B> for Seen {
     type Densities = f64;
 
     fn light_end(&mut self, path: u32, end: &LightEnd) {
-        self.starts[(path - self.first) as usize] = Some(end.emitter.0);
+        self.starts.push((path, end.emitter.0));
     }
 
     fn sample(&mut self, sample: &ObservedSample<B>) {

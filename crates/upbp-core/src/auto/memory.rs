@@ -1,23 +1,93 @@
-//! How much memory an iteration needs, and how many light sub-paths fit into a budget.
+//! Memory that a render may take, and that its light sub-paths need.
 //!
-//! Everything large has a size that follows from counts: the film and the buffer of an iteration from pixels; vertices, beams,
-//! their look-up structures, and what building those takes for a moment, from light sub-paths. The pilot tells how many of
-//! each a sub-path leaves. What does not grow is not counted: the program, the scene, the threads.
+//! Everything large has a size that follows from counts: the film and the buffer of an iteration from pixels;
+//! vertices, beams, their look-up structures, and what building those takes for a moment, from light
+//! sub-paths. Statistics tell the numbers per sub-path. Sizes that do not grow are not counted: the program,
+//! the scene, the threads.
 
 use upbp_estimators::path::{LightVertex, PhotonBeam};
+use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::{TechniqueSet, World as PreparedScene};
 
-use crate::auto::statistics::Pilot;
+use super::statistics::Statistics;
+use crate::error::RenderError;
+use crate::film::Film;
+use crate::plan::Plan;
+use crate::settings::Settings;
 
-/// What light sub-paths and their look-ups may take where that must not depend on the machine.
-pub(crate) const LIGHT_BYTES: u64 = 2 << 30;
+/// Bytes of light sub-paths and their trees, where the limit must not depend on the machine.
+const LIGHT_BYTES: u64 = 2 << 30;
 
-/// Bytes that a render may take: so many MiB, or half of what the machine has free.
-pub(crate) fn budget(mebibytes: Option<u32>) -> u64 {
+/// Bytes that a render may take, and needs for its film.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Room {
+    /// All that the render may take.
+    total: u64,
+    film: u64,
+    /// The writing of an image, when light vertices have gone.
+    output: u64,
+    /// Light vertices, beams, and their look-up structures.
+    pub(crate) light_bytes: u64,
+}
+
+impl Room {
+    /// The room beside the film.
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`] if there is none.
+    pub(crate) fn of<S: Scene>(
+        scene: &PreparedScene<'_, S>,
+        settings: &Settings,
+        techniques: TechniqueSet,
+    ) -> Result<Self, RenderError> {
+        let rect = scene.scene.camera().crop();
+        let total = budget(settings.memory);
+        let film = Film::memory_bytes(rect, techniques);
+        let output = Film::output_bytes(rect, techniques);
+        if film + output > total {
+            return Err(RenderError::Memory {
+                width: rect.width,
+                height: rect.height,
+                needed: (film + output).div_ceil(1 << 20),
+                budget: total >> 20,
+            });
+        }
+        let light_bytes = match settings.memory {
+            // The memory that is free now says nothing of other machines.
+            None if settings.deterministic => LIGHT_BYTES,
+            _ => total - film,
+        };
+        Ok(Self { total, film, output, light_bytes })
+    }
+
+    /// Checks that the iterations of a plan fit, and returns it.
+    ///
+    /// # Errors
+    /// [`RenderError::PlanMemory`].
+    pub(crate) fn fits<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Result<Plan, RenderError> {
+        let needed = self.film + LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>() as u64;
+        if needed > self.total {
+            return Err(RenderError::PlanMemory {
+                needed: needed.div_ceil(1 << 20),
+                budget: self.total >> 20,
+            });
+        }
+        Ok(*plan)
+    }
+
+    /// Bytes that a render by a plan is expected to take.
+    pub(crate) fn expected_bytes<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> u64 {
+        self.film + self.output.max(LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>() as u64)
+    }
+}
+
+/// Bytes that a render may take: the given number of MiB, or half of what the machine has free.
+fn budget(mebibytes: Option<u32>) -> u64 {
     mebibytes.map_or_else(|| free_bytes().map_or(LIGHT_BYTES, |free| free / 2), |mib| u64::from(mib) << 20)
 }
 
-/// Bytes that a process can still have, by what Linux says of the machine and of the group of processes that it is in; `None` where it
-/// says nothing.
+/// Bytes that a process can still have, by what Linux says of the machine and of the group of processes that
+/// it is in; `None` where it says nothing.
 fn free_bytes() -> Option<u64> {
     let number = |path: &str| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
     let machine = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| available(&text));
@@ -32,14 +102,14 @@ fn available(meminfo: &str) -> Option<u64> {
     line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// What light sub-paths leave in memory, by number.
+/// Numbers of vertices and beams that light sub-paths leave in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LightCounts {
     /// Light vertices.
     pub(crate) vertices: f64,
-    /// Of them those in the tree of surface photons.
+    /// Vertices in the tree of surface photons.
     pub(crate) surface: f64,
-    /// And in the tree of photons in media.
+    /// Vertices in the tree of photons in media.
     pub(crate) medium: f64,
     /// Photon beams.
     pub(crate) beams: f64,
@@ -48,15 +118,20 @@ pub(crate) struct LightCounts {
 }
 
 impl LightCounts {
-    /// The numbers that so many light sub-paths leave, of which so many leave beams.
-    pub(crate) fn expected(pilot: &Pilot, light_paths: u32, beam_paths: u32) -> Self {
+    /// The numbers that an iteration of a plan leaves.
+    pub(crate) fn of(plan: &Plan, statistics: &Statistics) -> Self {
+        Self::expected(statistics, plan.light_paths, plan.beam_paths)
+    }
+
+    /// The numbers that light sub-paths leave, some of which leave beams.
+    pub(crate) fn expected(statistics: &Statistics, light_paths: u32, beam_paths: u32) -> Self {
         let (paths, beam_paths) = (f64::from(light_paths), f64::from(beam_paths));
         Self {
-            vertices: paths * pilot.vertices_per_path,
-            surface: paths * pilot.surface_per_path,
-            medium: paths * pilot.medium_per_path,
-            beams: beam_paths * pilot.beams_per_path,
-            pieces: beam_paths * pilot.pieces_per_path,
+            vertices: paths * statistics.vertices_per_path,
+            surface: paths * statistics.surface_per_path,
+            medium: paths * statistics.medium_per_path,
+            beams: beam_paths * statistics.beams_per_path,
+            pieces: beam_paths * statistics.pieces_per_path,
         }
     }
 
@@ -66,8 +141,8 @@ impl LightCounts {
         const NODES: f64 = 256.0 / 512.0 * 8.0 / 7.0;
         const POINT_BOXES: f64 = 1.0 + NODES;
         const PIECE_BOXES: f64 = 3.0 + NODES;
-        /// A position with its payload: sorted into buckets, and before that given to be sorted, after that in its place in the
-        /// tree.
+        /// A position with its payload: sorted into buckets, and before that given to be sorted, after that
+        /// in its place in the tree.
         const POINT: f64 = 16.0;
         /// A segment with its payload.
         const SEGMENT: f64 = 36.0;

@@ -1,102 +1,152 @@
-//! The choice of techniques and sample counts by efficiency (`docs/theory.md`, section 6(a)).
+//! The choice of the plan of a render (`docs/theory.md`, section 6.2).
 //!
-//! A [trial](pilot_render) of a few thousand sub-paths with everything on is written down; from it follow the [variance](variance) and the
-//! [cost] of any other plan; a [search] takes the one with the least product of both. The sub-paths of trials have random numbers of their
-//! own and add nothing to the picture: whatever is chosen, the picture is unbiased.
+//! First techniques are left out that cannot contribute to the picture ([support]); this is exact. Then small
+//! runs with random numbers of their own look at the scene: they tell radii and the room that light sub-paths
+//! need ([statistics]), and which lights are worth samples ([emitters]). From these follows the [full
+//! plan](full_plan): all techniques, a light sub-path per pixel.
+//!
+//! If techniques are to be chosen, a [pilot render](pilot_render) runs the full plan at a few hundred pixels
+//! and writes down every sample with the density of each technique there. From it follow the [variance] and
+//! the [cost] of an iteration of any other plan, and a [search] over [candidates](candidate) takes the plan
+//! with the least product of both. Predictions are noisy, so there is one rule for all steps of the search: a
+//! step must gain more than [a fixed part](search::GAIN) and more than its own standard error.
+//!
+//! The pilot render grows until no other candidate is likely to be better by more than that part, or until it
+//! has taken [2 %](PILOT_PART) of the work that the render is going to do, whichever comes first.
+//!
+//! None of these samples is part of the picture: whatever is chosen, the picture is unbiased. The choice
+//! counts work and looks at no clock, so that it can be repeated, unless a limit of time holds.
 
-pub(crate) mod choices;
+mod candidate;
 mod cost;
-pub(crate) mod emitters;
+mod emitters;
+mod full_plan;
 pub(crate) mod memory;
 mod neighbours;
+mod pieces;
 mod pilot_render;
-pub(crate) mod planner;
+mod roulette;
 mod search;
 pub(crate) mod statistics;
 pub(crate) mod support;
 mod variance;
 
-use upbp_estimators::scene::{Camera, Scene};
-use upbp_estimators::{Plan, TechniqueSet, World};
-
-use cost::Costs;
-use pilot_render::PASSES;
-use pilot_render::grid::Grid;
-pub(crate) use search::Bounds;
-use search::Candidate;
-use variance::Prediction;
+use upbp_estimators::TechniqueSet;
+use upbp_estimators::World as PreparedScene;
+use upbp_estimators::scene::Scene;
 
 use crate::budget::Budget;
-use crate::budget::Halt;
+use crate::error::RenderError;
+use crate::plan::Plan;
+use crate::settings::{CheckedSettings, Techniques};
+use candidate::Candidates;
+use cost::Cost;
+use memory::Room;
+use pilot_render::{PilotRender, Size};
+use statistics::Statistics;
+use support::TechniqueSupport;
+use variance::Variance;
 
-/// The iterations before which the plan is chosen, again and again: radii have shrunk, and a larger trial is worth its time.
-pub(crate) const REVIEWS: [u64; 3] = [0, 512, 4096];
-/// The factor by which a change must make the product of variance and cost smaller.
-const GAINS: [f64; REVIEWS.len()] = [0.93, 0.96, 0.98];
-/// The first trial looks at one of so many pixels, more of them where no media make it slow, within bounds,
-const PIXELS_PER_CELL: [u32; 2] = [12, 4];
-const CELLS: [u32; 2] = [400, 2048];
-/// and the next one at so many times as many.
+pub(crate) use full_plan::iteration_plan;
+
+/// Part of the render's work that pilot renders may take, unless the first one takes more.
+const PILOT_PART: f64 = 0.02;
+/// Factor by which a pilot render grows.
 const GROWTH: u32 = 2;
-/// A trial that has too many samples is made again with so many times less,
-const SMALLER: u32 = 4;
-/// but not with less than so many, which would tell nothing.
-const LEAST_CELLS: u32 = 25;
-/// Light sub-paths per cell in a pass of the trial.
-const LIGHT_PATHS_PER_CELL: u32 = 2;
+/// Parts of the time of a preparation that the statistics and the pilot renders may take, if there is a limit
+/// of time.
+const TIME_FOR_STATISTICS: f64 = 0.2;
+const TIME_FOR_PILOT: f64 = 0.4;
 
-/// What may be chosen.
-pub(crate) struct Choice<'a> {
-    /// Everything that the scene can use, with the full number of light sub-paths.
-    pub(crate) everything: &'a Plan,
-    pub(crate) bounds: Bounds,
-    /// Camera sub-paths, and light sub-paths, of a pass at most: what is written down must fit into memory.
-    pub(crate) most_paths: u32,
-    /// Whether time may be measured.
-    pub(crate) timed: bool,
+/// A plan, with what was learnt on the way to it.
+pub(crate) struct Choice {
+    pub(crate) support: TechniqueSupport,
+    pub(crate) room: Room,
+    pub(crate) statistics: Statistics,
+    pub(crate) plan: Plan,
 }
 
-/// Makes the choice of a review, by the number of it: everything, if there is no time for a choice.
+/// Chooses the plan of a render, and the emitters that sub-paths begin at under it; or checks the plan that
+/// is `given`.
 pub(crate) fn choose<S: Scene>(
-    world: &World<'_, S>,
-    choice: &Choice<'_>,
-    review: u32,
-    budget: &Budget<'_>,
-) -> Candidate {
-    budget
-        .largest(false, |part, halt| choose_by_part(world, choice, review, part, halt))
-        .unwrap_or_else(|| Candidate::everything(&choice.bounds))
+    scene: &mut PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    given: Option<Plan>,
+    budget: &mut Budget<'_>,
+) -> Result<Choice, RenderError> {
+    let is_auto = settings.techniques == Techniques::Auto;
+    let support = TechniqueSupport::of(scene, settings, given.as_ref())?;
+    let techniques = support.techniques;
+    let room = Room::of(scene, settings, techniques)?;
+    // Without light sub-paths next events have to find what those would have found.
+    let alone = techniques.intersection(TechniqueSet::PT);
+    let for_emitters =
+        if is_auto && given.is_some_and(|plan| plan.light_paths == 0) { alone } else { techniques };
+
+    budget.step("measuring lights", 0.0)?;
+    emitters::choose(scene, settings, for_emitters, budget)?;
+    budget.step("looking around", 0.3)?;
+    let allowance = budget.part(TIME_FOR_STATISTICS);
+    let statistics = statistics::measure(scene, settings, techniques, statistics::LIGHT_PATHS, &allowance)?;
+    budget.step("choosing techniques", 0.5)?;
+    let plan = match given {
+        Some(plan) => room.fits::<S>(&plan, &statistics)?,
+        None => {
+            let full = full_plan::full_plan(scene, settings, techniques, &statistics, &room, budget);
+            if is_auto && full.uses_light_paths() {
+                let candidates = Candidates::new(scene, settings, &support, &statistics, full);
+                let plan = best_plan(scene, settings, &candidates, budget);
+                if !plan.uses_light_paths() {
+                    *scene = PreparedScene::new(scene.scene)?;
+                    emitters::choose(scene, settings, alone, budget)?;
+                }
+                plan
+            } else {
+                full
+            }
+        }
+    };
+    if budget.canceller.is_cancelled() {
+        Err(RenderError::Cancelled)
+    } else {
+        Ok(Choice { support, room, statistics, plan })
+    }
 }
 
-/// Makes the choice with a part of a trial. `None` if it was halted.
-fn choose_by_part<S: Scene>(
-    world: &World<'_, S>,
-    choice: &Choice<'_>,
-    review: u32,
-    part: f64,
-    halt: &Halt<'_>,
-) -> Option<Candidate> {
-    let plan = choice.everything;
-    let crop = world.scene.camera().crop();
-    let media = plan.techniques.intersects(TechniqueSet::VOLUME_MERGES);
-    let pixels_per_cell = PIXELS_PER_CELL[usize::from(!media)];
-    let first = (crop.width.saturating_mul(crop.height) / pixels_per_cell).clamp(CELLS[0], CELLS[1]);
-    let full = (first * GROWTH.pow(review)).min(choice.most_paths);
-    let mut cells = ((part * f64::from(full)) as u32).max(LEAST_CELLS);
-    while cells >= LEAST_CELLS {
-        let grid = Grid::new(crop, cells);
-        let paths = choice.most_paths.min(LIGHT_PATHS_PER_CELL * cells);
-        let trial = pilot_render::run(world, plan, &grid, paths, PASSES * review, choice.timed, halt);
-        if halt.now() {
-            return None;
+/// The best of the candidates by a pilot render that is large enough, or by the largest that there is time
+/// for.
+fn best_plan<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    candidates: &Candidates,
+    budget: &Budget<'_>,
+) -> Plan {
+    let allowance = budget.part(TIME_FOR_PILOT);
+    let enough = Size::enough(scene, candidates.full.techniques);
+    let most = Size::most(scene);
+    let mut size = if allowance.is_limited() { Size::LEAST } else { enough };
+    let (mut plan, mut spent) = (None, 0.0);
+    loop {
+        let Some(pilot) = PilotRender::run(scene, settings, &candidates.full, size, &allowance.halt()) else {
+            // No time, or more samples than there is room for.
+            if plan.is_some() || allowance.halt().now() || size <= Size::LEAST {
+                return plan.unwrap_or(candidates.usual());
+            }
+            size = Size(size.0 / 4);
+            continue;
+        };
+        let variance = Variance::of(pilot);
+        let found = search::best(&variance, candidates);
+        let cost = Cost::of(variance.pilot()).of_pilot();
+        spent += cost;
+        plan = Some(found.plan);
+        let is_done = size >= enough
+            && (found.is_clear
+                || size >= most
+                || spent + f64::from(GROWTH) * cost > PILOT_PART * found.work(&budget.stop));
+        if is_done || !allowance.has_time_for(1.0) {
+            return found.plan;
         }
-        if let Some(trial) = trial {
-            let costs = Costs::of(&trial);
-            let prediction = Prediction::new(trial, &grid);
-            return Some(search::best(&prediction, &costs, &choice.bounds, GAINS[review as usize]));
-        }
-        // As many photons are looked up less often and by less sub-paths.
-        cells /= SMALLER;
+        size = size.times(GROWTH);
     }
-    Some(Candidate::everything(&choice.bounds))
 }

@@ -1,4 +1,4 @@
-//! How close photons and beams are to where they are looked up.
+//! Distances of photons and beams from queries.
 
 use rayon::prelude::*;
 
@@ -9,7 +9,7 @@ const FIRST: f32 = 1e-3;
 /// Larger than any scene; its square is finite.
 const ANYWHERE: f32 = 1e18;
 
-/// How close the photons of the pilot are to a typical query.
+/// Distance of photons or beams from a typical query.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Neighbours {
     /// Median over queries of the distance to the `rank`-th nearest, scene units.
@@ -42,8 +42,8 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
-    /// Median over the queries of the distance to the nearest but some of `count` elements, of which `around` visits the distances of
-    /// those within a radius.
+    /// Median over the queries of the distance to the nearest but some of `count` elements, of which `around`
+    /// visits the distances of those within a radius.
     pub(crate) fn of<Q: Sync>(
         &self,
         queries: &[Q],

@@ -1,230 +1,66 @@
-//! The plan with the least product of variance and cost.
-
-use std::num::NonZeroU32;
-use std::ops::Range;
+//! The candidate with the least product of variance and cost.
 
 use rayon::prelude::*;
-use upbp_estimators::{LookUps, Technique, TechniqueSet};
 
-use super::cost::Costs;
-use super::pilot_render::recorder::TECHNIQUES;
-use super::pilot_render::roulette::TRIAL;
-use super::variance::{Counts, GROUPS, Prediction};
-use crate::auto::choices::BEAMS;
+use super::candidate::{Candidates, finished};
+use super::cost::Cost;
+use super::variance::{GROUPS, Variance};
+use crate::budget::Stop;
+use crate::plan::Plan;
 
-/// A plan that may be chosen. Numbers of sub-paths are relative to the trial's plan.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Candidate {
-    pub(crate) techniques: TechniqueSet,
-    pub(crate) light_paths: f64,
-    pub(crate) beam_paths: f64,
-    /// Connections per camera vertex, likewise.
-    pub(crate) connections: f64,
-    /// The radius of surface merging, likewise.
-    pub(crate) surf_radius: f64,
-    /// Merges whose photons only some iterations look up.
-    pub(crate) seldom: TechniqueSet,
-    /// The number of a roulette.
-    pub(crate) roulette: usize,
+/// Part of the product that a step must gain. Predictions are noisy, and the least of many is so by chance.
+pub(super) const GAIN: f64 = 0.05;
+
+/// The best candidate that small steps from some sensible ones lead to.
+pub(super) struct Found {
+    pub(super) plan: Plan,
+    /// Whether no other candidate is likely to be better by more than [`GAIN`].
+    pub(super) is_clear: bool,
+    /// Relative variance of an iteration.
+    pub(super) variance: f64,
+    /// Processor nanoseconds of an iteration.
+    pub(super) cost: f64,
 }
 
-/// What a candidate may be.
-#[derive(Clone, Debug)]
-pub(crate) struct Bounds {
-    /// All techniques that the scene can use.
-    pub(crate) techniques: TechniqueSet,
-    /// Those that stay on: some path may have no other.
-    pub(crate) always: TechniqueSet,
-    /// Those that a plan with light sub-paths has at least seldom: there may be light that a trial misses.
-    pub(crate) careful: TechniqueSet,
-    /// Numbers of light sub-paths, relative to the trial's plan; ascending, with 1.
-    pub(crate) light_paths: Vec<f64>,
-    /// The same of those with photon beams.
-    pub(crate) beam_paths: Vec<f64>,
-    /// The light sub-paths of the trial's plan over those of them with beams.
-    pub(crate) paths_per_beam_path: f64,
-    /// Connections per camera vertex, likewise. None more than one: a trial does not tell what several at a vertex have in common.
-    pub(crate) connections: Vec<f64>,
-    /// Radii of surface merging, likewise; ascending, the usual one first.
-    pub(crate) surf_radii: Vec<f64>,
-    /// Numbers of roulettes, ascending.
-    pub(crate) roulettes: Range<usize>,
-}
-
-/// One of so many iterations looks up what is looked up seldom.
-const SELDOM: NonZeroU32 = NonZeroU32::new(8).unwrap();
-
-impl Candidate {
-    /// All that is possible, as much of it as there may be, with the usual radius.
-    pub(crate) fn everything(bounds: &Bounds) -> Self {
-        Self {
-            techniques: bounds.techniques,
-            light_paths: 1.0,
-            beam_paths: 1.0,
-            connections: 1.0,
-            surf_radius: bounds.surf_radii.first().copied().unwrap_or(1.0),
-            seldom: TechniqueSet::EMPTY,
-            roulette: TRIAL,
-        }
-    }
-
-    /// The same with beams from no more light sub-paths than there are.
-    fn possible(self, bounds: &Bounds) -> Self {
-        let most = self.light_paths * bounds.paths_per_beam_path;
-        let beam_paths =
-            if self.techniques.intersects(BEAMS) { self.beam_paths.min(most) } else { self.beam_paths };
-        Self { beam_paths, ..self }
-    }
-
-    /// The part of the iterations that make the look-up of a technique.
-    pub(crate) fn look_up(&self, technique: Technique) -> f64 {
-        1.0 / f64::from(self.look_ups().period(technique))
-    }
-
-    /// As a stage has it.
-    pub(crate) fn look_ups(&self) -> LookUps {
-        LookUps::from_fn(|technique| if self.seldom.has(technique) { SELDOM } else { NonZeroU32::MIN })
-    }
-
-    /// The light sub-paths that a technique uses.
-    pub(crate) fn paths(&self, technique: Technique) -> f64 {
-        if BEAMS.has(technique) { self.beam_paths } else { self.light_paths }
-    }
-
-    /// Photons or beams within reach of a look-up.
-    pub(crate) fn photons(&self, technique: Technique) -> f64 {
-        let kernel = if technique == Technique::Surf { self.surf_radius.powi(2) } else { 1.0 };
-        kernel * self.paths(technique)
-    }
-
-    /// Whether any technique uses light sub-paths.
-    pub(crate) fn needs_light(&self) -> bool {
-        !self.techniques.without(TechniqueSet::PT).is_empty()
-    }
-
-    /// How often another's light sub-paths have to be quartered to be as few as its own; zero unless both have some.
-    fn quarterings(&self, other: &Self) -> f64 {
-        let both = self.needs_light() && other.needs_light();
-        if both { (other.light_paths / self.light_paths).log(4.0) } else { 0.0 }
-    }
-
-    fn counts(&self) -> Counts {
-        let paths = [self.light_paths, self.beam_paths];
-        let mut counts = Counts {
-            relative: [0.0; TECHNIQUES],
-            paths,
-            look_ups: [1.0; TECHNIQUES],
-            roulette: self.roulette,
-        };
-        // Camera sub-paths are never told apart by how they find the light.
-        counts.relative[Technique::Hit as usize] = 1.0;
-        counts.relative[Technique::Nee as usize] = 1.0;
-        for technique in self.techniques.without(TechniqueSet::PT).iter() {
-            let p = self.look_up(technique);
-            counts.look_ups[technique as usize] = p;
-            counts.relative[technique as usize] = match technique {
-                Technique::Hit | Technique::Nee => 1.0,
-                Technique::Connect => self.connections,
-                _ => p * self.photons(technique),
-            };
-        }
-        counts
+impl Found {
+    /// Processor nanoseconds of a render by this plan that ends by `stop`, as far as that can be told without
+    /// a clock.
+    pub(super) fn work(&self, stop: &Stop) -> f64 {
+        let by_iterations = stop.iterations.map(|iterations| iterations as f64);
+        // The relative variance of an iteration is its relMSE.
+        let by_error = stop.error.map(|error| self.variance / error);
+        let iterations = by_iterations.into_iter().chain(by_error).fold(f64::INFINITY, f64::min);
+        iterations * self.cost
     }
 }
 
-/// A candidate with what is predicted of it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Judged {
-    pub(crate) candidate: Candidate,
-    /// Relative variance of one iteration, in parts due to groups of pixels.
-    pub(crate) variance: [f64; GROUPS],
-    /// Nanoseconds of one iteration, on one thread.
-    pub(crate) cost: f64,
-}
-
-impl Judged {
-    /// What an error costs: variance times time.
-    pub(crate) fn product(&self) -> f64 {
-        self.variance.iter().sum::<f64>() * self.cost
-    }
-
-    /// This, unless the other's product is less: by `gain` for each time that the other's light sub-paths are quartered.
-    fn or_less(self, other: Self, gain: f64) -> Self {
-        let needed = gain.powf(other.candidate.quarterings(&self.candidate));
-        if other.product() < needed * self.product() { other } else { self }
-    }
-
-    /// Whether the product is less than `gain` times the other's, and by more than the uncertainty of that.
-    fn beats(&self, other: &Self, gain: f64) -> bool {
-        if other.product().is_infinite() {
-            return self.product().is_finite();
-        }
-        let differences: [f64; GROUPS] =
-            std::array::from_fn(|i| gain * other.cost * other.variance[i] - self.cost * self.variance[i]);
-        let n = GROUPS as f64;
-        let sum: f64 = differences.iter().sum();
-        let spread: f64 = differences.iter().map(|d| (d - sum / n).powi(2)).sum();
-        sum > (n / (n - 1.0) * spread).sqrt()
-    }
-}
-
-/// Judges candidates, each once.
-struct Judge<'a> {
-    prediction: &'a Prediction,
-    costs: &'a Costs,
-    known: Vec<Judged>,
-}
-
-impl Judge<'_> {
-    /// The judgement of each.
-    fn judge(&mut self, candidates: &[Candidate]) -> Vec<Judged> {
-        let find =
-            |known: &[Judged], candidate| known.iter().find(|judged| judged.candidate == candidate).copied();
-        let new: Vec<_> = candidates
-            .par_iter()
-            .filter(|candidate| find(&self.known, **candidate).is_none())
-            .map(|&candidate| Judged {
-                candidate,
-                variance: self.prediction.relative_variance(&candidate.counts()),
-                cost: self.costs.iteration(&candidate),
-            })
-            .collect();
-        self.known.extend(new);
-        candidates.iter().filter_map(|candidate| find(&self.known, *candidate)).collect()
-    }
-}
-
-/// The best candidate that small steps from some sensible ones lead to. A step must make the product smaller by the factor
-/// `gain`: predictions are noisy, and the least of many is so by chance. Where the ways end there are only a few. None is to be
-/// preferred, but that without light sub-paths, if no other is better by more than its uncertainty, and those with more light
-/// sub-paths to those with fewer, by `gain` for each quartering: what fewer lose is in few samples, of which most trials see too little.
-pub(crate) fn best(prediction: &Prediction, costs: &Costs, bounds: &Bounds, gain: f64) -> Candidate {
-    let mut judge = Judge { prediction, costs, known: Vec::new() };
-    let less = |a: Judged, b: Judged| a.or_less(b, gain);
-    let [camera, paths, everything] = starts(bounds, Candidate::everything(bounds)).map(|start| {
-        let end = descend(&mut judge, start, bounds, gain);
-        let end = judge.judge(&numbers_of_light_paths(&end.candidate, bounds)).into_iter().fold(end, less);
-        with_roulette(&mut judge, end, bounds)
+/// Searches from several starts, and compares the ends directly. Ties go to the plan without light sub-paths, then to the one with
+/// more of them: the variance that is lost by tracing fewer sits in rare samples, which a pilot render underestimates.
+pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
+    let cost = Cost::of(variance.pilot());
+    let mut judge = Judge { variance, cost, known: Vec::new() };
+    let [camera, paths, everything] = candidates.starts().map(|start| {
+        let end = descend(&mut judge, start, candidates);
+        judge.judge(&candidates.light_paths(&end.plan)).into_iter().fold(end, Judged::or_better)
     });
-    let least = less(less(camera, paths), everything);
-    let best = if camera.candidate.needs_light() || least.beats(&camera, 1.0) { least } else { camera };
-    insured(best.candidate, costs, bounds)
+    let least = camera.or_better(paths).or_better(everything);
+    let (gain, error) = least.gain_over(&camera);
+    let best = if camera.plan.uses_light_paths() || !(gain <= error) { least } else { camera };
+    let plan = finished(candidates.with_safeguard(best.plan, &cost));
+    Found {
+        plan,
+        is_clear: !judge.known.iter().any(|other| other.may_beat(&best)),
+        variance: best.variance.iter().sum(),
+        cost: cost.iteration(&plan),
+    }
 }
 
-/// Goes the steepest way as long as there are steps down.
-fn descend(judge: &mut Judge<'_>, start: Candidate, bounds: &Bounds, gain: f64) -> Judged {
-    /// What a wider radius and more beams than the trial has must gain: the blur of the one is not predicted, and the gain by the
-    /// others is predicted too large.
-    const BEYOND: f64 = 0.8;
+/// Takes the steepest step as long as one leads down.
+fn descend(judge: &mut Judge<'_>, start: Plan, candidates: &Candidates) -> Judged {
     let mut at = judge.judge(&[start])[0];
     loop {
-        let steps = judge.judge(&steps(&at.candidate, bounds));
-        let needed = |step: &Judged| {
-            let wider = step.candidate.surf_radius > at.candidate.surf_radius;
-            let more = step.candidate.beam_paths > at.candidate.beam_paths.max(1.0);
-            if wider || more { BEYOND.min(gain) } else { gain }
-        };
-        let better = steps.into_iter().filter(|step| step.beats(&at, needed(step)));
+        let steps = judge.judge(&candidates.steps(&at.plan));
+        let better = steps.into_iter().filter(|step| step.beats(&at));
         match better.min_by(|a, b| a.product().total_cmp(&b.product())) {
             Some(next) => at = next,
             None => return at,
@@ -232,152 +68,151 @@ fn descend(judge: &mut Judge<'_>, start: Candidate, bounds: &Bounds, gain: f64) 
     }
 }
 
-/// The same with the roulette that ends least walks of those that are nearly as good as the best. Random numbers of camera sub-paths are
-/// stratified, of which trials know the first ones only: it makes all that does not come from roulette smaller.
-///
-/// After all else, so that there are fewer candidates on the way.
-fn with_roulette(judge: &mut Judge<'_>, at: Judged, bounds: &Bounds) -> Judged {
-    const NEARLY: f64 = 1.05;
-    let with = |roulette| Candidate { roulette, ..at.candidate };
-    let all = judge.judge(&bounds.roulettes.clone().map(with).collect::<Vec<_>>());
-    let least = all.iter().map(Judged::product).fold(f64::INFINITY, f64::min);
-    all.into_iter().find(|judged| judged.product() <= NEARLY * least).unwrap_or(at)
+/// A plan with what is predicted of it.
+#[derive(Clone, Copy, Debug)]
+struct Judged {
+    plan: Plan,
+    /// Relative variance of one iteration, in parts due to groups of pixels.
+    variance: [f64; GROUPS],
+    /// Processor nanoseconds of one iteration.
+    cost: f64,
 }
 
-/// A candidate with what may find light that the trial missed, if it has light sub-paths: in all iterations and with the widest
-/// radius where this costs little, since such light is bright in few photons, else in all with the radius at hand, else in some.
-fn insured(best: Candidate, costs: &Costs, bounds: &Bounds) -> Candidate {
-    /// The factor by which an iteration may take longer.
-    const PREMIUM: f64 = 1.05;
-    if !best.needs_light() || bounds.careful.is_empty() {
-        return best;
+impl Judged {
+    /// The price of an error: variance times time.
+    fn product(&self) -> f64 {
+        self.variance.iter().sum::<f64>() * self.cost
     }
-    let techniques = best.techniques.union(bounds.careful);
-    let missing = bounds.careful.without(best.techniques).union(best.seldom.intersection(bounds.careful));
-    let always = Candidate { techniques, seldom: best.seldom.without(missing), ..best };
-    let widest = Candidate { surf_radius: bounds.surf_radii.last().copied().unwrap_or(1.0), ..always };
-    let most = PREMIUM * costs.iteration(&best);
-    [widest, always].into_iter().find(|candidate| costs.iteration(candidate) <= most).unwrap_or(Candidate {
-        techniques,
-        seldom: best.seldom.union(missing),
-        ..best
-    })
+
+    /// This, unless the other's product is less: by [`GAIN`] for each time that it has a quarter of the light sub-paths.
+    fn or_better(self, other: Self) -> Self {
+        let needed = (1.0 - GAIN).powf(log4_path_ratio(&self.plan, &other.plan));
+        if other.product() < needed * self.product() { other } else { self }
+    }
+
+    /// Whether this gains more than the larger of [`GAIN`] and the standard error of what it gains.
+    fn beats(&self, other: &Self) -> bool {
+        if other.product().is_infinite() {
+            return self.product().is_finite();
+        }
+        let (gain, error) = self.gain_over(other);
+        gain > error.max(GAIN * other.product())
+    }
+
+    /// Whether this would gain more than [`GAIN`] if it was better by its standard error.
+    fn may_beat(&self, other: &Self) -> bool {
+        let (gain, error) = self.gain_over(other);
+        gain + error > GAIN * other.product()
+    }
+
+    /// The difference of both products, and its standard error.
+    fn gain_over(&self, other: &Self) -> (f64, f64) {
+        let differences: [f64; GROUPS] =
+            std::array::from_fn(|i| other.cost * other.variance[i] - self.cost * self.variance[i]);
+        let n = GROUPS as f64;
+        let sum: f64 = differences.iter().sum();
+        let spread: f64 = differences.iter().map(|d| (d - sum / n).powi(2)).sum();
+        (sum, (n / (n - 1.0) * spread).sqrt())
+    }
 }
 
-/// Where to begin, the simplest first: with camera sub-paths alone, with paths alone, and with everything.
-fn starts(bounds: &Bounds, everything: Candidate) -> [Candidate; 3] {
-    let with = |set: TechniqueSet| set.union(bounds.always).intersection(bounds.techniques);
-    // What stays on only for the sake of paths that were not seen is to cost little.
-    let least = bounds.light_paths.first().copied().unwrap_or(1.0);
-    let camera = Candidate { techniques: with(TechniqueSet::PT), light_paths: least, ..everything };
-    let seldom = bounds.careful.without(bounds.always);
-    let paths = Candidate { techniques: with(TechniqueSet::BPT.union(bounds.careful)), seldom, ..everything };
-    [camera, paths, everything].map(|start| start.possible(bounds))
+/// Light sub-paths of a plan over those of another, as a power of four; 0 unless both have some.
+fn log4_path_ratio(plan: &Plan, other: &Plan) -> f64 {
+    let both = plan.uses_light_paths() && other.uses_light_paths();
+    if both { (f64::from(plan.light_paths) / f64::from(other.light_paths)).log(4.0) } else { 0.0 }
 }
 
-/// All that differ from a candidate in one thing.
-fn steps(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
-    let mut steps = Vec::new();
-    for technique in bounds.techniques.without(TechniqueSet::PT).iter() {
-        let alone = TechniqueSet::EMPTY.with(technique);
-        let (on, seldom) = (from.techniques.with(technique), from.seldom.without(alone));
-        let states = [
-            (!bounds.always.has(technique)).then_some((from.techniques.without(alone), seldom)),
-            (technique > Technique::LightTracing).then_some((on, seldom.with(technique))),
-            Some((on, seldom)),
-        ];
-        steps.extend(states.into_iter().flatten().map(|(techniques, seldom)| Candidate {
-            techniques,
-            seldom,
-            ..*from
-        }));
-    }
-    steps.extend(numbers_of_light_paths(from, bounds));
-    if from.techniques.has(Technique::Bb1d) {
-        steps.extend(bounds.beam_paths.iter().map(|&beam_paths| Candidate { beam_paths, ..*from }));
-    }
-    if from.techniques.has(Technique::Surf) {
-        steps.extend(bounds.surf_radii.iter().map(|&surf_radius| Candidate { surf_radius, ..*from }));
-    }
-    if from.techniques.has(Technique::Connect) {
-        steps.extend(bounds.connections.iter().map(|&connections| Candidate { connections, ..*from }));
-    }
-    steps.into_iter().map(|step| step.possible(bounds)).filter(|step| step != from).collect()
+/// Predictions of candidates, each made once.
+struct Judge<'a> {
+    variance: &'a Variance,
+    cost: Cost<'a>,
+    known: Vec<Judged>,
 }
 
-/// The same with other numbers of light sub-paths, if it has any.
-fn numbers_of_light_paths(from: &Candidate, bounds: &Bounds) -> Vec<Candidate> {
-    let numbers = if from.needs_light() { bounds.light_paths.as_slice() } else { &[] };
-    numbers.iter().map(|&light_paths| Candidate { light_paths, ..*from }.possible(bounds)).collect()
+impl Judge<'_> {
+    fn judge(&mut self, plans: &[Plan]) -> Vec<Judged> {
+        let find = |known: &[Judged], plan| known.iter().find(|judged| judged.plan == plan).copied();
+        let new: Vec<_> = plans
+            .par_iter()
+            .filter(|plan| find(&self.known, **plan).is_none())
+            .map(|&plan| Judged {
+                plan,
+                variance: self.variance.relative(&plan),
+                cost: self.cost.iteration(&plan),
+            })
+            .collect();
+        self.known.extend(new);
+        plans.iter().filter_map(|plan| find(&self.known, *plan)).collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::collections::VecDeque;
+    use std::num::NonZeroU32;
+
+    use upbp_estimators::{LookUps, Roulette, TechniqueSet};
 
     use super::*;
+    use crate::radius::RadiusSchedule;
 
-    #[test]
-    fn fewer_light_sub_paths_must_gain_more() {
-        let judged = |techniques, light_paths, cost| Judged {
-            candidate: Candidate {
-                techniques,
-                light_paths,
-                beam_paths: 1.0,
-                connections: 1.0,
-                surf_radius: 1.0,
-                seldom: TechniqueSet::EMPTY,
-                roulette: TRIAL,
-            },
-            variance: [1.0; GROUPS],
-            cost,
+    fn judged(variance: [f64; GROUPS], cost: f64) -> Judged {
+        let radii = RadiusSchedule {
+            surf: 0.0,
+            pp3d: 0.0,
+            pb2d: 0.0,
+            bp2d: 0.0,
+            bb1d: 0.0,
+            progressive: true,
+            floor: 1e-6,
         };
-        let gain = 0.9;
-        let chosen = |a: Judged, b: Judged| {
-            let least = a.or_less(b, gain);
-            assert_eq!(least.cost, b.or_less(a, gain).cost, "whichever comes first");
-            least.cost
+        let plan = Plan {
+            techniques: TechniqueSet::BPT,
+            light_paths: 1,
+            beam_paths: 0,
+            connections: 1.0,
+            next_events: 1.0,
+            roulette: Roulette::Off,
+            look_ups: LookUps::from_fn(|_| NonZeroU32::MIN),
+            vertices_per_light_path: 1.0,
+            radii,
         };
-        let all = judged(TechniqueSet::BPT, 1.0, 1.0);
-        for (fewer, needed) in [(0.25, gain), (0.0625, gain * gain)] {
-            assert_eq!(chosen(all, judged(TechniqueSet::BPT, fewer, 1.01 * needed)), 1.0);
-            assert_eq!(chosen(all, judged(TechniqueSet::BPT, fewer, 0.99 * needed)), 0.99 * needed);
-        }
-        // What has none is compared as it is.
-        assert_eq!(chosen(all, judged(TechniqueSet::PT, 0.0625, 0.99)), 0.99);
-        assert_eq!(chosen(all, judged(TechniqueSet::PT, 0.0625, 1.01)), 1.0);
+        Judged { plan, variance, cost }
     }
 
     #[test]
-    fn beams_come_from_light_sub_paths() {
-        let bounds = Bounds {
-            techniques: TechniqueSet::ALL,
-            always: TechniqueSet::EMPTY,
-            careful: TechniqueSet::EMPTY,
-            light_paths: vec![0.0625, 0.25, 1.0],
-            beam_paths: vec![0.25, 1.0, 4.0],
-            paths_per_beam_path: 2.0,
-            connections: vec![1.0],
-            surf_radii: vec![1.0],
-            roulettes: TRIAL..TRIAL + 1,
+    fn fewer_light_sub_paths_must_gain_more() {
+        let with = |techniques, light_paths, cost| {
+            let judged = judged([1.0; GROUPS], cost);
+            Judged { plan: Plan { techniques, light_paths, ..judged.plan }, ..judged }
         };
-        let mut found = starts(&bounds, Candidate::everything(&bounds)).to_vec();
-        let mut next = VecDeque::from(found.clone());
-        let mut fewer = 0;
-        while let Some(from) = next.pop_front().filter(|_| found.len() < 2000) {
-            for step in steps(&from, &bounds) {
-                if found.contains(&step) {
-                    continue;
-                }
-                assert!(
-                    !step.techniques.intersects(BEAMS) || step.beam_paths <= 2.0 * step.light_paths,
-                    "{step:?}"
-                );
-                fewer += u32::from(!bounds.beam_paths.contains(&step.beam_paths));
-                found.push(step);
-                next.push_back(step);
-            }
+        let chosen = |a: Judged, b: Judged| {
+            let better = a.or_better(b);
+            assert_eq!(better.cost, b.or_better(a).cost, "whichever comes first");
+            better.cost
+        };
+        let gain = 1.0 - GAIN;
+        let all = with(TechniqueSet::BPT, 1600, 1.0);
+        for (fewer, needed) in [(400, gain), (100, gain * gain)] {
+            assert_eq!(chosen(all, with(TechniqueSet::BPT, fewer, 1.01 * needed)), 1.0);
+            assert_eq!(chosen(all, with(TechniqueSet::BPT, fewer, 0.99 * needed)), 0.99 * needed);
         }
-        assert!(fewer > 0, "nothing to hold back in {} candidates", found.len());
+        // What has none is compared as it is.
+        assert_eq!(chosen(all, with(TechniqueSet::PT, 100, 0.99)), 0.99);
+        assert_eq!(chosen(all, with(TechniqueSet::PT, 100, 1.01)), 1.0);
+    }
+
+    #[test]
+    fn a_step_gains_more_than_a_part_and_more_than_its_error() {
+        let all = judged([1.0; GROUPS], 1.0);
+        assert!(judged([1.0; GROUPS], 0.94).beats(&all) && !judged([1.0; GROUPS], 0.96).beats(&all));
+        assert!(judged([1.0; GROUPS], 0.94).may_beat(&all) && !judged([1.0; GROUPS], 0.96).may_beat(&all));
+        // Half of the groups gain, the others lose: the sum gains 20 % with a standard error of 38 %.
+        let noisy = judged(std::array::from_fn(|i| if i % 2 == 0 { -0.2 } else { 1.8 }), 1.0);
+        let (gain, error) = noisy.gain_over(&all);
+        assert!((gain / 8.0 - 0.2).abs() < 1e-9 && (error / 8.0 - 0.378).abs() < 1e-3, "{gain} {error}");
+        assert!(!noisy.beats(&all) && noisy.may_beat(&all));
+        let impossible = judged([f64::INFINITY; GROUPS], 1.0);
+        assert!(all.beats(&impossible) && !impossible.beats(&all) && !impossible.may_beat(&all));
+        assert!(!impossible.beats(&impossible));
     }
 }

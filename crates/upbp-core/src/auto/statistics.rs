@@ -1,188 +1,225 @@
-//! A small run before the first iteration: it sets radii and counts.
-//!
-//! Whatever it finds is fixed before any sample of the image is drawn, so it introduces no bias; it has random streams of its
-//! own, so it is the same for every run of a seed.
+//! Statistics of light and camera sub-paths, from which radii, counts and memory follow.
 
 use glam::Vec3;
-use rayon::prelude::*;
 use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{DynObserver, ObservedVertex, Observer};
-use upbp_estimators::path::{Context, LightVertex, Scratch, Site};
-use upbp_estimators::scene::Scene;
-use upbp_estimators::trace::trace_camera_path;
+use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Site};
+use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, StreamKind, Technique,
-    TechniqueSet, World,
+    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan as IterationPlan, PlanChoices,
+    StreamKind, Technique, TechniqueSet, World as PreparedScene,
 };
 
-use crate::auto::choices::usual_roulette;
-use crate::auto::emitters::pixel;
-use crate::auto::memory::LightCounts;
-use crate::auto::neighbours::{Nearest, Neighbours, median};
-use crate::budget::Halt;
-use crate::render::engine::Clock;
-use crate::render::passes::{Lists, light_pass};
+use super::neighbours::{Nearest, Neighbours, median};
+use super::pieces::{in_pieces, pixel};
+use super::roulette::usual_roulette;
+use crate::budget::{Allowance, Clock, Halt};
+use crate::error::RenderError;
 use crate::settings::CheckedSettings;
 
-/// Light sub-paths of the pilot: of a first, quick one, and at most of the one that counts,
-pub(crate) const LIGHT_PATHS: [u32; 2] = [1024, 8192];
-/// which does with less if they have more than so many vertices.
-const VERTICES: f64 = 24_576.0;
-/// One of so many leaves beams.
+/// Light sub-paths of a quick look.
+pub(crate) const FEW_LIGHT_PATHS: u32 = 1024;
+/// Light sub-paths at most.
+pub(crate) const LIGHT_PATHS: u32 = 8192;
+/// Light vertices that are enough: sub-paths are added until there are about as many.
+const ENOUGH_VERTICES: f64 = 24_576.0;
+/// Light sub-paths for each one that leaves beams.
 const PATHS_PER_BEAM_PATH: u32 = 8;
 /// Camera sub-paths.
-const CAMERA_PATHS: u64 = 1024;
-/// Of them in a piece of work.
-const CHUNK: u64 = 64;
+const CAMERA_PATHS: u32 = 1024;
 /// Queries of each kind that are measured.
 const QUERIES: usize = 96;
 /// Light vertices that distances are measured to: those of the first light sub-paths.
 const NEIGHBOURS: usize = 16384;
 
-/// What the pilot found.
+/// Averages over light sub-paths, and typical distances between photons and queries.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Pilot {
-    /// Wall seconds per light sub-path, with all threads at work: for limits of time, which are kept by the clock.
+pub(crate) struct Statistics {
+    /// Wall seconds per light sub-path, with all threads at work: for limits of time, which are kept by the
+    /// clock.
     pub(crate) light_path_seconds: f64,
     /// Connectible vertices per light sub-path.
     pub(crate) vertices_per_path: f64,
-    /// Of them those on surfaces that are looked up,
+    /// Photons on surfaces, per light sub-path; 0 if none is queried.
     pub(crate) surface_per_path: f64,
-    /// and those in media.
+    /// Photons in media, per light sub-path; 0 if none is queried.
     pub(crate) medium_per_path: f64,
     /// Photon beams per light sub-path that leaves beams.
     pub(crate) beams_per_path: f64,
-    /// Pieces that these are cut into for look-ups.
+    /// Pieces of photon beams in the tree, per light sub-path that leaves beams.
     pub(crate) pieces_per_path: f64,
-    /// Width of a pixel where camera sub-paths first meet what scatters in more than one direction, median; 0 where nothing does.
+    /// Width of a pixel where camera sub-paths first meet what scatters in more than one direction, median in
+    /// scene units; 0 where nothing does.
     pub(crate) footprint: f32,
-    /// Typical distances to the nearest neighbours; `None` where there is nothing.
+    /// Photons on surfaces around points of camera sub-paths there; `None` where there is nothing.
     pub(crate) surf: Option<Neighbours>,
-    /// PP3D.
+    /// Photons in media around points.
     pub(crate) pp3d: Option<Neighbours>,
-    /// PB2D.
+    /// Photons in media around query beams.
     pub(crate) pb2d: Option<Neighbours>,
-    /// BP2D.
+    /// Photon beams around points.
     pub(crate) bp2d: Option<Neighbours>,
-    /// BB1D.
+    /// Photon beams around query beams.
     pub(crate) bb1d: Option<Neighbours>,
 }
 
-/// Runs a pilot with at most so many light sub-paths, or a part of them and of the camera sub-paths. `None` if it was halted.
-pub(crate) fn run<S: Scene>(
-    world: &World<'_, S>,
+/// Measures with at most `light_paths` light sub-paths; with fewer, and fewer camera sub-paths, if there is
+/// no time.
+///
+/// # Errors
+/// [`RenderError::Cancelled`].
+pub(crate) fn measure<S: Scene>(
+    scene: &PreparedScene<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
-    most_light_paths: u32,
-    part: f64,
-    halt: &Halt<'_>,
-) -> Option<Pilot> {
-    let most_light_paths = (part * f64::from(most_light_paths)).ceil() as u32;
-    let nominal = 1e-3 * world.bounds.radius;
-    let plan_with = |light_paths| {
-        let choices = PlanChoices {
-            seed: settings.seed,
-            iteration: 0,
-            // Light tracing is of no use here.
-            techniques: techniques.without([Technique::LightTracing].into_iter().collect()),
-            light_paths,
-            beam_paths: light_paths / PATHS_PER_BEAM_PATH,
-            connections: 1.0,
-            next_events: 1.0,
-            look_ups: LookUps::ALL,
-            vertices_per_light_path: 1.0,
-            lengths: PathLengths { min: settings.min_length, max: settings.max_length },
-            roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
-            kernels: Kernels {
-                surf: Kernel::disc(nominal),
-                pp3d: Kernel::ball(nominal),
-                pb2d: Kernel::parabolic_disc(nominal),
-                bp2d: Kernel::parabolic_disc(nominal),
-                bb1d: Kernel::parabolic_line(nominal),
-            },
-            heuristic: Heuristic::Balance,
-            photon_beams: settings.photon_beams,
-            query_beams: BeamExtent::Short,
-        };
-        Plan::new(world.scene, &choices)
-    };
-    let mut light = Lists::default();
-    let few = most_light_paths.min(LIGHT_PATHS[0]);
-    let mut plan = plan_with(few);
-    let mut clock = Clock::start();
-    trace_light(world, &plan, &mut light, halt)?;
-    let enough = VERTICES / light.vertices.len().max(1) as f64 * f64::from(few);
-    let light_paths = (enough as u32).min(most_light_paths);
-    if light_paths > few {
-        plan = plan_with(light_paths);
-        clock.lap();
-        trace_light(world, &plan, &mut light, halt)?;
+    light_paths: u32,
+    allowance: &Allowance<'_>,
+) -> Result<Statistics, RenderError> {
+    let use_nothing = [Technique::Hit, Technique::Nee, Technique::LightTracing].into_iter().collect();
+    let only_light_tracing = techniques.without(use_nothing).is_empty();
+    if only_light_tracing && !(allowance.is_limited() && techniques.has(Technique::LightTracing)) {
+        return Ok(Statistics::default());
     }
-    let light_time = clock.lap();
-    let mut queries = camera_queries(world, &plan, (part * CAMERA_PATHS as f64).ceil() as u64, halt)?;
-    let beam_paths = f64::from(plan.beam_paths);
-    let paths = f64::from(plan.light_paths);
-    let near = first_paths(&light.vertices, paths);
-    let all_photons =
-        |keep: fn(&Site<S::Bsdf>) -> bool| light.vertices.iter().filter(|v| keep(&v.site)).count() as f64;
-    let (on_surfaces, in_media) =
-        (|site: &Site<_>| matches!(site, Site::Surface(_)), |site: &Site<_>| matches!(site, Site::Medium(_)));
-    let (surface, medium) = (photons(near.0, on_surfaces), photons(near.0, in_media));
-    // Split in any case: so memory is enough whether or not the beams of an iteration are.
-    let beams = SegmentTree::build(
-        light.beams.iter().map(|beam| (beam.segment, ())).collect(),
-        SplitParams::default(),
-    );
-    let looked_up = |on: bool, keep| if on { all_photons(keep) / paths } else { 0.0 };
-    let near = Nearest { paths: near.1, scale: world.bounds.radius };
-    let near_beams = Nearest { paths: beam_paths, ..near };
-    let wanted = |technique, found: &dyn Fn() -> Option<Neighbours>| {
-        plan.techniques.has(technique).then(found).flatten()
+    let run = |part: f64, halt: &Halt<'_>| {
+        let light_paths = (part * f64::from(light_paths)).ceil() as u32;
+        let camera_paths = (part * f64::from(CAMERA_PATHS)).ceil() as u32;
+        let plan = |paths| nominal_plan(scene, settings, techniques, paths);
+        let light = LightPaths::trace(scene, plan, light_paths, halt)?;
+        let plan = plan(light.paths);
+        let queries = Queries::trace(&Context { world: scene, plan: &plan }, camera_paths, halt)?;
+        Some(light.statistics(&plan, queries, scene.bounds.radius))
     };
-    Some(Pilot {
-        light_path_seconds: light_time.as_secs_f64() / paths,
-        vertices_per_path: light.vertices.len() as f64 / paths,
-        footprint: median(&mut queries.footprints).unwrap_or(0.0),
-        surface_per_path: looked_up(plan.looks_up(Technique::Surf), on_surfaces),
-        medium_per_path: looked_up(plan.stores_medium_photons(), in_media),
-        pieces_per_path: beams.pieces() as f64 / beam_paths,
-        beams_per_path: light.beams.len() as f64 / beam_paths,
-        surf: wanted(Technique::Surf, &|| {
-            near.of(&queries.surfaces, surface.len(), 2.0, |point, radius, found| {
-                surface.in_ball(*point, radius, |(), distance2| found(distance2.sqrt()));
-            })
-        }),
-        pp3d: wanted(Technique::Pp3d, &|| {
-            near.of(&queries.media, medium.len(), 3.0, |point, radius, found| {
-                medium.in_ball(*point, radius, |(), distance2| found(distance2.sqrt()));
-            })
-        }),
-        pb2d: wanted(Technique::Pb2d, &|| {
-            near.of(&queries.edges, medium.len(), 2.0, |edge, radius, found| {
-                medium.around_ray(edge, radius, |(), _, distance2| found(distance2.sqrt()));
-            })
-        }),
-        bp2d: wanted(Technique::Bp2d, &|| {
-            near_beams.of(&queries.media, light.beams.len(), 2.0, |point, radius, found| {
-                beams.around_point(*point, radius, |(), _, distance2| found(distance2.sqrt()));
-            })
-        }),
-        // Tells how many beams are enough, too.
-        bb1d: near_beams.of(&queries.edges, light.beams.len(), 1.0, |edge, radius, found| {
-            beams.around_ray(edge, radius, |(), approach| found(approach.distance));
-        }),
-    })
+    allowance.largest(run).ok_or(RenderError::Cancelled)
 }
 
-fn trace_light<S: Scene>(
-    world: &World<'_, S>,
-    plan: &Plan,
-    lists: &mut Lists<S::Bsdf>,
-    halt: &Halt<'_>,
-) -> Option<Counters> {
-    let (context, expected) = (Context { world, plan }, LightCounts::default());
-    light_pass(&context, StreamKind::PilotLight, &expected, lists, halt, |_| ())
+/// A plan whose light sub-paths and camera sub-paths go where those of iterations do. Its radii are of no
+/// importance.
+fn nominal_plan<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    light_paths: u32,
+) -> IterationPlan {
+    let nominal = 1e-3 * scene.bounds.radius;
+    let choices = PlanChoices {
+        seed: settings.seed,
+        iteration: 0,
+        techniques: techniques.without(TechniqueSet::EMPTY.with(Technique::LightTracing)),
+        light_paths,
+        beam_paths: light_paths / PATHS_PER_BEAM_PATH,
+        connections: 1.0,
+        next_events: 1.0,
+        look_ups: LookUps::ALL,
+        vertices_per_light_path: 1.0,
+        lengths: PathLengths { min: settings.min_length, max: settings.max_length },
+        roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
+        kernels: Kernels {
+            surf: Kernel::disc(nominal),
+            pp3d: Kernel::ball(nominal),
+            pb2d: Kernel::parabolic_disc(nominal),
+            bp2d: Kernel::parabolic_disc(nominal),
+            bb1d: Kernel::parabolic_line(nominal),
+        },
+        heuristic: Heuristic::Balance,
+        photon_beams: settings.photon_beams,
+        query_beams: BeamExtent::Short,
+    };
+    IterationPlan::new(scene.scene, &choices)
+}
+
+/// Light sub-paths with all that they store.
+struct LightPaths<B> {
+    paths: u32,
+    vertices: Vec<LightVertex<B>>,
+    beams: Vec<PhotonBeam>,
+    /// Wall seconds per light sub-path.
+    seconds: f64,
+}
+
+impl<B: Copy + Send + Sync> LightPaths<B> {
+    /// Traces a few first, then at most `most` if their vertices are not [enough](ENOUGH_VERTICES).
+    fn trace<S: Scene<Bsdf = B>>(
+        scene: &PreparedScene<'_, S>,
+        plan: impl Fn(u32) -> IterationPlan,
+        most: u32,
+        halt: &Halt<'_>,
+    ) -> Option<Self> {
+        let trace = |paths| {
+            let mut clock = Clock::start();
+            let plan = plan(paths);
+            let context = Context { world: scene, plan: &plan };
+            let pieces = in_pieces(paths, halt, |index, scratch, out: &mut LightChunk<B>| {
+                trace_light_path(&context, StreamKind::PilotLight, index, scratch, out, &mut ());
+                true
+            })?;
+            let (mut vertices, mut beams) = (Vec::new(), Vec::new());
+            for out in pieces {
+                vertices.extend(out.vertices);
+                beams.extend(out.beams);
+            }
+            Some(Self { paths, vertices, beams, seconds: clock.lap().as_secs_f64() / f64::from(paths) })
+        };
+        let few = most.min(FEW_LIGHT_PATHS);
+        let first = trace(few)?;
+        let enough = ENOUGH_VERTICES / first.vertices.len().max(1) as f64 * f64::from(few);
+        let more = (enough as u32).min(most);
+        if more > few { trace(more) } else { Some(first) }
+    }
+
+    fn statistics(&self, plan: &IterationPlan, mut queries: Queries, scale: f32) -> Statistics {
+        let (paths, beam_paths) = (f64::from(self.paths), f64::from(plan.beam_paths));
+        let on_surfaces = |site: &Site<B>| matches!(site, Site::Surface(_));
+        let in_media = |site: &Site<B>| matches!(site, Site::Medium(_));
+        let per_path = |queried: bool, keep: &dyn Fn(&Site<B>) -> bool| {
+            let count = self.vertices.iter().filter(|vertex| keep(&vertex.site)).count();
+            if queried { count as f64 / paths } else { 0.0 }
+        };
+        let (near, near_paths) = first_paths(&self.vertices, paths);
+        let (surface, medium) = (photons(near, on_surfaces), photons(near, in_media));
+        // Split in any case: so memory is enough whether or not the beams of an iteration are.
+        let segments = self.beams.iter().map(|beam| (beam.segment, ())).collect();
+        let beams = SegmentTree::build(segments, SplitParams::default());
+        let near = Nearest { paths: near_paths, scale };
+        let near_beams = Nearest { paths: beam_paths, scale };
+        let of = |technique, found: &dyn Fn() -> Option<Neighbours>| {
+            plan.techniques.has(technique).then(found).flatten()
+        };
+        Statistics {
+            light_path_seconds: self.seconds,
+            vertices_per_path: self.vertices.len() as f64 / paths,
+            footprint: median(&mut queries.footprints).unwrap_or(0.0),
+            surface_per_path: per_path(plan.looks_up(Technique::Surf), &on_surfaces),
+            medium_per_path: per_path(plan.stores_medium_photons(), &in_media),
+            pieces_per_path: beams.pieces() as f64 / beam_paths,
+            beams_per_path: self.beams.len() as f64 / beam_paths,
+            surf: of(Technique::Surf, &|| {
+                near.of(&queries.surfaces, surface.len(), 2.0, |point, radius, found| {
+                    surface.in_ball(*point, radius, |(), distance2| found(distance2.sqrt()));
+                })
+            }),
+            pp3d: of(Technique::Pp3d, &|| {
+                near.of(&queries.media, medium.len(), 3.0, |point, radius, found| {
+                    medium.in_ball(*point, radius, |(), distance2| found(distance2.sqrt()));
+                })
+            }),
+            pb2d: of(Technique::Pb2d, &|| {
+                near.of(&queries.edges, medium.len(), 2.0, |edge, radius, found| {
+                    medium.around_ray(edge, radius, |(), _, distance2| found(distance2.sqrt()));
+                })
+            }),
+            bp2d: of(Technique::Bp2d, &|| {
+                near_beams.of(&queries.media, self.beams.len(), 2.0, |point, radius, found| {
+                    beams.around_point(*point, radius, |(), _, distance2| found(distance2.sqrt()));
+                })
+            }),
+            // Tells how many beams are enough, too.
+            bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, |edge, radius, found| {
+                beams.around_ray(edge, radius, |(), approach| found(approach.distance));
+            }),
+        }
+    }
 }
 
 /// The vertices of the first light sub-paths, and how many sub-paths those are.
@@ -197,7 +234,7 @@ fn photons<B>(vertices: &[LightVertex<B>], keep: impl Fn(&Site<B>) -> bool) -> P
     PointTree::build(vertices.iter().filter(|v| keep(&v.site)).map(|v| (v.position, ())).collect())
 }
 
-/// Where camera sub-paths look.
+/// Queries that camera sub-paths make.
 #[derive(Default)]
 struct Queries {
     surfaces: Vec<Vec3>,
@@ -248,43 +285,30 @@ impl<B> Observer<B> for Queries {
     }
 }
 
-fn camera_queries<S: Scene>(
-    world: &World<'_, S>,
-    plan: &Plan,
-    paths: u64,
-    halt: &Halt<'_>,
-) -> Option<Queries> {
-    use upbp_estimators::scene::Camera;
-    let crop = world.scene.camera().crop();
-    let context = Context { world, plan };
-    let map = LightMap::empty();
-    let pieces: Vec<Queries> = (0..paths.div_ceil(CHUNK))
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, chunk| {
-            let mut queries = Queries::default();
-            for index in chunk * CHUNK..((chunk + 1) * CHUNK).min(paths) {
-                if halt.now() {
-                    return None;
-                }
-                let (kind, pixel) = (StreamKind::PilotCamera, pixel(crop, index));
-                let counters = &mut Counters::default();
-                let observer: &mut DynObserver<'_, S::Bsdf> = &mut queries;
-                trace_camera_path(&context, &map, kind, pixel, index, scratch, counters, observer);
-            }
-            Some(queries)
-        })
-        .collect::<Option<_>>()?;
-    let mut queries = Queries::default();
-    for piece in pieces {
-        queries.surfaces.extend(piece.surfaces);
-        queries.media.extend(piece.media);
-        queries.edges.extend(piece.edges);
-        queries.footprints.extend(piece.footprints);
+impl Queries {
+    /// The queries of camera sub-paths all over the picture.
+    fn trace<S: Scene>(context: &Context<'_, S>, paths: u32, halt: &Halt<'_>) -> Option<Self> {
+        let crop = context.world.scene.camera().crop();
+        let map = LightMap::empty();
+        let pieces = in_pieces(paths, halt, |index, scratch, queries: &mut Self| {
+            let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
+            let observer: &mut DynObserver<'_, S::Bsdf> = queries;
+            let counters = &mut Counters::default();
+            trace_camera_path(context, &map, kind, pixel(crop, index), index, scratch, counters, observer);
+            true
+        })?;
+        let mut queries = Self::default();
+        for piece in pieces {
+            queries.surfaces.extend(piece.surfaces);
+            queries.media.extend(piece.media);
+            queries.edges.extend(piece.edges);
+            queries.footprints.extend(piece.footprints);
+        }
+        thin(&mut queries.surfaces);
+        thin(&mut queries.media);
+        thin(&mut queries.edges);
+        Some(queries)
     }
-    thin(&mut queries.surfaces);
-    thin(&mut queries.media);
-    thin(&mut queries.edges);
-    Some(queries)
 }
 
 /// Keeps `QUERIES` elements, evenly.

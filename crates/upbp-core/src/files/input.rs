@@ -7,11 +7,11 @@ use std::path::Path;
 /// The longest text that is read, in bytes.
 const MAX_TEXT: u64 = 1 << 28;
 
-/// Opens a regular file of at most `limit` bytes. Anything else is refused before it is opened: a device may be without an end,
-/// and a pipe may never begin.
+/// Opens a regular file of at most `limit` bytes. Anything else is refused before it is opened: a device may
+/// be without an end, and a pipe may never begin.
 ///
 /// # Errors
-/// What the file system says, or what was found instead of such a file.
+/// The file system's own, or one that names what was found instead of such a file.
 pub fn open_file(path: &Path, limit: u64) -> io::Result<File> {
     let metadata = fs::metadata(path)?;
     if !metadata.is_file() {
@@ -26,10 +26,11 @@ pub fn open_file(path: &Path, limit: u64) -> io::Result<File> {
     File::open(path)
 }
 
-/// Reads a text, such as a scene, settings or a plan, of at most 256 MiB. A byte order mark at its start is left out.
+/// Reads a text, such as a scene, settings or a plan, of at most 256 MiB. A byte order mark at its start is
+/// left out.
 ///
 /// # Errors
-/// As [`open_file`]; or the line that is not UTF-8.
+/// Those of [`open_file`]; or one that names the line that is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     let mut bytes = Vec::new();
     // Files that the system makes up have no size before they are read.
@@ -45,11 +46,11 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// Opens an `OpenEXR` image. One that says it is larger than its file can hold is refused, since decoders take all memory before
-/// they read the first pixel.
+/// Opens an `OpenEXR` image. One that says it is larger than its file can hold is refused, since decoders
+/// take all memory before they read the first pixel.
 ///
 /// # Errors
-/// As [`open_file`]; or what is wrong with the header.
+/// Those of [`open_file`]; or one that says what is wrong with the header.
 pub fn open_exr(path: &Path) -> io::Result<BufReader<File>> {
     // No compression of the format makes more of a byte; the rest is for small images.
     const BYTES_PER_BYTE: u64 = 1100;

@@ -8,7 +8,7 @@ use self::platform::{FileId, file_id, is_block_device, is_character_device};
 use super::whole::{folder, is_one_name, target};
 use crate::error::OutputError;
 
-/// What a file holds. One that is there and holds something else is not overwritten.
+/// Kinds of files. One that is there and holds something else is not overwritten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// An OpenEXR image.
@@ -38,13 +38,13 @@ impl Content {
         }
     }
 
-    /// How files begin that hold it.
+    /// First bytes of such a file.
     const fn beginning(self) -> &'static [u8] {
         match self {
             Self::Exr => b"\x76\x2f\x31\x01",
             Self::Png => b"\x89PNG\r\n\x1a\n",
             Self::Report => b"{",
-            Self::Plan => b"[",
+            Self::Plan => b"Plan(",
             Self::State => b"UPBPSTAT",
             Self::Text(beginning) => beginning.as_bytes(),
         }
@@ -54,20 +54,20 @@ impl Content {
 /// A file that is going to be written.
 #[derive(Clone, Copy, Debug)]
 pub struct Output<'a> {
-    /// What it is called in messages, such as the option that names it.
+    /// Name in messages, such as the option that names the file.
     pub role: &'a str,
-    /// Where.
+    /// Path of the file.
     pub path: &'a Path,
-    /// What will be in it.
+    /// Kind of its content.
     pub content: Content,
 }
 
 /// Checks, before the work, that writing `outputs` destroys nothing else: that they are different files, none
-/// of `inputs`, and that those that are there already hold what will be in them, or nothing. Links are followed,
-/// and hard links to a file are the same file. An input is its role and its path; a file that is read and written
-/// on purpose is an output only.
+/// of `inputs`, and that those that are there already hold what will be in them, or nothing. Links are
+/// followed, and hard links to a file are the same file. An input is its role and its path; a file that is
+/// read and written on purpose is an output only.
 ///
-/// Where the platform has no numbers of files (all but Unix), hard links are not noticed.
+/// Hard links are not noticed on platforms that have no numbers of files (all but Unix).
 ///
 /// # Errors
 /// [`SameFile`](OutputError::SameFile), [`Overwrites`](OutputError::Overwrites), or what the file system
@@ -117,7 +117,7 @@ fn holds(path: &Path, content: Content) -> io::Result<bool> {
     Ok(found.is_empty() || found == beginning)
 }
 
-/// What tells one file from another.
+/// Identity of a file.
 enum Identity {
     /// One that is there.
     There(FileId),

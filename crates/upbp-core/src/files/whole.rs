@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::error::OutputError;
 
-/// What the names of unfinished files end with.
+/// End of the names of unfinished files.
 const UNFINISHED: &str = ".part";
 
 /// The age at which an unfinished file is no longer being written.
@@ -17,7 +17,7 @@ const LEFTOVER: Duration = Duration::from_secs(3600);
 /// Checks that a file can be written, before hours are spent on its content.
 ///
 /// # Errors
-/// What the file system says; a file that is there and read-only; a folder.
+/// The file system's own; or that the file is read-only, or a folder.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     let check = || {
         if path.is_dir() {
@@ -35,9 +35,9 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     check().map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
 
-/// Writes a file beside its place, forces it to the disk and moves it there: whoever looks, whenever the process or the machine
-/// stops, finds the old file or the new one. A read-only file stays. What is no regular file, such as a pipe,
-/// is written to directly.
+/// Writes a file beside its place, forces it to the disk and moves it there: whoever looks, whenever the
+/// process or the machine stops, finds the old file or the new one. A read-only file stays. What is no
+/// regular file, such as a pipe, is written to directly.
 pub(crate) fn write_whole(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<File>) -> Result<(), OutputError>,
@@ -69,7 +69,7 @@ pub(crate) fn write_whole(
 /// Writes a text as a whole or not at all.
 ///
 /// # Errors
-/// What the file system says.
+/// The file system's own.
 pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
     write_whole(path, |writer| {
         let fail = |source| OutputError::Write { path: path.to_owned(), source };
@@ -77,8 +77,8 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
     })
 }
 
-/// Removes what processes that were killed while they wrote `path` have left beside it, once it is an hour old. Failures
-/// do not matter: there is nothing to remove then, or nothing to be done.
+/// Removes what processes that were killed while they wrote `path` have left beside it, once it is an hour
+/// old. Failures do not matter: there is nothing to remove then, or nothing to be done.
 pub fn remove_leftovers(path: &Path) {
     let Ok(target) = target(path) else { return };
     let (Some(name), Ok(entries)) = (target.file_name(), fs::read_dir(folder(&target))) else { return };
@@ -100,8 +100,8 @@ fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
-/// Refuses a file that is not to be changed. A new one in its place is a change, too, for which the file system
-/// asks the folder only.
+/// Refuses a file that is not to be changed. A new one in its place is a change, too, for which the file
+/// system asks the folder only.
 fn check_not_protected(target: &Path) -> io::Result<()> {
     let metadata = match fs::metadata(target) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -134,8 +134,8 @@ pub(super) fn folder(path: &Path) -> &Path {
     }
 }
 
-/// A new file in the same folder, so that moving is a rename. Its name is one that no other process chooses, on this machine or
-/// on another that shares the folder.
+/// A new file in the same folder, so that moving is a rename. Its name is one that no other process chooses,
+/// on this machine or on another that shares the folder.
 fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
     let temporary = beside(path, mark())?;
     let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;

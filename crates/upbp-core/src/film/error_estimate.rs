@@ -1,4 +1,4 @@
-//! How far an image is from the converged one, told by two halves of it that are independent.
+//! Estimates of the error of an image, by two halves of it that are independent.
 //!
 //! Their difference has the variance that stratified random numbers leave. What the error is relative
 //! to, the converged image, is not known: a pixel's own value is the worst guess where it matters, since
@@ -42,8 +42,8 @@ const FEW_ITERATIONS: u64 = 8;
 pub struct HalfImage<'a> {
     /// All light.
     pub image: &'a [[f32; 3]],
-    /// Of it, light that the camera sees directly, or by mirrors and through glass only: then it is no
-    /// sign of an error that a pixel is much brighter than its neighbours. `None` where it is not known.
+    /// The part of the light that the camera sees directly, or by mirrors and through glass only: then it is
+    /// no sign of an error that a pixel is much brighter than its neighbours. `None` where it is not known.
     pub seen: Option<&'a [[f32; 3]]>,
     /// Number of iterations.
     pub iterations: u64,
@@ -60,7 +60,7 @@ pub struct ErrorEstimate {
     pub high: f64,
     /// Why there is no upper end.
     pub doubt: Option<Doubt>,
-    /// How heavy the tail of the pixels' errors is, the exponent of a Pareto distribution inverted:
+    /// Weight of the tail of the pixels' errors: the exponent of a Pareto distribution inverted:
     /// without a variance from 1/2 on, without a mean from 1 on.
     pub tail_index: f64,
 }
@@ -183,7 +183,8 @@ impl fmt::Display for Doubt {
     }
 }
 
-/// The mean of the pixels' errors, infinite without any, and the factor between it and the ends of its interval.
+/// The mean of the pixels' errors, infinite without any, and the factor between it and the ends of its
+/// interval.
 fn mean_and_factor(errors: &[f32]) -> (f64, f64) {
     // Pieces of fixed size, added in their order.
     let add = |[sum, squares]: [f64; 2], t: &f32| [sum + f64::from(*t), squares + f64::from(*t).powi(2)];
@@ -235,7 +236,7 @@ struct Sums {
     noise: [f64; 3],
 }
 
-/// What a fine window says about the pixel in its middle.
+/// Estimate for a pixel from the fine window around it.
 #[derive(Clone, Copy)]
 struct Fine {
     mean: [f64; 3],
@@ -243,7 +244,7 @@ struct Fine {
     noise: [f64; 3],
     /// The mean without the pixel in the middle.
     others: [f64; 3],
-    /// How far the pixel's own value is to be trusted, `[0, 1]`.
+    /// Trust in the pixel's own value, `[0, 1]`.
     own: [f64; 3],
 }
 
@@ -258,7 +259,7 @@ struct Block {
 }
 
 impl HalfImage<'_> {
-    /// What is not seen directly.
+    /// Light that is not seen directly.
     fn rest(&self, i: usize) -> [f32; 3] {
         let seen = self.seen.map_or([0.0; 3], |seen| seen[i]);
         std::array::from_fn(|c| (self.image[i][c] - seen[c]).max(0.0))
@@ -407,7 +408,7 @@ impl Fine {
 }
 
 impl Block {
-    /// How far the mean of a fine window is to be trusted beside that of the coarse one.
+    /// Trust in the mean of a fine window beside that of the coarse one.
     fn trust(&self, c: usize) -> f64 {
         let mean = self.mean[c] / self.pixels;
         signal(self.square[c] / self.pixels - mean * mean, self.noise[c] / self.pixels)

@@ -1,31 +1,33 @@
 //! Sums of non-negative numbers that do not depend on the order of the additions, to the last bit.
 //!
-//! Floating-point addition is not associative: two machines that share the iterations of a render would get other bits than
-//! one. Here the line of binary digits is cut into bins of 36 bits at fixed places. A number is cut with it, and
-//! what falls into a bin is added to an integer; nothing is ever carried from bin to bin. Two bins are kept: that of the first
-//! digit of the largest number so far, and the one below. When a larger number moves them up, what was below is dropped as
-//! a whole, and it is the same whether it was dropped before it was added or after. So the state is a function of
-//! the numbers as a set.
+//! Floating-point addition is not associative: two machines that share the iterations of a render would get
+//! other bits than one. Here the line of binary digits is cut into bins of 36 bits at fixed places. A number
+//! is cut with it, and what falls into a bin is added to an integer; nothing is ever carried from bin to bin.
+//! Two bins are kept: that of the first digit of the largest number so far, and the one below. When a larger
+//! number moves them up, what was below is dropped as a whole, and it is the same whether it was dropped
+//! before it was added or after. So the state is a function of the numbers as a set.
 //!
-//! The price: of every number the digits below 2⁻³⁶ of the largest are lost, hence a mean is too small by less than 2⁻³⁶ of
-//! the largest number. Without a spread of more than 2¹² among single-precision numbers nothing is lost at all.
+//! The price: of every number the digits below 2⁻³⁶ of the largest are lost, hence a mean is too small by
+//! less than 2⁻³⁶ of the largest number. Without a spread of more than 2¹² among single-precision numbers
+//! nothing is lost at all.
 //!
-//! Source: the bins of J. Demmel and H. D. Nguyen, "Fast Reproducible Floating-Point Summation", ARITH 2013, with integers.
-//! Oracle: `tests::is_the_exact_sum_of_the_digits_kept`.
+//! Source: the bins of J. Demmel and H. D. Nguyen, "Fast Reproducible Floating-Point Summation", ARITH 2013,
+//! with integers. Oracle: `tests::is_the_exact_sum_of_the_digits_kept`.
 
 /// Binary digits per bin.
 const DIGITS: i32 = 36;
 
-/// As many numbers can be added: beyond, a bin could overflow.
+/// Numbers that a sum may have: beyond, a bin could overflow.
 pub(crate) const MAX_COUNT: u64 = 1 << (64 - DIGITS);
 
 /// Places of the first digits of the least and of the greatest number in double precision.
 const PLACES: std::ops::RangeInclusive<i8> = -30..=28;
 
-/// A sum per channel: the upper and the lower bin of each, in units of their last digits, then [a byte](place) for each that says where
-/// these are.
+/// A sum per channel: the upper and the lower bin of each, in units of their last digits, then [a
+/// byte](place) for each that says where these are.
 ///
-/// Plain words, of which zeros are sums of nothing: so that memory for a large film is there at once, and is taken as it is used.
+/// Plain words, of which zeros are sums of nothing: so that memory for a large film is there at once, and is
+/// taken as it is used.
 pub(crate) type Sum3 = [u64; 7];
 
 /// Sums of nothing.
@@ -37,7 +39,8 @@ const NOWHERE: i8 = i8::MIN;
 /// The bytes of a sum in a file, at most.
 pub(crate) const MAX_ENCODED: usize = 3 * 17;
 
-/// Where the upper bin of a channel is: it counts multiples of `2^(36 place)`. `NOWHERE` while the sum is zero.
+/// Place of the upper bin of a channel, which counts multiples of `2^(36 place)`. `NOWHERE` while the sum is
+/// zero.
 fn place(sum: &Sum3, c: usize) -> i8 {
     ((sum[6] >> (8 * c)) as u8 ^ 0x80).cast_signed()
 }

@@ -1,15 +1,16 @@
-//! Sets of pixels, each spread evenly over the picture: an iteration that has to stop early leaves a coarse picture of everything
-//! and not the upper rows of a fine one.
+//! Sets of pixels, each spread evenly over the picture: an iteration that has to stop early leaves a coarse
+//! picture of everything and not the upper rows of a fine one.
 //!
-//! A pixel belongs to a set by its place in a square of 16 × 16 pixels, counted from the corner of what is rendered. The first
-//! set is a grid of one pixel per square; four, sixteen, 64 and 256 sets are grids of half the spacing each.
+//! A pixel belongs to a set by its place in a square of 16 × 16 pixels, counted from the corner of what is
+//! rendered. The first set is a grid of one pixel per square; four, sixteen, 64 and 256 sets are grids of
+//! half the spacing each.
 
 use std::ops::Range;
 
 /// Number of sets.
 pub(crate) const SETS: u32 = 256;
 
-/// All of them.
+/// All sets.
 pub(crate) const ALL: Range<u32> = 0..SETS;
 
 /// Side of a square in pixels.

@@ -23,7 +23,7 @@ impl IterationSet {
         self.ranges.iter().map(|range| range.end - range.start).sum()
     }
 
-    /// Whether there are none.
+    /// Whether the set has no iterations.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty()
@@ -51,7 +51,7 @@ impl IterationSet {
         (next < range.end).then_some(next)
     }
 
-    /// How many indices of `range` are in the set.
+    /// Number of indices of `range` in the set.
     #[must_use]
     pub fn count_in(&self, range: &Range<u64>) -> u64 {
         self.ranges.iter().map(|own| overlap(own, range).map_or(0, |both| both.end - both.start)).sum()
@@ -132,7 +132,7 @@ impl TryFrom<Vec<(u64, u64)>> for IterationSet {
 }
 
 impl fmt::Display for IterationSet {
-    /// As `0..40, 50..60`; of many ranges the first few.
+    /// Ranges, as in `0..40, 50..60`; of many the first few.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         /// Ranges that are shown.
         const SHOWN: usize = 8;

@@ -22,8 +22,8 @@ pub use iterations::{IterationSet, MAX_ITERATIONS};
 pub struct Pixel {
     /// Radiance by layer.
     pub layers: [Spectrum; Layer::COUNT],
-    /// Of it, light that the camera sees directly, by mirrors or through glass: then it is no sign of an error that a pixel is much
-    /// brighter than its neighbours.
+    /// The part of the light that the camera sees directly, by mirrors or through glass: then it is no sign
+    /// of an error that a pixel is much brighter than its neighbours.
     pub seen: Spectrum,
 }
 
@@ -32,13 +32,14 @@ impl Pixel {
     pub const BLACK: Self = Self { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
 }
 
-/// Sums over a set of iterations, to the last bit the same in whatever order they were added. A mean is too small by less than
-/// 2⁻³⁶ of the largest iteration of that pixel.
+/// Sums over a set of iterations, to the last bit the same in whatever order they were added. A mean is too
+/// small by less than 2⁻³⁶ of the largest iteration of that pixel.
 ///
-/// The even and the odd iterations are two halves with no random decision in common: what they differ in tells the error.
+/// The even and the odd iterations are two halves with no random decision in common: what they differ in
+/// tells the error.
 ///
-/// Of an iteration that was stopped a film may hold a part: some sets of pixels that are spread evenly. A pixel without any samples shows
-/// a neighbour's.
+/// A film may hold a part of an iteration that was stopped: some sets of pixels that are spread evenly. A
+/// pixel without any samples shows a neighbour's.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Film {
     rect: PixelRect,
@@ -105,8 +106,8 @@ impl Film {
         pixels(rect) as u64 * pixel as u64
     }
 
-    /// Bytes that writing a film as an image takes besides: the picture, the layers, two halves, variance and error in single precision,
-    /// and one more while it is copied or compressed.
+    /// Bytes that writing a film as an image takes besides: the picture, the layers, two halves, variance and
+    /// error in single precision, and one more while it is copied or compressed.
     pub(crate) fn output_bytes(rect: PixelRect, techniques: TechniqueSet) -> u64 {
         let pixel = (Self::layers_of(techniques).len() + 6) * size_of::<[f32; 3]>();
         pixels(rect) as u64 * pixel as u64
@@ -122,13 +123,6 @@ impl Film {
     #[must_use]
     pub fn layers(&self) -> impl ExactSizeIterator<Item = Layer> + '_ {
         self.layers.iter().map(|(layer, _)| *layer)
-    }
-
-    /// Keeps the layers of `techniques` from now on, too.
-    pub(crate) fn keep(&mut self, techniques: TechniqueSet) {
-        for layer in Self::layers_of(techniques) {
-            self.keep_layer(layer);
-        }
     }
 
     /// The sums of a layer, which is kept from now on.
@@ -193,11 +187,12 @@ impl Film {
         parts.chain(self.iterations.overlap(&other.iterations)).min_by_key(|range| range.start)
     }
 
-    /// Adds an iteration, one value per pixel. Returns how many of the values were not finite or negative; they count as zero.
+    /// Adds an iteration, one value per pixel. Returns how many of the values were not finite or negative;
+    /// they count as zero.
     ///
     /// # Panics
-    /// If `pixels` has another size than the film, or the film holds some of the iteration already, or its index is not below
-    /// [`MAX_ITERATIONS`].
+    /// If `pixels` has another size than the film, or the film holds some of the iteration already, or its
+    /// index is not below [`MAX_ITERATIONS`].
     pub fn add(&mut self, iteration: u64, pixels: &[Pixel]) -> u64 {
         self.add_part(iteration, interleave::ALL, pixels)
     }
@@ -262,13 +257,14 @@ impl Film {
         self.parts.extend(&other.parts);
     }
 
-    /// All lists of sums: those of each layer, of the even iterations, of what is seen directly in even and in odd ones, of the squares.
+    /// All lists of sums: those of each layer, of the even iterations, of what is seen directly in even and
+    /// in odd ones, of the squares.
     fn all(&self) -> impl Iterator<Item = &Vec<Sum3>> {
         let [even, odd] = &self.seen;
         self.layers.iter().map(|(_, sums)| sums).chain([&self.even, even, odd, &self.squares])
     }
 
-    /// The same, to be filled row by row.
+    /// A film whose sums are going to be filled in row by row.
     pub(crate) fn all_mut(&mut self) -> impl Iterator<Item = &mut Vec<Sum3>> {
         let [even, odd] = &mut self.seen;
         let others = [&mut self.even, even, odd, &mut self.squares];
@@ -313,8 +309,8 @@ impl Film {
         Some(self.collect(|i, [even, odd]| exact_sum::values(&sums[i]).map(|v| v / (even + odd))))
     }
 
-    /// The means of the even and of the odd iterations, which are independent of each other. `None` while some pixel has samples of one
-    /// half only.
+    /// The means of the even and of the odd iterations, which are independent of each other. `None` while
+    /// some pixel has samples of one half only.
     #[must_use]
     pub fn halves(&self) -> Option<[Image; 2]> {
         if self.counts().as_flattened().contains(&0.0) {
@@ -323,14 +319,16 @@ impl Film {
         let even = self.collect(|i, [even, _]| exact_sum::values(&self.even[i]).map(|v| v / even));
         let odd = self.collect(|i, [_, odd]| {
             let (total, even) = (self.total(i), exact_sum::values(&self.even[i]));
-            // Sums are cut off far below their last digits in single precision: so may be their difference, below zero.
+            // Sums are cut off far below their last digits in single precision: so may be their difference,
+            // below zero.
             std::array::from_fn(|c| ((total[c] - even[c]) / odd).max(0.0))
         });
         Some([even, odd])
     }
 
-    /// The variance of the mean, from the spread of the iterations; infinite with fewer than two. Overstates what stratified random
-    /// numbers leave of it, evenly among neighbours; [`error_map`](Self::error_map) does not.
+    /// The variance of the mean, from the spread of the iterations; infinite with fewer than two. Overstates
+    /// what stratified random numbers leave of it, evenly among neighbours; [`error_map`](Self::error_map)
+    /// does not.
     #[must_use]
     pub fn variance(&self) -> Image {
         self.collect(|i, [even, odd]| {
@@ -346,7 +344,8 @@ impl Film {
         })
     }
 
-    /// Estimated error of every pixel, from the two halves. `None` while some pixel has samples of one half only.
+    /// Estimated error of every pixel, from the two halves. `None` while some pixel has samples of one half
+    /// only.
     #[must_use]
     pub fn error_map(&self) -> Option<ErrorMap> {
         let halves = self.halves()?;
@@ -404,7 +403,8 @@ impl Film {
         (0..SETS).map(count).collect()
     }
 
-    /// Picture of what `value` says of a pixel by its index and the counts of its halves; black while there is nothing.
+    /// Picture of what `value` says of a pixel by its index and the counts of its halves; black while there
+    /// is nothing.
     fn collect(&self, value: impl Fn(usize, [f64; 2]) -> [f64; 3] + Sync) -> Image {
         let (counts, width) = (self.counts(), self.rect.width as usize);
         let place = |i: usize| (i % width, i / width);
@@ -436,7 +436,8 @@ fn usable(radiance: Spectrum) -> ([f64; 3], u64) {
 }
 
 impl Image {
-    /// relMSE against a reference of the same size: mean over pixels and channels of `(x − r)² / (r² + 0.01)`.
+    /// relMSE against a reference of the same size: mean over pixels and channels of `(x − r)² / (r² +
+    /// 0.01)`.
     #[must_use]
     pub fn relative_mse(&self, reference: &Self) -> f64 {
         self.mean_of(reference, |x, r| (x - r).powi(2) / (r * r + 0.01))
@@ -535,7 +536,7 @@ mod tests {
         a.merge(&b);
         assert_eq!((a.layers().len(), a.image().pixels[1]), (5, [2.0; 3]));
         let mut all = Film::new(RECT, TechniqueSet::BPT.with(upbp_estimators::Technique::Surf));
-        all.keep(TechniqueSet::VOLUME_MERGES);
+        all.merge(&b);
         assert_eq!(all.layers().collect::<Vec<_>>(), Layer::ALL);
     }
 

@@ -15,22 +15,22 @@ use crate::film::{Film, Image as Picture};
 use crate::report::Report;
 use crate::settings::Settings;
 
-/// What an image file says of its origin, RON text in the attribute `upbp`.
+/// Origin of an image file, as RON text in its attribute `upbp`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Metadata<'a> {
     /// Name or hash of the scene.
     pub scene: &'a str,
     /// Settings of the render.
     pub settings: &'a Settings,
-    /// What the render did.
+    /// Report of the render.
     pub report: &'a Report,
 }
 
-/// Writes the mean of a film, its layers, variance, halves and estimated error, as far as there are such:
-/// float32.
+/// Writes the mean of a film, its layers, variance, halves and estimated error, as far as the film has them,
+/// in float32.
 ///
 /// # Errors
-/// What the file system or the encoder says.
+/// Those of the file system or of the encoder.
 pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::result::Result<(), OutputError> {
     let fail = |reason: String| OutputError::Encode { path: path.to_owned(), reason };
     let mut channels = SmallVec::<[AnyChannel<FlatSamples>; 4]>::new();
@@ -100,7 +100,7 @@ fn push(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, prefix: &str, ima
 /// Reads the channels `R`, `G`, `B` of an image.
 ///
 /// # Errors
-/// What the file system or the decoder says.
+/// Those of the file system or of the decoder.
 pub fn read_exr(path: &Path) -> std::result::Result<Picture, OutputError> {
     let unreadable =
         |error: exr::error::Error| OutputError::Read { path: path.to_owned(), reason: error.to_string() };

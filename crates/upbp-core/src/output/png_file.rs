@@ -10,7 +10,7 @@ use crate::film::Image;
 /// Writes `image` as `tones` has it, with the sRGB transfer curve, 8 bits per channel; NaN becomes black.
 ///
 /// # Errors
-/// What the file system or the encoder says.
+/// Those of the file system or of the encoder.
 pub fn write_png(path: &Path, image: &Image, tones: ToneMapping) -> Result<(), OutputError> {
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|pixel| tones.apply(*pixel)).map(quantise).collect();
     write_whole(path, |writer| {

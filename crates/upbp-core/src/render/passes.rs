@@ -1,7 +1,7 @@
 //! The passes of one iteration, in parallel, with a result that does not depend on the number of threads.
 //!
-//! Work is cut into pieces of fixed size, and what pieces return is put together in their order: a reduction by work stealing
-//! would change the last bits with the schedule.
+//! Work is cut into pieces of fixed size, and what pieces return is put together in their order: a reduction
+//! by work stealing would change the last bits with the schedule.
 
 use std::ops::Range;
 
@@ -21,7 +21,8 @@ const LIGHT_CHUNK: u32 = 64;
 /// Pixels per piece of work.
 const CAMERA_CHUNK: usize = 64;
 
-/// Lists that are used again in the next iteration: the allocator need not find a use for what was given back to it.
+/// Lists that are used again in the next iteration: the allocator need not find a use for what was given back
+/// to it.
 pub(crate) struct Lists<B> {
     pub(crate) vertices: Vec<LightVertex<B>>,
     pub(crate) beams: Vec<PhotonBeam>,
@@ -34,17 +35,18 @@ impl<B> Default for Lists<B> {
 }
 
 impl<B> Lists<B> {
-    /// Those of a map that is no longer needed.
+    /// The lists of a map that is no longer needed.
     pub(crate) fn of(map: LightMap<B>) -> Self {
         Self { vertices: map.vertices, beams: map.beams }
     }
 }
 
-/// Traces all light sub-paths of the plan into `lists`, and hands their splats over in the order of the sub-paths. `expected` is how many
-/// vertices and beams there will be, as far as anyone knows. `None` if it was halted: then lists and splats mean nothing.
+/// Traces all light sub-paths of the plan into `lists`, and hands their splats over in the order of the
+/// sub-paths. `expected` is how many vertices and beams there will be, as far as anyone knows. `None` if it
+/// was halted: then lists and splats mean nothing.
 ///
-/// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never more than a
-/// fraction of all in two places.
+/// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never
+/// more than a fraction of all in two places.
 pub(crate) fn light_pass<S: Scene>(
     context: &Context<'_, S>,
     kind: StreamKind,
@@ -90,8 +92,8 @@ pub(crate) fn light_pass<S: Scene>(
     Some(counters)
 }
 
-/// Traces one camera sub-path for each pixel of `rect` that belongs to one of `sets`, and adds it to `pixels`. `None` if it was halted: then
-/// the pixels of these sets mean nothing.
+/// Traces one camera sub-path for each pixel of `rect` that belongs to one of `sets`, and adds it to
+/// `pixels`. `None` if it was halted: then the pixels of these sets mean nothing.
 pub(crate) fn camera_pass<S: Scene>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf>,

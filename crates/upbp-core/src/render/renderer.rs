@@ -1,44 +1,37 @@
-//! The scheduler: iterations, each a plan and three passes, until a rule says stop.
+//! The scheduler: iterations of three passes each, until a rule says stop.
 
 use std::ops::{ControlFlow, Range};
 use std::time::{Duration, Instant};
 
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{Counters, Plan};
+use upbp_estimators::{Counters, Plan as IterationPlan};
 
-use crate::auto;
-use crate::auto::planner::Planner;
-use crate::auto::support::Census;
-use crate::budget::{Canceller, Halt};
+use super::engine::Engine;
+use super::prepare::{Prepared, Start, prepare};
+use super::stop::{Outcome, Progress, StopReason};
+use crate::auto::support::TechniqueSupport;
+use crate::budget::{Canceller, Clock, Halt, Stop};
 use crate::error::{RenderError, StateError};
-use crate::film::ErrorEstimate;
-use crate::film::MAX_ITERATIONS;
-use crate::film::{Film, Pixel};
-use crate::plan::Stage;
-use crate::render::engine::{Clock, Engine};
-use crate::render::prepare::{PREPARATION, Prepared, Start, prepare};
-use crate::render::stop::{Outcome, Progress, Stop, StopReason};
-use crate::report::{ErrorPoint, PassTimes, Report};
+use crate::film::{ErrorEstimate, Film, MAX_ITERATIONS, Pixel};
+use crate::report::Report;
 use crate::settings::CheckedSettings;
-use crate::state::{Identity, State, fingerprint};
+use crate::state::{ErrorPoint, Identity, PassTimes, State, fingerprint};
 
 /// A render of one scene.
 ///
-/// Iterations are independent given their index, and the same for any number of threads: the pool that is current when the
-/// methods are called does the work.
+/// Iterations are independent given their index, and the same for any number of threads: the pool that is
+/// current when the methods are called does the work.
 pub struct Renderer<'a> {
     engine: Box<dyn Engine + 'a>,
-    /// Chooses the plan, unless it is given.
-    planner: Option<Planner>,
     state: State,
     /// The iterations that are rendered.
     range: Range<u64>,
     pixels: Vec<Pixel>,
-    /// How long the camera sub-paths of a set of pixels took, if known.
+    /// Time that the camera sub-paths of a set of pixels took, if known.
     set_time: Option<Duration>,
-    /// How long adding an iteration to the film takes.
+    /// Time that adding an iteration to the film takes.
     film_time: Duration,
-    /// As it was when it was last due.
+    /// Estimate of the error when it was last due.
     estimated_error: ErrorEstimate,
     canceller: Canceller,
 }
@@ -50,7 +43,7 @@ const _: () = {
 };
 
 impl<'a> Renderer<'a> {
-    /// Takes the census, runs the pilot, and makes a plan.
+    /// Looks at the scene and chooses a plan.
     ///
     /// The walks are compiled for the type of scene, where this is called.
     ///
@@ -60,10 +53,12 @@ impl<'a> Renderer<'a> {
         Self::start(scene, settings, Start::default())
     }
 
-    /// As [`new`](Self::new), with more to say: a plan that was made before, a time limit, a handle that stops the preparation too.
+    /// Begins a render with a plan that was made before, with limits that the preparation has to know, or
+    /// with a handle that stops it.
     ///
     /// # Errors
-    /// As `new`; or the plan has techniques that the settings or the scene rule out, or exceeds the memory budget; or it was cancelled.
+    /// Those of [`new`](Self::new); or the plan has techniques that the settings or the scene rule out, or
+    /// exceeds the memory budget; or it was cancelled.
     pub fn start<S: Scene>(
         scene: &'a S,
         settings: CheckedSettings,
@@ -72,14 +67,13 @@ impl<'a> Renderer<'a> {
         Ok(Self::begin(prepare(scene, settings, start)?))
     }
 
-    fn begin(Prepared { engine, planner, canceller, state }: Prepared<'a>) -> Self {
+    fn begin(Prepared { engine, canceller, state }: Prepared<'a>) -> Self {
         /// Nanoseconds per sum of a pixel, where its memory is used for the first time.
         const SUM: u64 = 60;
         let rect = state.film.rect();
         let sums = u64::from(rect.width) * u64::from(rect.height) * (state.film.layers().len() as u64 + 2);
         Self {
             engine,
-            planner,
             state,
             range: 0..MAX_ITERATIONS,
             pixels: Vec::new(),
@@ -90,34 +84,29 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Says which scene this is, so that states of different scenes are told apart: a name for people, and a fingerprint of
-    /// all that the scene's content depends on.
+    /// Says which scene this is, so that states of different scenes are told apart: a name for people, and a
+    /// fingerprint of all that the scene's content depends on.
     pub fn identify_scene(&mut self, name: &str, content: &[u8]) {
         name.clone_into(&mut self.state.identity.scene);
         self.state.identity.fingerprint = fingerprint(content);
     }
 
-    /// Renders only iterations of `range`, which may be a share of a render that many machines work on. Indices from
-    /// [`MAX_ITERATIONS`] on are never rendered.
+    /// Renders only iterations of `range`, which may be a share of a render that many machines work on.
+    /// Indices from [`MAX_ITERATIONS`] on are never rendered.
     pub fn set_range(&mut self, range: Range<u64>) {
         self.range = range.start..range.end.min(MAX_ITERATIONS);
     }
 
-    /// Goes on where a state was left, or adds what others have rendered: what the state holds is not rendered again. For a
-    /// moment there are two films in memory.
+    /// Goes on where a state was left, or adds what others have rendered: what the state holds is not
+    /// rendered again. For a moment there are two films in memory.
+    ///
+    /// The state has to be of the same plan: give it to [`start`](Self::start), where it is not chosen anew.
     ///
     /// # Errors
-    /// As [`State::merge`]: then nothing has changed.
+    /// Those of [`State::merge`]: then nothing has changed.
     pub fn resume(&mut self, state: State) -> Result<(), StateError> {
-        let mut identity = self.state.identity.clone();
-        if self.planner.is_some() && self.state.film.iteration_set().is_empty() {
-            // What was chosen then stays chosen, even if time was measured and would now be measured otherwise.
-            self.state.identity.plan.clone_from(&state.identity.plan);
-        }
+        let identity = self.state.identity.clone();
         let merged = self.state.merge(state);
-        if merged.is_ok() {
-            identity.plan.clone_from(&self.state.identity.plan);
-        }
         // The settings of this render, where they do not matter.
         self.state.identity = identity;
         merged
@@ -129,51 +118,31 @@ impl<'a> Renderer<'a> {
         &self.state
     }
 
-    /// What an iteration does, as far as it has been decided.
+    /// The plan of one iteration.
     #[must_use]
-    pub fn plan(&self, iteration: u64) -> Plan {
-        let Identity { settings, plan: stages, .. } = &self.state.identity;
-        self.engine.plan(settings, stages.stage(iteration), iteration)
+    pub fn iteration_plan(&self, iteration: u64) -> IterationPlan {
+        let Identity { settings, plan, .. } = &self.state.identity;
+        self.engine.iteration_plan(settings, plan, iteration)
     }
 
-    /// Makes the plan for all iterations up to this one, in so many seconds each time.
-    fn plan_up_to(&mut self, iteration: u64, seconds: Option<f64>) {
-        let Some(planner) = &self.planner else { return };
-        let Identity { census, plan, settings, .. } = &mut self.state.identity;
-        let seconds = seconds.filter(|_| !settings.deterministic);
-        let start = Instant::now();
-        while let Some(from) = auto::REVIEWS.get(plan.stages().len()).filter(|from| **from <= iteration) {
-            let review = plan.stages().len() as u32;
-            let stage = self.engine.stage(planner, census, review, &self.canceller, seconds);
-            if self.canceller.is_cancelled() {
-                // What was chosen in a hurry is not what would have been chosen.
-                return;
-            }
-            plan.push(Stage { from: *from, ..stage });
-        }
-        let times = PassTimes { pilot: start.elapsed(), ..PassTimes::default() };
-        self.state.film.keep(plan.techniques());
-        self.state.record.times.add(&times);
-    }
-
-    /// Renders the next iteration: the first of the [range](Self::set_range) that is not on the film yet, or what is missing of it. `false`
-    /// if there is none, or if it was cancelled: then some of it may be on the film.
+    /// Renders the next iteration: the first of the [range](Self::set_range) that is not on the film yet, or
+    /// what is missing of it. `false` if there is none, or if it was cancelled: then some of it may be on the
+    /// film.
     pub fn iterate(&mut self) -> bool {
         self.iterate_until(&Stop::default())
     }
 
-    /// As [`iterate`](Self::iterate), but ends when the time of `stop` is up, too.
+    /// Renders the next iteration, but ends when the time of `stop` is up.
     fn iterate_until(&mut self, stop: &Stop) -> bool {
         /// Sets of pixels that are traced together take about so long: what is lost when a render is stopped.
         const PORTION: Duration = Duration::from_millis(200);
         let Some(iteration) = self.next_iteration() else { return false };
-        self.plan_up_to(iteration, stop.seconds.map(|seconds| PREPARATION * seconds));
         if self.canceller.is_cancelled() {
             return false;
         }
         // Before the deadline is set: memory for a large picture is not had in no time.
         self.pixels.resize(self.state.film.len(), Pixel::BLACK);
-        let plan = self.plan(iteration);
+        let plan = self.iteration_plan(iteration);
         let halt = Halt { canceller: &self.canceller, deadline: self.deadline(stop) };
         let State { record, film, .. } = &mut self.state;
         let rect = film.rect();
@@ -220,8 +189,8 @@ impl<'a> Renderer<'a> {
         self.state.record.times.seconds().total()
     }
 
-    /// Renders until a rule of `stop` holds or `progress`, which is called after every iteration, breaks. Time spent in
-    /// `progress` does not count.
+    /// Renders until a rule of `stop` holds or `progress`, which is called after every iteration, breaks.
+    /// Time spent in `progress` does not count.
     pub fn render(&mut self, stop: &Stop, progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>) -> Outcome {
         let outcome = self.render_until(stop, progress);
         // Room for what is done with the picture.
@@ -259,7 +228,7 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// When an iteration that begins now has to end.
+    /// Moment at which an iteration that begins now has to end.
     fn deadline(&self, stop: &Stop) -> Option<Instant> {
         let limit = stop.seconds?;
         let patience = (0.05 * limit).max(1.0);
@@ -325,13 +294,13 @@ impl<'a> Renderer<'a> {
         &self.state.film
     }
 
-    /// What the scene can use.
+    /// Techniques that the scene can use.
     #[must_use]
-    pub const fn census(&self) -> &Census {
-        &self.state.identity.census
+    pub const fn support(&self) -> &TechniqueSupport {
+        &self.state.identity.support
     }
 
-    /// What was done so far.
+    /// A summary of all that was done so far.
     #[must_use]
     pub fn report(&self) -> Report {
         self.state.report()

@@ -1,21 +1,8 @@
-//! When a render stops, and what it tells meanwhile.
+//! Progress of a render, and the reason why it stopped.
 
 use crate::film::ErrorEstimate;
 use crate::film::Film;
 use crate::state::State;
-
-/// When to stop: as soon as any of the rules holds. Without rules a render goes on until it is cancelled.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stop {
-    /// When the film holds this many iterations.
-    pub iterations: Option<u64>,
-    /// After this many seconds of rendering, those before a resumption and those of the pilot included: at the end of the iteration that
-    /// comes closest, or in the middle of one that would take longer than a twentieth more, or than one second more if that is more.
-    pub seconds: Option<f64>,
-    /// When the upper end of [`Film::estimated_error`] is not above this. Asked after 8, 10, 12, 14, 16, 20, 24, 28, 32, 40 iterations and
-    /// so on: who asks after each stops at the luckiest answer.
-    pub error: Option<f64>,
-}
 
 /// Why a render stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +24,7 @@ pub struct Outcome {
     pub reason: StopReason,
 }
 
-/// Where a render is, after an iteration.
+/// Progress of a render, after an iteration.
 pub struct Progress<'a> {
     /// Iterations done.
     pub iterations: u64,

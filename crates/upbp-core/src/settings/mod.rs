@@ -1,4 +1,4 @@
-//! What a user may choose, and its validation.
+//! Settings of a render, and their validation.
 
 mod techniques;
 
@@ -15,7 +15,8 @@ pub use techniques::{Techniques, UnknownTechniques};
 /// A number of light sub-paths per iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LightPaths {
-    /// As many as there are pixels, within the memory budget; fewer where [`Techniques::Auto`] finds that this pays.
+    /// One light sub-path per pixel, within the memory budget; fewer where [`Techniques::Auto`] finds that
+    /// this pays.
     #[default]
     Auto,
     /// This many, within the memory budget.
@@ -28,26 +29,28 @@ pub enum LightPaths {
 pub struct Settings {
     /// `"auto"`, or a set as in `"bpt+surf+pp3d+pb2d+bb1d"`, of which what the scene cannot use is left out.
     pub techniques: Techniques,
-    /// Choose by a model of costs instead of measured time, so that every run of the same render chooses the same.
+    /// Choose the plan as if the render had no limits, so that every run with the same seed chooses the same,
+    /// whenever it ends.
     pub deterministic: bool,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Light sub-paths per iteration. A count is kept as it is, whatever techniques are chosen.
     pub light_paths: LightPaths,
-    /// Light sub-paths that leave photon beams; `None` for as many as a pilot finds useful, or a quarter or four times of that if techniques are
-    /// chosen.
+    /// Light sub-paths that leave photon beams; `None` for as many as small runs find useful, or a quarter of
+    /// that if techniques are chosen.
     pub beams: Option<u32>,
-    /// Light vertices that every camera vertex is connected to, on average, in `[0.001, 1000]`; `None` for one, or fewer if
-    /// techniques are chosen.
+    /// Light vertices that every camera vertex is connected to, on average, in `[0.001, 1000]`; `None` for
+    /// one.
     pub connections: Option<f32>,
-    /// Points on lights that every camera vertex is connected to, likewise.
+    /// Points on lights that every camera vertex is connected to, on average, in `[0.001, 1000]`; `None` for
+    /// one.
     pub next_events: Option<f32>,
     /// Fewest edges of a path between light and camera, at least 1.
     pub min_length: u32,
-    /// Most edges of a path, at least `min_length`. Thick media that hardly absorb need many: walks that are cut are counted
-    /// in the report.
+    /// Most edges of a path, at least `min_length`. Thick media that hardly absorb need many: walks that are
+    /// cut are counted in the report.
     pub max_length: u32,
-    /// When walks end by Russian roulette; `None` for what is chosen with the techniques, or usual for them.
+    /// Russian roulette; `None` for the one that is chosen with the techniques, or usual for them.
     pub roulette: Option<Roulette>,
     /// Balance or power heuristic.
     pub heuristic: Heuristic,
@@ -59,8 +62,9 @@ pub struct Settings {
     pub radii: Radii,
     /// Whether radii shrink, so that the result converges.
     pub progressive: bool,
-    /// Memory for light vertices, beams, look-up structures and the film, MiB; `None` for half of what the machine has free. If choices
-    /// are [deterministic](Self::deterministic), light vertices, beams and look-ups then take at most 2048 MiB on any machine.
+    /// Memory for light vertices, beams, look-up structures and the film, MiB; `None` for half of what the
+    /// machine has free. If choices are [deterministic](Self::deterministic), light vertices, beams and
+    /// look-ups then take at most 2048 MiB on any machine.
     pub memory: Option<u32>,
 }
 

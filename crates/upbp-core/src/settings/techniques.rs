@@ -10,7 +10,7 @@ use upbp_estimators::{TechniqueSet, UnknownTechnique};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Techniques {
-    /// Those that pay in the scene, with the numbers of samples that pay most ([`crate::RenderPlan`]).
+    /// The techniques that pay in the scene, with the numbers of samples that pay most ([`crate::Plan`]).
     #[default]
     Auto,
     /// These, as far as the scene can use them.

@@ -1,6 +1,7 @@
 //! A checksum for files: no guard against malice, but against disks, cables and half-written copies.
 
-/// A running checksum of 64 bits. A change within eight neighbouring bytes never goes unseen, any other with probability 2⁻⁶⁴.
+/// A running checksum of 64 bits. A change within eight neighbouring bytes never goes unseen, any other with
+/// probability 2⁻⁶⁴.
 #[derive(Clone, Debug)]
 pub(super) struct Checksum(u64);
 

@@ -8,9 +8,9 @@
 //!              directly in even and in odd ones, of squares
 //! ```
 //!
-//! A block is its length (u32), its bytes, and the checksum (u64) of all blocks so far: each block is
-//! known to be good, and in its place, before anything in it is believed. Memory for the film grows as blocks arrive, so a
-//! file cannot ask for more than some fifty times its own length.
+//! A block is its length (u32), its bytes, and the checksum (u64) of all blocks so far: each block is known
+//! to be good, and in its place, before anything in it is believed. Memory for the film grows as blocks
+//! arrive, so a file cannot ask for more than some fifty times its own length.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
@@ -26,11 +26,11 @@ use crate::film::exact_sum::{self, MAX_ENCODED, Sum3};
 use crate::film::interleave::SETS;
 use crate::film::{IterationSet, MAX_ITERATIONS};
 
-/// How every state file begins.
+/// First bytes of every state file.
 const MAGIC: [u8; 8] = *b"UPBPSTAT";
 
 /// Version of the format.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// The longest header, bytes: room for a million ranges of iterations.
 const MAX_HEADER: u64 = 1 << 24;
@@ -54,7 +54,8 @@ pub(crate) fn fingerprint(bytes: &[u8]) -> String {
 }
 
 impl Film {
-    /// A number of the film's bits, as text: equal for the same sums of the same iterations, however they came about.
+    /// A number of the film's bits, as text: equal for the same sums of the same iterations, however they
+    /// came about.
     #[must_use]
     pub fn fingerprint(&self) -> String {
         let mut checksum = Checksum::new();
@@ -85,7 +86,7 @@ impl State {
     /// Writes the state, in blocks of one row of the film.
     ///
     /// # Errors
-    /// What `to` says; a set of iterations with millions of gaps.
+    /// Those of `to`; a set of iterations with millions of gaps.
     pub fn write(&self, mut to: impl Write) -> io::Result<()> {
         let header = Header {
             identity: self.identity.clone(),
@@ -112,7 +113,7 @@ impl State {
     /// Reads a state to the end of `from`. It need not be buffered.
     ///
     /// # Errors
-    /// What `from` says; bytes that are not a state, or not a whole one, or not what was written.
+    /// Those of `from`; bytes that are not a state, or not a whole one, or not what was written.
     pub fn read(from: impl Read) -> Result<Self, StateError> {
         let mut from = io::BufReader::with_capacity(1 << 16, from);
         let mut mark = [0; 12];
@@ -143,7 +144,7 @@ impl State {
                 return Err(damaged("header", &format!("no part of an iteration: {iteration}, {done} sets")));
             }
         }
-        let mut film = Film::without_sums(rect, identity.plan.techniques(), iterations, parts);
+        let mut film = Film::without_sums(rect, identity.plan.techniques, iterations, parts);
         let longest = u64::from(rect.width) * (film.all_mut().count() * MAX_ENCODED) as u64;
         for row in 0..rect.height {
             let what = || format!("row {row} of {}", rect.height);

@@ -1,17 +1,17 @@
-//! What a render is: all that its iterations depend on, besides their index.
+//! Identity of a render: all that its iterations depend on, besides their index.
 
 use serde::{Deserialize, Serialize};
 use upbp_estimators::scene::PixelRect;
 
-use crate::auto::support::Census;
+use crate::auto::support::TechniqueSupport;
 use crate::error::StateError;
-use crate::plan::{RenderPlan, Stage};
+use crate::plan::Plan;
 use crate::settings::Settings;
 
 /// All that the iterations of a render depend on, besides their index.
 ///
-/// What the pilot chose is part of it: so slices from machines whose mathematical functions differ in the last bit, and
-/// whose pilots therefore chose otherwise, are refused and not mixed.
+/// The plan is part of it: so slices from machines whose mathematical functions differ in the last bit, and
+/// which therefore chose otherwise, are refused and not mixed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
     /// Version of the renderer.
@@ -26,12 +26,12 @@ pub struct Identity {
     pub part: (u32, u32, u32, u32),
     /// Settings as they were given.
     pub settings: Settings,
-    /// What the scene can use of them.
-    pub census: Census,
+    /// Techniques that the scene can use.
+    pub support: TechniqueSupport,
     /// Fingerprint of the probabilities with which emitters are chosen.
     pub emitters: String,
-    /// What iterations run, as far as it has been decided.
-    pub plan: RenderPlan,
+    /// Techniques, sample counts and first radii.
+    pub plan: Plan,
 }
 
 impl Identity {
@@ -41,20 +41,15 @@ impl Identity {
         PixelRect { x, y, width, height }
     }
 
-    /// Compares with another render's. Settings count by what became of them: how much memory is allowed does not matter where
-    /// the number of light sub-paths is the same.
-    ///
-    /// Of two plans one may have gone farther.
+    /// Compares with another render's. Settings count by what became of them: how much memory is allowed does
+    /// not matter where the number of light sub-paths is the same.
     ///
     /// # Errors
     /// [`StateError::Different`] with the names of what differs and both values.
     pub fn check_same(&self, other: &Self) -> Result<(), StateError> {
-        let mut pairs: Vec<_> = self.fields().into_iter().zip(other.fields()).collect();
-        for (own, theirs) in self.plan.stages().iter().zip(other.plan.stages()) {
-            pairs.extend(stage_fields(own).into_iter().zip(stage_fields(theirs)));
-        }
-        let differences: Vec<_> = pairs
-            .into_iter()
+        let fields = |identity: &Self| identity.fields().into_iter().chain(plan_fields(&identity.plan));
+        let differences: Vec<_> = fields(self)
+            .zip(fields(other))
             .filter(|(own, other)| own != other)
             .map(|((name, own), (_, other))| format!("{name} is {own} in one and {other} in the other"))
             .collect();
@@ -82,18 +77,17 @@ impl Identity {
     }
 }
 
-fn stage_fields(stage: &Stage) -> [(&'static str, String); 16] {
-    let r = &stage.radii;
+fn plan_fields(plan: &Plan) -> [(&'static str, String); 15] {
+    let r = &plan.radii;
     [
-        ("first iteration of a stage", stage.from.to_string()),
-        ("techniques", stage.techniques.to_string()),
-        ("light_paths", stage.light_paths.to_string()),
-        ("beams", stage.beam_paths.to_string()),
-        ("connections", stage.connections.to_string()),
-        ("next_events", stage.next_events.to_string()),
-        ("roulette", format!("{:?}", stage.roulette)),
-        ("look_ups", format!("{:?}", stage.look_ups)),
-        ("vertices per light sub-path", stage.vertices_per_light_path.to_string()),
+        ("techniques", plan.techniques.to_string()),
+        ("light_paths", plan.light_paths.to_string()),
+        ("beams", plan.beam_paths.to_string()),
+        ("connections", plan.connections.to_string()),
+        ("next_events", plan.next_events.to_string()),
+        ("roulette", format!("{:?}", plan.roulette)),
+        ("look_ups", format!("{:?}", plan.look_ups)),
+        ("vertices per light sub-path", plan.vertices_per_light_path.to_string()),
         ("radii.surf", r.surf.to_string()),
         ("radii.pp3d", r.pp3d.to_string()),
         ("radii.pb2d", r.pb2d.to_string()),

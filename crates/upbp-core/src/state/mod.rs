@@ -1,24 +1,23 @@
 //! The state of a render: enough to go on, and to put the work of several runs together.
 //!
-//! Iterations are independent given their index, and the sums of a film do not depend on the order of additions. So there is one
-//! operation, [`State::merge`]: resuming is merging into a fresh render.
+//! Iterations are independent given their index, and the sums of a film do not depend on the order of
+//! additions. So there is one operation, [`State::merge`]: resuming is merging into a fresh render.
 
 mod checksum;
 mod format;
 mod identity;
+mod record;
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
-use upbp_estimators::Counters;
-
 pub use identity::Identity;
+pub use record::{ErrorPoint, ErrorSeries, PassSeconds};
+pub(crate) use record::{PassTimes, Record};
 
 use crate::error::{OutputError, StateError};
 use crate::files::{open_file, write_whole};
 use crate::film::Film;
 use crate::film::MAX_ITERATIONS;
-use crate::report::{ErrorSeries, PassTimes, Report};
 
 pub(crate) use format::fingerprint;
 
@@ -30,20 +29,8 @@ pub struct State {
     pub(crate) film: Film,
 }
 
-/// What was done, besides the film. All of it adds up.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Record {
-    pub(crate) times: PassTimes,
-    pub(crate) counters: Counters,
-    /// Largest number of bytes that light vertices, beams and look-up structures took.
-    pub(crate) map_bytes: u64,
-    /// Bytes that the render is expected to need.
-    pub(crate) expected_bytes: u64,
-    pub(crate) series: ErrorSeries,
-}
-
 impl State {
-    /// What the render is.
+    /// Identity of the render.
     #[must_use]
     pub const fn identity(&self) -> &Identity {
         &self.identity
@@ -55,17 +42,13 @@ impl State {
         &self.film
     }
 
-    /// What was done so far.
-    #[must_use]
-    pub fn report(&self) -> Report {
-        Report::new(self)
-    }
-
-    /// Adds what another run of the same render has done. The result has the same bits in whatever order states are merged. A
-    /// series of errors belongs to one run: it is lost unless one of the two has no iterations.
+    /// Adds what another run of the same render has done. The result has the same bits in whatever order
+    /// states are merged. A series of errors belongs to one run: it is lost unless one of the two has no
+    /// iterations.
     ///
     /// # Errors
-    /// If the other state is of another render, or has iterations that this one has too. Then nothing has changed.
+    /// If the other state is of another render, or has iterations that this one has too. Then nothing has
+    /// changed.
     pub fn merge(&mut self, other: Self) -> Result<(), StateError> {
         self.identity.check_same(&other.identity)?;
         if let Some(common) = self.film.overlap(&other.film) {
@@ -74,12 +57,9 @@ impl State {
         let (none, others_none) = (self.film.is_empty(), other.film.is_empty());
         // What may differ is that of the state with the first iteration, so that the order does not matter.
         let first = |film: &Film| film.first().unwrap_or(MAX_ITERATIONS);
-        let theirs_goes_farther = other.identity.plan.stages().len() > self.identity.plan.stages().len();
-        let plan = if theirs_goes_farther { &other.identity.plan } else { &self.identity.plan }.clone();
         if first(&other.film) < first(&self.film) {
             self.identity = other.identity;
         }
-        self.identity.plan = plan;
         let record = &mut self.record;
         record.times.add(&other.record.times);
         record.counters.add(&other.record.counters);
@@ -92,14 +72,14 @@ impl State {
             record.series = ErrorSeries::default();
             self.film.merge(&other.film);
         }
-        self.film.keep(self.identity.plan.techniques());
         Ok(())
     }
 
-    /// Writes a file as a whole or not at all: a crash at any moment leaves the file that was there or the new one.
+    /// Writes a file as a whole or not at all: a crash at any moment leaves the file that was there or the
+    /// new one.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Those of the file system.
     pub fn save(&self, path: &Path) -> Result<(), OutputError> {
         write_whole(path, |writer| {
             self.write(writer).map_err(|source| OutputError::Write { path: path.to_owned(), source })
@@ -109,7 +89,7 @@ impl State {
     /// Reads a file that [`save`](Self::save) wrote.
     ///
     /// # Errors
-    /// As [`read`](Self::read), with the file's name.
+    /// Those of [`read`](Self::read), with the file's name.
     pub fn load(path: &Path) -> Result<Self, OutputError> {
         let read = || Self::read(open_file(path, u64::MAX)?);
         read().map_err(|source| OutputError::State { path: path.to_owned(), source })

@@ -13,7 +13,7 @@ pub(crate) fn photons(scene: &str, settings: &Settings) -> Result<Vec<Vec3>, Str
     let scene = ReadyScene::from_ron_str(scene, "").map_err(|error| format!("refused: {error}"))?;
     let settings = settings.clone().validate().map_err(|error| format!("refused: {error}"))?;
     let mut renderer = scene.renderer(settings).map_err(|error| format!("refused: {error}"))?;
-    let plan = renderer.plan(0);
+    let plan = renderer.iteration_plan(0);
     let world = World::new(&scene).map_err(|error| format!("refused: {error}"))?;
     let context = Context { world: &world, plan: &plan };
     let (mut scratch, mut out) = (Scratch::default(), LightChunk::default());

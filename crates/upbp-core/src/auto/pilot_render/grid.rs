@@ -1,8 +1,8 @@
-//! The pixels that a trial looks at.
+//! The pixels that a pilot render looks at.
 
 use upbp_estimators::scene::PixelRect;
 
-/// The part of the picture that a trial looks at.
+/// Cells of the picture, one pixel of each of which a pilot render looks at.
 pub(crate) struct Grid {
     rect: PixelRect,
     side: f64,
@@ -11,7 +11,7 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// About so many cells, or one per pixel.
+    /// A grid of about this number of cells, or of one per pixel.
     pub(crate) fn new(rect: PixelRect, cells: u32) -> Self {
         let [width, height] = [rect.width, rect.height].map(f64::from);
         let side = (width * height / f64::from(cells)).sqrt().max(1.0);

@@ -1,245 +1,281 @@
-//! A trial: a few thousand sub-paths with all techniques, written down so that any plan can be judged by them.
+//! The pilot render: a few hundred pixels or more with all techniques, written down so that any plan can be
+//! judged by it.
 //!
-//! The walks carry the densities of every technique for itself, so that a sample comes with the part of each in its weight.
+//! The walks carry the densities of every technique for itself, so that a sample comes with the part of each
+//! in its weight.
 
-pub(crate) mod grid;
-pub(crate) mod recorder;
-pub(crate) mod roulette;
-mod trace;
-pub(crate) mod watch;
+pub(super) mod grid;
+pub(super) mod recorder;
 
-use upbp_estimators::observer::Observer;
-use upbp_estimators::scene::Scene;
-use upbp_estimators::{Counters, Plan, Technique, World};
+use upbp_estimators::path::{Context, LightChunk};
+use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
+use upbp_estimators::{
+    Counters, LightMap, Plan as IterationPlan, StreamKind, Technique, TechniqueSet, World as PreparedScene,
+};
 
+use super::full_plan::iteration_plan;
+use super::pieces::{PIECE, in_pieces};
+use super::roulette;
 use crate::budget::Halt;
+use crate::plan::Plan;
+use crate::settings::CheckedSettings;
 use grid::Grid;
-use recorder::{ByRoulette, MOST_SAMPLES, Recorder, Sample, TECHNIQUES, add, reach};
-use trace::{CHUNK, Pass, Piece, Room};
-use watch::{PARTS, WALK, Watch};
+use recorder::{ByRoulette, ByTechnique, MOST_SAMPLES, Recorder, Room, Sample, TECHNIQUES, add, passed};
 
-/// Looks at each cell: enough to tell what they have in common.
-pub(crate) const PASSES: u32 = 2;
-/// How often the time of the same pass is taken.
-const TIMINGS: usize = 2;
+/// Looks at each pixel: enough to tell what they have in common.
+pub(super) const PASSES: u32 = 2;
+/// Light vertices of a pass, at most.
+const LIGHT_VERTICES: f64 = 5e5;
+/// Light sub-paths per pixel of a pass.
+const LIGHT_PATHS_PER_PIXEL: u32 = 2;
 
-/// What was seen. The picture is divided into cells, of each of which one pixel is looked at, several times.
-pub(crate) struct Trial {
+/// The number of pixels that a pilot render looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Size(pub(super) u32);
+
+impl Size {
+    /// With fewer pixels nothing can be told.
+    pub(super) const LEAST: Self = Self(25);
+    /// Pixels beyond which too little would be learnt.
+    pub(super) fn most<S: Scene>(scene: &PreparedScene<'_, S>) -> Self {
+        let crop = scene.scene.camera().crop();
+        Self(crop.width.saturating_mul(crop.height).min(16_384))
+    }
+
+    /// Pixels from which on a choice is trusted: more of them where no media make them slow.
+    pub(super) fn enough<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> Self {
+        let crop = scene.scene.camera().crop();
+        let media = techniques.intersects(TechniqueSet::VOLUME_MERGES);
+        let part = if media { 12 } else { 4 };
+        Self((crop.width.saturating_mul(crop.height) / part).clamp(400, 2048))
+    }
+
+    pub(super) const fn times(self, factor: u32) -> Self {
+        Self(self.0.saturating_mul(factor))
+    }
+}
+
+/// Samples and work of a pilot render. The picture is divided into cells, of each of which one pixel is
+/// looked at, several times.
+pub(super) struct PilotRender {
+    /// The plan that it ran, with fewer light sub-paths.
+    pub(super) plan: Plan,
+    /// Pixels of the picture.
+    pub(super) pixels: f64,
+    pub(super) cells: usize,
+    /// Cells in a row.
+    pub(super) columns: usize,
     /// Looks at each cell.
-    pub(crate) passes: usize,
-    pub(crate) cells: usize,
-    /// Samples of camera sub-paths, by cell, then by pass, then by the light sub-path that was merged;
-    /// `ends[cell * passes + pass]` is behind the last one of each.
-    pub(crate) samples: Vec<Sample>,
-    pub(crate) ends: Vec<u32>,
+    pub(super) passes: usize,
+    /// Samples of camera sub-paths, by cell, then by pass, then by the light sub-path that was merged.
+    pub(super) samples: Vec<Sample>,
+    /// Ends of samples: `ends[cell * passes + pass]` is behind the last one of each.
+    pub(super) ends: Vec<u32>,
     /// Splats by cell. Light sub-paths fill the whole picture.
-    pub(crate) splats: Vec<(u32, Sample)>,
-    /// Light sub-paths per pass over those that the plan has, and the same of those with beams.
-    pub(crate) thinning: [f64; 2],
-    /// Light sub-paths of the plan, and of them those with beams.
-    pub(crate) planned: [f64; 2],
-    pub(crate) pixels: f64,
-    pub(crate) work: Work,
+    pub(super) splats: Vec<(u32, Sample)>,
+    /// Light sub-paths per pass over those of the plan, and the same of those with beams.
+    pub(super) thinning: [f64; 2],
+    pub(super) work: Work,
 }
 
-/// What sub-paths had to do, on average.
+/// Average numbers of steps and samples of a sub-path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Work {
+pub(super) struct Work {
     /// Edges per camera sub-path, by roulette.
-    pub(crate) camera_edges: ByRoulette,
-    /// Turns to each technique per camera sub-path; of light tracing per light sub-path.
-    pub(crate) calls: [ByRoulette; TECHNIQUES],
-    /// Samples, likewise; of merges for as many photons as the plan has.
-    pub(crate) samples: [ByRoulette; TECHNIQUES],
-    pub(crate) light_edges: f64,
-    /// Light vertices and beams per light sub-path (with beams).
-    pub(crate) vertices: f64,
-    pub(crate) beams: f64,
-    /// Nanoseconds that were measured, per camera sub-path.
-    pub(crate) camera_time: Option<[f64; PARTS]>,
-    /// And per light sub-path: light tracing and the walk.
-    pub(crate) light_time: Option<[f64; 2]>,
+    pub(super) camera_edges: ByRoulette,
+    /// Calls of each technique per camera sub-path; of light tracing per light sub-path.
+    pub(super) calls: ByTechnique<ByRoulette>,
+    /// Samples of each technique per camera sub-path; of merges for as many photons as the plan has.
+    pub(super) samples: ByTechnique<ByRoulette>,
+    /// Edges per light sub-path.
+    pub(super) light_edges: f64,
+    /// Light vertices per light sub-path.
+    pub(super) vertices: f64,
+    /// Beams per light sub-path that leaves beams.
+    pub(super) beams: f64,
 }
 
-impl Trial {
-    /// Samples that the trial has of what the plan has one of.
-    pub(crate) const fn thinning(&self, technique: Technique) -> f64 {
+impl PilotRender {
+    /// Runs `plan` with fewer light sub-paths. `None` if there were [too many samples](MOST_SAMPLES), or if
+    /// it was halted.
+    pub(super) fn run<S: Scene>(
+        scene: &PreparedScene<'_, S>,
+        settings: &CheckedSettings,
+        plan: &Plan,
+        Size(pixels): Size,
+        halt: &Halt<'_>,
+    ) -> Option<Self> {
+        let grid = Grid::new(scene.scene.camera().crop(), pixels);
+        let most_paths = (LIGHT_VERTICES / plan.vertices_per_light_path.max(1.0)).max(64.0) as u32;
+        let paths = (LIGHT_PATHS_PER_PIXEL * grid.cells()).min(most_paths).min(plan.light_paths);
+        let beam_paths = plan.beam_paths.min(paths);
+        let part = |traced: u32, planned: u32| f64::from(traced) / f64::from(planned.max(1));
+        let mut pilot = Self {
+            plan: *plan,
+            pixels: grid.pixels(),
+            cells: grid.cells() as usize,
+            columns: grid.columns(),
+            passes: PASSES as usize,
+            samples: Vec::new(),
+            ends: Vec::new(),
+            splats: Vec::new(),
+            thinning: [part(paths, plan.light_paths), part(beam_paths, plan.beam_paths)],
+            work: Work::default(),
+        };
+        let mut thinned = iteration_plan(scene, settings, plan, 0);
+        // Fewer light sub-paths, each of which counts for more; weights as in the plan.
+        (thinned.light_paths, thinned.beam_paths) = (paths, beam_paths);
+        let room = Room::new(MOST_SAMPLES);
+        let mut passes = (0..PASSES)
+            .map(|pass| {
+                // Not the iterations of other runs before the first iteration.
+                thinned.iteration = u64::from(pass) + 1;
+                Pass::trace(&Context { world: scene, plan: &thinned }, &grid, &room, halt)
+            })
+            .collect::<Option<Vec<_>>>()?;
+        for pass in &mut passes {
+            pilot.splats.append(&mut pass.splats);
+        }
+        let camera_paths = f64::from(grid.cells() * PASSES);
+        pilot.work = pilot.work(&passes, camera_paths, [paths, beam_paths].map(|n| f64::from(n * PASSES)));
+        pilot.sort(passes);
+        Some(pilot)
+    }
+
+    /// The number of the roulette of another plan.
+    pub(super) fn roulette(&self, plan: &Plan) -> usize {
+        roulette::number(plan.roulette, self.plan.roulette)
+    }
+
+    /// Samples that the pilot render has over those that an iteration of the plan has.
+    pub(super) const fn thinning(&self, technique: Technique) -> f64 {
         match technique {
             Technique::Hit | Technique::Nee | Technique::Connect => 1.0,
             Technique::LightTracing | Technique::Surf | Technique::Pp3d | Technique::Pb2d => self.thinning[0],
             Technique::Bp2d | Technique::Bb1d => self.thinning[1],
         }
     }
+
+    /// Light sub-paths that a technique's samples under another plan come from, relative to the plan of this
+    /// render.
+    pub(super) fn relative_paths(&self, technique: Technique, plan: &Plan) -> f64 {
+        f64::from(plan.paths_of(technique)) / f64::from(self.plan.paths_of(technique).max(1))
+    }
+
+    /// Photons or beams within a query's kernel under another plan, relative to the plan of this render.
+    pub(super) fn relative_photons(&self, technique: Technique, plan: &Plan) -> f64 {
+        let kernel = if technique == Technique::Surf && self.plan.radii.surf > 0.0 {
+            f64::from(plan.radii.surf / self.plan.radii.surf).powi(2)
+        } else {
+            1.0
+        };
+        kernel * self.relative_paths(technique, plan)
+    }
+
+    /// The work of all passes per sub-path.
+    fn work(&self, passes: &[Pass], camera_paths: f64, [light_paths, beam_paths]: [f64; 2]) -> Work {
+        let mut counters = Counters::default();
+        let mut edges = ByRoulette::default();
+        let (mut calls, mut samples) = ([edges; TECHNIQUES], [edges; TECHNIQUES]);
+        for pass in passes {
+            counters.add(&pass.counters);
+            for recorder in pass.light.iter().chain(&pass.camera) {
+                add(&mut edges, &recorder.edges);
+                for (sum, own) in calls.iter_mut().zip(&recorder.calls) {
+                    add(sum, own);
+                }
+                for sample in &recorder.samples {
+                    add(&mut samples[sample.technique as usize], &passed(sample.albedos));
+                }
+            }
+        }
+        let per = |count: f64, paths: f64| if paths > 0.0 { count / paths } else { 0.0 };
+        for technique in Technique::ALL {
+            let i = technique as usize;
+            let paths = if technique == Technique::LightTracing { light_paths } else { camera_paths };
+            calls[i] = calls[i].map(|count| per(count, paths));
+            let thinning = if technique.merges() { self.thinning(technique) } else { 1.0 };
+            samples[i] = samples[i].map(|count| per(count, paths) / thinning);
+        }
+        Work {
+            camera_edges: edges.map(|count| per(count, camera_paths)),
+            calls,
+            samples,
+            light_edges: per(counters.light_edges as f64, light_paths),
+            vertices: per(counters.light_vertices as f64, light_paths),
+            beams: per(counters.photon_beams as f64, beam_paths),
+        }
+    }
+
+    /// Puts the samples of all passes in order.
+    fn sort(&mut self, mut passes: Vec<Pass>) {
+        let cells = self.cells;
+        for piece in 0..cells.div_ceil(PIECE) {
+            // Taken, so that all samples are not there twice.
+            let recorders: Vec<_> =
+                passes.iter_mut().map(|pass| std::mem::take(&mut pass.camera[piece])).collect();
+            for path in 0..PIECE.min(cells - piece * PIECE) {
+                for recorder in &recorders {
+                    let start = self.samples.len();
+                    self.samples.extend_from_slice(recorder.of_path(path));
+                    self.samples[start..].sort_by_key(|sample| sample.merged);
+                    self.ends.push(self.samples.len() as u32);
+                }
+            }
+        }
+    }
 }
 
-/// Runs a trial of `plan`, with `paths` of its light sub-paths per pass. `first_pass` numbers the passes of all trials of a render;
-/// `timed` says whether to measure time. `None` if there were [too many samples](MOST_SAMPLES), or if it was halted.
-pub(crate) fn run<S: Scene>(
-    world: &World<'_, S>,
-    plan: &Plan,
-    grid: &Grid,
-    paths: u32,
-    first_pass: u32,
-    timed: bool,
-    halt: &Halt<'_>,
-) -> Option<Trial> {
-    let cells = grid.cells() as usize;
-    let part = |traced: u32, planned: u32| f64::from(traced) / f64::from(planned.max(1));
-    let paths = paths.min(plan.light_paths);
-    let beam_paths = plan.beam_paths.min(paths);
-    let mut trial = Trial {
-        passes: PASSES as usize,
-        cells,
-        samples: Vec::new(),
-        ends: Vec::new(),
-        splats: Vec::new(),
-        thinning: [part(paths, plan.light_paths), part(beam_paths, plan.beam_paths)],
-        planned: [plan.light_paths, plan.beam_paths].map(f64::from),
-        pixels: grid.pixels(),
-        work: Work::default(),
-    };
-    let mut plan = plan.clone();
-    // Fewer light sub-paths, each of which counts for more; weights as in the plan.
-    (plan.light_paths, plan.beam_paths) = (paths, beam_paths);
-    let room = Room::new(MOST_SAMPLES, halt);
-    let mut passes = (first_pass..first_pass + PASSES)
-        .map(|pass| {
-            // Not the iterations of other pilots.
-            plan.iteration = u64::from(pass) + 1;
-            Pass::<Recorder>::trace(world, &plan, grid, pass, &room)
-        })
-        .collect::<Option<Vec<_>>>()?;
-    for pass in &passes {
-        for (recorder, splats) in &pass.light {
+/// A pass: light sub-paths with their splats, and one camera sub-path for each cell.
+struct Pass {
+    /// Recorders of light sub-paths, by piece.
+    light: Vec<Recorder>,
+    /// Recorders of camera sub-paths, by piece.
+    camera: Vec<Recorder>,
+    splats: Vec<(u32, Sample)>,
+    counters: Counters,
+}
+
+impl Pass {
+    /// Traces the sub-paths of a pass; `None` if there is not enough room.
+    fn trace<S: Scene>(context: &Context<'_, S>, grid: &Grid, room: &Room, halt: &Halt<'_>) -> Option<Self> {
+        let plan: &IterationPlan = context.plan;
+        let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
+        let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut (Recorder, LightChunk<_, _>)| {
+            let (recorder, out) = piece;
+            let kind = StreamKind::PilotLight;
+            recorder.record(room, |recorder| trace_light_path(context, kind, index, scratch, out, recorder))
+        })?;
+        let mut pass =
+            Self { light: Vec::new(), camera: Vec::new(), splats: Vec::new(), counters: Counters::default() };
+        let (mut vertices, mut beams) = (Vec::new(), Vec::new());
+        for (recorder, out) in pieces {
+            vertices.extend(out.vertices);
+            beams.extend(out.beams);
+            pass.counters.add(&out.counters);
             // A splat goes with each sample.
-            let cells = splats.iter().map(|splat| grid.cell(splat.pixel));
-            trial.splats.extend(cells.zip(recorder.samples.iter().copied()));
+            let cells = out.splats.iter().map(|splat| grid.cell(splat.pixel));
+            pass.splats.extend(cells.zip(recorder.samples.iter().copied()));
+            pass.light.push(recorder);
         }
-    }
-    let per_path = |pass_paths: u32| f64::from(pass_paths * PASSES);
-    trial.work = work(&passes, (cells * PASSES as usize) as f64, [paths, beam_paths].map(per_path), &trial);
-    for chunk in 0..cells.div_ceil(CHUNK) {
-        // Taken, so that all samples are not there twice.
-        let pieces: Vec<_> = passes.iter_mut().map(|pass| std::mem::take(&mut pass.camera[chunk])).collect();
-        for path in 0..CHUNK.min(cells - chunk * CHUNK) {
-            for piece in &pieces {
-                let start = trial.samples.len();
-                trial.samples.extend_from_slice(piece.of_path(path));
-                trial.samples[start..].sort_by_key(|sample| sample.merged);
-                trial.ends.push(trial.samples.len() as u32);
-            }
+        let map = if plan.stores_vertices() || plan.stores_beams() {
+            LightMap::build(plan, vertices, beams)
+        } else {
+            LightMap::empty()
+        };
+        let pieces = in_pieces(grid.cells(), halt, |cell, scratch, piece: &mut (Recorder, Counters)| {
+            let (recorder, counters) = piece;
+            // Passes begin alike: what they differ in is what stratification leaves.
+            let (kind, pixel, index) = (StreamKind::PilotCamera, grid.pixel(cell), u64::from(cell));
+            recorder.record(room, |recorder| {
+                trace_camera_path(context, &map, kind, pixel, index, scratch, counters, recorder);
+            })
+        })?;
+        for (recorder, counters) in pieces {
+            pass.counters.add(&counters);
+            pass.camera.push(recorder);
         }
-    }
-    if timed {
-        // The first pass again, with weights as the render has them.
-        plan.iteration = u64::from(first_pass) + 1;
-        let passes = (0..TIMINGS)
-            .map(|_| Pass::<Watch>::trace(world, &plan, grid, first_pass, &room))
-            .collect::<Option<Vec<_>>>()?;
-        let camera = undisturbed(passes.iter().map(|pass| pass.camera.iter().map(Watch::net)));
-        trial.work.camera_time = Some(camera.map(|time| time / cells as f64));
-        let light = undisturbed(passes.iter().map(|pass| pass.light.iter().map(|(watch, _)| watch.net())));
-        let of = |part: usize| light[part] / f64::from(paths.max(1));
-        trial.work.light_time = Some([of(WALK), of(Technique::LightTracing as usize)]);
-    }
-    Some(trial)
-}
-
-impl<B> Piece<B> for Recorder {
-    fn path_ended(&mut self) {
-        self.ends.push(self.samples.len() as u32);
-    }
-
-    fn written(&self) -> usize {
-        self.seen
-    }
-}
-
-impl Recorder {
-    /// The samples of the i-th sub-path.
-    fn of_path(&self, i: usize) -> &[Sample] {
-        let start = if i == 0 { 0 } else { self.ends[i - 1] };
-        &self.samples[start as usize..self.ends[i] as usize]
-    }
-}
-
-impl<B> Piece<B> for Watch {
-    fn path_ended(&mut self) {
-        Observer::<B>::turns_to(self, None);
-    }
-
-    fn written(&self) -> usize {
-        0
-    }
-}
-
-/// The work of all passes, per camera sub-path, and per light sub-path (with beams) where it is about those.
-fn work(
-    passes: &[Pass<Recorder>],
-    camera_paths: f64,
-    [light_paths, beam_paths]: [f64; 2],
-    trial: &Trial,
-) -> Work {
-    let mut counters = Counters::default();
-    let mut edges = ByRoulette::default();
-    let (mut calls, mut samples) = ([edges; TECHNIQUES], [edges; TECHNIQUES]);
-    for pass in passes {
-        counters.add(&pass.counters);
-        for recorder in pass.camera.iter().chain(pass.light.iter().map(|(recorder, _)| recorder)) {
-            add(&mut edges, &recorder.edges);
-            for (sum, own) in calls.iter_mut().zip(&recorder.calls) {
-                add(sum, own);
-            }
-            for sample in &recorder.samples {
-                add(&mut samples[sample.technique as usize], &reach(sample.albedos));
-            }
-        }
-    }
-    let per = |count: f64, paths: f64| if paths > 0.0 { count / paths } else { 0.0 };
-    for technique in Technique::ALL {
-        let i = technique as usize;
-        let paths = if technique == Technique::LightTracing { light_paths } else { camera_paths };
-        calls[i] = calls[i].map(|count| per(count, paths));
-        let merges = technique.merges();
-        let thinning = if merges { trial.thinning(technique) } else { 1.0 };
-        samples[i] = samples[i].map(|count| per(count, paths) / thinning);
-    }
-    Work {
-        camera_edges: edges.map(|count| per(count, camera_paths)),
-        calls,
-        samples,
-        light_edges: per(counters.light_edges as f64, light_paths),
-        vertices: per(counters.light_vertices as f64, light_paths),
-        beams: per(counters.photon_beams as f64, beam_paths),
-        camera_time: None,
-        light_time: None,
-    }
-}
-
-/// Nanoseconds by part, of all pieces of a pass whose time was taken several times. Of each piece the least counts: whatever comes
-/// in between makes it longer.
-fn undisturbed(passes: impl Iterator<Item = impl Iterator<Item = [f64; PARTS]>>) -> [f64; PARTS] {
-    let mut least: Vec<[f64; PARTS]> = Vec::new();
-    for pass in passes {
-        for (piece, time) in pass.enumerate() {
-            match least.get_mut(piece) {
-                None => least.push(time),
-                Some(least) => least.iter_mut().zip(time).for_each(|(least, time)| *least = least.min(time)),
-            }
-        }
-    }
-    least.iter().fold([0.0; PARTS], |sum, piece| std::array::from_fn(|part| sum[part] + piece[part]))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_interruption_does_not_count() {
-        // Two pieces, 2 and 3 ns for each part; something came in between in another piece each time.
-        let [first, second] = [[2.0, 3.0 + 200.0], [2.0 + 500.0, 3.0]];
-        let passes = [first, second].map(|pass| pass.map(|time| [time; PARTS]).into_iter());
-        assert_eq!(undisturbed(passes.into_iter()), [5.0; PARTS]);
+        Some(pass)
     }
 }

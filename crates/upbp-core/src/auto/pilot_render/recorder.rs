@@ -1,16 +1,23 @@
-//! What a trial writes down: every sample with the parts of all techniques in its weight, every look-up.
+//! Samples with the parts of all techniques in their weights, and counts of work, as the walks of a pilot
+//! render make them.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
 use upbp_estimators::Technique;
-use upbp_estimators::mis::{ByTechnique, Densities};
+use upbp_estimators::mis;
+use upbp_estimators::mis::Densities;
 use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
 
-use super::roulette;
+use crate::auto::roulette;
 
 /// The number of techniques.
 pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
 
-/// Samples that a trial may have, of 72 bytes each.
+/// A value for each technique.
+pub(crate) type ByTechnique<T> = [T; TECHNIQUES];
+
+/// Samples that a pilot render may have, of 64 bytes each.
 pub(super) const MOST_SAMPLES: usize = 1 << 20;
 
 /// A sample, weighted as when everything runs.
@@ -26,31 +33,32 @@ pub(crate) struct Sample {
     pub(crate) shares: [f32; TECHNIQUES],
 }
 
-/// What camera sub-paths do, by the number of a roulette.
+/// Counts of camera sub-paths' work, by the number of a roulette.
 pub(crate) type ByRoulette = [f64; roulette::COUNT];
 
-/// Writes down what the walks of one piece of work do.
+/// Samples and work of one piece of sub-paths.
 #[derive(Default)]
 pub(crate) struct Recorder {
-    /// Samples; `ends[i]` is behind the last one of the i-th sub-path.
     pub(crate) samples: Vec<Sample>,
-    pub(crate) ends: Vec<u32>,
+    /// Ends of samples: `ends[i]` is behind the last one of the i-th sub-path.
+    ends: Vec<u32>,
     /// Samples, those included that would have been [too many](MOST_SAMPLES).
-    pub(super) seen: usize,
+    seen: usize,
     /// Edges of camera sub-paths.
     pub(crate) edges: ByRoulette,
-    /// How often a technique was turned to.
-    pub(crate) calls: [ByRoulette; TECHNIQUES],
-    /// The camera sub-path at hand.
+    /// Calls of each technique.
+    pub(crate) calls: ByTechnique<ByRoulette>,
+    /// Product of the albedos of the camera sub-path at hand.
     albedos: f32,
-    reach: ByRoulette,
+    /// Camera sub-paths that would be here, by the number of a roulette.
+    passed: ByRoulette,
 }
 
 impl<B> Observer<B> for Recorder {
-    type Densities = ByTechnique;
+    type Densities = mis::ByTechnique;
 
     fn light_end(&mut self, _: u32, _: &LightEnd) {
-        self.reach = [1.0; roulette::COUNT];
+        self.passed = [1.0; roulette::COUNT];
     }
 
     fn camera_end(&mut self, _: Vec3, _: Vec3, _: f32) {
@@ -65,11 +73,11 @@ impl<B> Observer<B> for Recorder {
 
     fn turns_to(&mut self, technique: Option<Technique>) {
         if let Some(technique) = technique {
-            add(&mut self.calls[technique as usize], &self.reach);
+            add(&mut self.calls[technique as usize], &self.passed);
         }
     }
 
-    fn sample(&mut self, sample: &ObservedSample<B, ByTechnique>) {
+    fn sample(&mut self, sample: &ObservedSample<B, mis::ByTechnique>) {
         let ObservedSample { technique, ref joint, value, weight, .. } = *sample;
         self.seen += 1;
         if self.seen > MOST_SAMPLES {
@@ -88,20 +96,53 @@ impl<B> Observer<B> for Recorder {
 }
 
 impl Recorder {
+    /// Traces a sub-path under the eyes of this recorder; whether there is room for its samples.
+    pub(super) fn record(&mut self, room: &Room, trace: impl FnOnce(&mut Self)) -> bool {
+        let before = self.seen;
+        trace(self);
+        self.ends.push(self.samples.len() as u32);
+        room.take(self.seen - before)
+    }
+
+    /// The samples of the i-th sub-path.
+    pub(super) fn of_path(&self, i: usize) -> &[Sample] {
+        let start = if i == 0 { 0 } else { self.ends[i - 1] };
+        &self.samples[start as usize..self.ends[i] as usize]
+    }
+
     /// Another edge of a camera sub-path.
     fn edge(&mut self) {
-        self.reach = reach(self.albedos);
-        add(&mut self.edges, &self.reach);
+        self.passed = passed(self.albedos);
+        add(&mut self.edges, &self.passed);
     }
 }
 
-/// How many camera sub-paths get past vertices with this product of albedos, relative to the trial's.
-pub(super) fn reach(albedos: f32) -> ByRoulette {
-    std::array::from_fn(|number| f64::from(roulette::relative_reach(number, albedos)))
+/// Camera sub-paths that get past vertices with this product of albedos, relative to those of the pilot
+/// render.
+pub(super) fn passed(albedos: f32) -> ByRoulette {
+    std::array::from_fn(|number| f64::from(roulette::relative_pass_probability(number, albedos)))
 }
 
 pub(super) fn add(sum: &mut ByRoulette, more: &ByRoulette) {
     for (sum, more) in sum.iter_mut().zip(more) {
         *sum += more;
+    }
+}
+
+/// Room for samples, common to all pieces of a pilot render. Whether it suffices does not depend on the order
+/// of the pieces.
+pub(super) struct Room {
+    taken: AtomicUsize,
+    most: usize,
+}
+
+impl Room {
+    pub(super) const fn new(most: usize) -> Self {
+        Self { taken: AtomicUsize::new(0), most }
+    }
+
+    /// Takes room for more samples; whether there was enough.
+    fn take(&self, samples: usize) -> bool {
+        samples <= self.most && self.taken.fetch_add(samples, Ordering::Relaxed) + samples <= self.most
     }
 }

@@ -1,11 +1,11 @@
-//! What errors are relative to, and how much a sample may say.
+//! The radiance that errors are relative to, and the largest part of a sample in the whole.
 
 use glam::DVec3;
 
-/// No sample says more than this part of the whole.
+/// The largest part that a sample may have in the whole.
 pub(super) const LARGEST_PART: f64 = 0.03;
-/// Of the squared mean of the picture, what is added to the squared radiance that errors are relative to: for a picture of mean
-/// 0.5 the 0.01 of relMSE.
+/// Part of the squared mean of the picture that is added to the squared radiance which errors are relative
+/// to: for a picture of mean 0.5 the 0.01 of relMSE.
 pub(super) const DARKNESS: f64 = 0.04;
 
 /// Means over squares of five by five cells, without the one in the middle.
@@ -29,7 +29,8 @@ pub(super) fn relative_to(means: &[DVec3]) -> Vec<DVec3> {
     means.iter().map(|mean| (3.0 * (mean * mean + dark)).map(|square| square.sqrt().recip())).collect()
 }
 
-/// Factors of values, by the parts that their squares have: none is to be more than [`LARGEST_PART`] of the whole.
+/// Factors of values, by the parts that their squares have: none is to be more than [`LARGEST_PART`] of the
+/// whole.
 pub(super) fn reductions(parts: &[f64]) -> Vec<f32> {
     let most = largest(parts.to_vec());
     parts.iter().map(|part| if *part > most { (most / part).sqrt() as f32 } else { 1.0 }).collect()

@@ -1,9 +1,10 @@
-//! The variance that a plan would have, predicted from a trial of another one.
+//! The variance that an iteration of a plan would have, predicted from the pilot render of another one.
 //!
-//! With the balance heuristic, the second moment of single samples is `∫ f²/S`, `S` the sum of the densities of all techniques
-//! with their counts; it can be estimated for every `S` by the samples of a trial (`docs/theory.md`, section 6(a)), and
-//! knows of paths that the techniques of a plan would find once in a million years. What samples of one camera sub-path have in
-//! common is added: photons that are merged with one vertex share its error, and those of one light sub-path share that of their own.
+//! With the balance heuristic, the second moment of single samples is `∫ f²/S`, `S` the sum of the densities
+//! of all techniques with their counts; it can be estimated for every `S` by the samples of a pilot render
+//! (`docs/theory.md`, section 6.2), and knows of paths that the techniques of a plan would find once in a
+//! million years. What samples of one camera sub-path have in common is added: photons that are merged with
+//! one vertex share its error, and those of one light sub-path share that of their own.
 
 mod limits;
 mod pairs;
@@ -12,10 +13,12 @@ mod tests;
 
 use glam::DVec3;
 
-use super::pilot_render::Trial;
-use super::pilot_render::grid::Grid;
-use super::pilot_render::recorder::{Sample, TECHNIQUES};
-use crate::auto::choices::BEAMS;
+use upbp_estimators::{Technique, TechniqueSet};
+
+use super::full_plan::BEAMS;
+use super::pilot_render::PilotRender;
+use super::pilot_render::recorder::{ByTechnique, Sample, TECHNIQUES};
+use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
 use pairs::{Looks, View};
 
@@ -23,89 +26,120 @@ use pairs::{Looks, View};
 const LEAST_PART: f64 = 0.05;
 
 /// Parts that a variance is given in, so that its own error can be told.
-pub(crate) const GROUPS: usize = 8;
+pub(super) const GROUPS: usize = 8;
 
-/// How many samples of each technique a plan has, relative to the trial's plan; and what part of the iterations look
-/// photons up, which those numbers contain.
+/// Samples of each technique under a plan, relative to those of the pilot render's plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Counts {
-    pub(crate) relative: [f64; TECHNIQUES],
-    /// Light sub-paths that they come from, and those with beams, relative to the trial's plan.
-    pub(crate) paths: [f64; 2],
-    pub(crate) look_ups: [f64; TECHNIQUES],
+struct Counts {
+    relative: ByTechnique<f64>,
+    /// Light sub-paths that they come from, and those with beams.
+    paths: [f64; 2],
+    /// Part of the iterations that make the queries of a technique, which `relative` contains.
+    active: ByTechnique<f64>,
     /// The number of the roulette.
-    pub(crate) roulette: usize,
+    roulette: usize,
+    /// The fewest light sub-paths that merges come from: those with beams, if there are any.
+    light_paths: f64,
 }
 
 impl Counts {
-    /// The fewest light sub-paths that merges of the plan come from: those with beams, if it has any.
-    fn light_paths(&self, trial: &Trial) -> f64 {
-        let beams = BEAMS.iter().any(|technique| self.relative[technique as usize] > 0.0);
-        (trial.planned[usize::from(beams)] * self.paths[usize::from(beams)]).max(1.0)
+    fn of(plan: &Plan, pilot: &PilotRender) -> Self {
+        // Camera sub-paths are never told apart by how they find the light.
+        let techniques = plan.techniques.union(TechniqueSet::PT);
+        let mut counts = Self {
+            relative: [0.0; TECHNIQUES],
+            paths: [Technique::Surf, Technique::Bb1d].map(|technique| pilot.relative_paths(technique, plan)),
+            active: [1.0; TECHNIQUES],
+            roulette: pilot.roulette(plan),
+            light_paths: f64::from(if plan.techniques.intersects(BEAMS) {
+                plan.beam_paths
+            } else {
+                plan.light_paths
+            })
+            .max(1.0),
+        };
+        for technique in techniques.iter() {
+            let active = plan.active_part(technique);
+            counts.active[technique as usize] = active;
+            counts.relative[technique as usize] = match technique {
+                Technique::Hit | Technique::Nee | Technique::Connect => 1.0,
+                _ => active * pilot.relative_photons(technique, plan),
+            };
+        }
+        counts
     }
 }
 
-/// A trial, made ready for predictions.
-pub(crate) struct Prediction {
+/// A pilot render, made ready for predictions.
+pub(super) struct Variance {
     /// Splats and counts; values are relative to the radiance around them.
-    trial: Trial,
+    pilot: PilotRender,
     looks: Looks,
 }
 
-impl Prediction {
-    /// Takes a trial. Samples that say too much are made smaller, and so are those of camera sub-paths that do together.
-    pub(crate) fn new(mut trial: Trial, grid: &Grid) -> Self {
-        trial.make_relative(&relative_to(&surroundings(&trial.means(), grid.columns())));
-        let per_look = 1.0 / (trial.cells * trial.passes) as f64;
-        let mut parts: Vec<f64> = trial.samples.iter().map(|s| per_look * trial.second_moment(s)).collect();
-        parts.extend(trial.splats.iter().map(|(_, splat)| trial.per_splat() * trial.second_moment(splat)));
+impl Variance {
+    /// Takes a pilot render. Samples that say too much are made smaller, and so are those of camera sub-paths
+    /// that do together.
+    pub(super) fn of(mut pilot: PilotRender) -> Self {
+        pilot.make_relative(&relative_to(&surroundings(&pilot.means(), pilot.columns)));
+        let per_look = 1.0 / (pilot.cells * pilot.passes) as f64;
+        let mut parts: Vec<f64> = pilot.samples.iter().map(|s| per_look * pilot.second_moment(s)).collect();
+        parts.extend(pilot.splats.iter().map(|(_, splat)| pilot.per_splat() * pilot.second_moment(splat)));
         let by_sample = reductions(&parts);
-        let splats = trial.splats.iter_mut().map(|(_, splat)| splat);
-        for (sample, reduction) in trial.samples.iter_mut().chain(splats).zip(by_sample) {
+        let splats = pilot.splats.iter_mut().map(|(_, splat)| splat);
+        for (sample, reduction) in pilot.samples.iter_mut().chain(splats).zip(by_sample) {
             sample.value *= reduction;
         }
-        let looks = (0..trial.cells).flat_map(|cell| (0..trial.passes).map(move |pass| (cell, pass)));
+        let looks = (0..pilot.cells).flat_map(|cell| (0..pilot.passes).map(move |pass| (cell, pass)));
         let together = |(cell, pass)| {
-            let sum: DVec3 = trial.look(cell, pass).iter().map(|s| s.value.as_dvec3()).sum();
+            let sum: DVec3 = pilot.look(cell, pass).iter().map(|s| s.value.as_dvec3()).sum();
             sum.length_squared()
         };
         let parts: Vec<f64> = looks.clone().map(together).collect();
         for ((cell, pass), reduction) in looks.clone().zip(reductions(&parts)) {
-            let range = trial.range(cell, pass);
-            trial.samples[range].iter_mut().for_each(|sample| sample.value *= reduction);
+            let range = pilot.range(cell, pass);
+            pilot.samples[range].iter_mut().for_each(|sample| sample.value *= reduction);
         }
-        let looks = Looks::new(&trial);
-        trial.samples = Vec::new();
-        Self { trial, looks }
+        let looks = Looks::new(&pilot);
+        pilot.samples = Vec::new();
+        Self { pilot, looks }
     }
 
-    /// The relative variance of an iteration of a plan with these counts, mean over pixels and channels, in parts due to groups of
-    /// cells. Infinite if a path that the trial found is one that the plan cannot find.
-    pub(crate) fn relative_variance(&self, counts: &Counts) -> [f64; GROUPS] {
-        let trial = &self.trial;
-        let mut view = View::new(trial, &self.looks, counts);
-        let light_paths = counts.light_paths(trial);
+    /// The pilot render, without its samples.
+    pub(super) const fn pilot(&self) -> &PilotRender {
+        &self.pilot
+    }
+
+    /// The relative variance of an iteration of a plan, mean over pixels and channels, in parts due to groups
+    /// of cells. Infinite if a path that the pilot render found is one that the plan cannot find.
+    pub(super) fn relative(&self, plan: &Plan) -> [f64; GROUPS] {
+        self.with(&Counts::of(plan, &self.pilot))
+    }
+
+    fn with(&self, counts: &Counts) -> [f64; GROUPS] {
+        let pilot = &self.pilot;
+        let mut view = View::new(pilot, &self.looks, counts);
         let mut groups = [Moments::default(); GROUPS];
-        for cell in 0..trial.cells {
+        for cell in 0..pilot.cells {
             groups[group(cell)].add(&self.of_cell(cell, &mut view));
         }
-        let mut variance = groups.map(|moments| moments.variance(light_paths) / trial.cells as f64);
-        for (cell, splat) in &trial.splats {
-            let square = trial.second_moment(splat) as f32;
+        let mut variance = groups.map(|moments| moments.variance(counts.light_paths) / pilot.cells as f64);
+        for (cell, splat) in &pilot.splats {
+            let square = pilot.second_moment(splat) as f32;
             let second_moment = f64::from(view.share(&splat.shares).single(square));
-            variance[group(*cell as usize)] += trial.per_splat() * second_moment;
+            variance[group(*cell as usize)] += pilot.per_splat() * second_moment;
         }
         // Not a number where no technique of the plan finds a path.
         variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
     }
 
-    /// What samples of a cell say.
+    /// Moments of the samples of a cell.
     fn of_cell(&self, cell: usize, view: &mut View<'_>) -> Moments {
-        let passes = self.trial.passes as f64;
+        let passes = self.pilot.passes as f64;
         let mut moments = Moments::default();
         let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
-        for pass in 0..self.trial.passes {
-            let look = view.look(cell * self.trial.passes + pass);
+        for pass in 0..self.pilot.passes {
+            let look = view.look(cell * self.pilot.passes + pass);
             moments.single += look.single / passes;
             moments.light += look.light / passes;
             moments.pairs += look.products / passes;
@@ -118,12 +152,12 @@ impl Prediction {
     }
 }
 
-/// Moments of what camera sub-paths find.
+/// Moments of the samples of camera sub-paths.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     /// Second moments of single samples.
     single: f64,
-    /// What of those is due to light sub-paths.
+    /// The part of `single` that is due to light sub-paths.
     light: f64,
     /// Products of pairs of samples.
     pairs: f64,
@@ -138,8 +172,9 @@ impl Moments {
         self.mean_square += more.mean_square;
     }
 
-    /// The variance. As the difference of noisy numbers it may be anything, but not less than if nothing was due to camera sub-paths: that of
-    /// independent light sub-paths is their second moment less the square of the mean over their number, and pairs only add to it.
+    /// The variance. As the difference of noisy numbers it may be anything, but not less than if nothing was
+    /// due to camera sub-paths: that of independent light sub-paths is their second moment less the square of
+    /// the mean over their number, and pairs only add to it.
     fn variance(&self, light_paths: f64) -> f64 {
         let of_light = self.light - self.mean_square / light_paths;
         let least = LEAST_PART * (self.single - self.light) + of_light;
@@ -152,7 +187,7 @@ const fn group(cell: usize) -> usize {
     ((cell as u32).wrapping_mul(2_654_435_761) >> 29) as usize % GROUPS
 }
 
-impl Trial {
+impl PilotRender {
     fn range(&self, cell: usize, pass: usize) -> std::ops::Range<usize> {
         let group = cell * self.passes + pass;
         let start = if group == 0 { 0 } else { self.ends[group - 1] };
@@ -192,7 +227,7 @@ impl Trial {
         &self.samples[self.range(cell, pass)]
     }
 
-    /// The square of a sample, as much of it as all samples of the plan would have.
+    /// The square of a sample, as large as that of all samples of the plan together.
     fn second_moment(&self, sample: &Sample) -> f64 {
         f64::from(sample.value.length_squared()) * self.thinning(sample.technique)
     }

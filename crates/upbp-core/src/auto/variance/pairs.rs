@@ -1,4 +1,4 @@
-//! What the samples of one camera sub-path have in common.
+//! Covariances of the samples of one camera sub-path.
 
 use std::num::NonZeroU32;
 
@@ -6,11 +6,11 @@ use glam::{DVec3, Vec3};
 use upbp_estimators::Technique;
 
 use super::Counts;
-use crate::auto::pilot_render::Trial;
+use crate::auto::pilot_render::PilotRender;
 use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
-use crate::auto::pilot_render::roulette::{COUNT, relative_reach};
+use crate::auto::roulette::{COUNT, relative_pass_probability};
 
-/// The samples of a trial, ready for being looked at by many plans.
+/// The samples of a pilot render, ready for the predictions of many plans.
 pub(super) struct Looks {
     /// By look, those after most albedos first.
     seen: Vec<Seen>,
@@ -24,7 +24,7 @@ struct Seen {
     /// The number, in its look and from 1, of a light sub-path with several photons.
     light_path: Option<NonZeroU32>,
     albedos: f32,
-    /// How much more it weighs than in the trial, by the number of a roulette: walks get to it less often.
+    /// Weight relative to that in the pilot render, by the number of a roulette: walks get to it less often.
     rarity: [f32; COUNT],
     value: Vec3,
     /// Its square, of as many samples as the plan has.
@@ -33,23 +33,25 @@ struct Seen {
 }
 
 impl Looks {
-    /// Takes the samples of a trial.
-    pub(super) fn new(trial: &Trial) -> Self {
-        let mut looks = Self { seen: Vec::with_capacity(trial.samples.len()), ends: Vec::new() };
+    /// Takes the samples of a pilot.
+    pub(super) fn new(pilot: &PilotRender) -> Self {
+        let mut looks = Self { seen: Vec::with_capacity(pilot.samples.len()), ends: Vec::new() };
         let of_one_path = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
-        for look in 0..trial.cells * trial.passes {
+        for look in 0..pilot.cells * pilot.passes {
             let start = looks.seen.len();
             let mut light_paths = 0;
-            for photons in trial.look(look / trial.passes, look % trial.passes).chunk_by(of_one_path) {
+            for photons in pilot.look(look / pilot.passes, look % pilot.passes).chunk_by(of_one_path) {
                 light_paths += u32::from(photons.len() > 1);
                 let light_path = if photons.len() > 1 { NonZeroU32::new(light_paths) } else { None };
                 looks.seen.extend(photons.iter().map(|sample| Seen {
                     technique: sample.technique,
                     light_path,
                     albedos: sample.albedos,
-                    rarity: std::array::from_fn(|number| relative_reach(number, sample.albedos).recip()),
+                    rarity: std::array::from_fn(|number| {
+                        relative_pass_probability(number, sample.albedos).recip()
+                    }),
                     value: sample.value,
-                    square: trial.second_moment(sample) as f32,
+                    square: pilot.second_moment(sample) as f32,
                     shares: sample.shares,
                 }));
             }
@@ -72,7 +74,7 @@ impl Looks {
 pub(super) struct Look {
     /// Second moments of single samples.
     pub(super) single: f64,
-    /// What of those is due to light sub-paths: to splats and merges.
+    /// The part of `single` that is due to light sub-paths: to splats and merges.
     pub(super) light: f64,
     /// Products of all pairs of different samples.
     pub(super) products: f64,
@@ -84,28 +86,30 @@ pub(super) struct Look {
 pub(super) struct View<'a> {
     looks: &'a Looks,
     roulette: usize,
-    /// Samples of each technique relative to the trial's.
+    /// Samples of each technique relative to the pilot render's plan.
     relative: [f32; TECHNIQUES],
-    /// How many more pairs of samples of one look-up count than if each was made for itself: it is made for both or for none.
+    /// Pairs of samples of one query that count beside those of independent samples: it is made for both or
+    /// for none.
     common: [f32; TECHNIQUES],
-    /// As many pairs of photons of one light sub-path as the plan has, less those of the trial: by points and by beams.
+    /// Pairs of photons of one light sub-path that the plan has, less those of the pilot render: by points
+    /// and by beams.
     more: [f32; 2],
-    /// Whether any look-up is seldom.
-    seldom: bool,
-    /// Sums of what was found of a light sub-path: by class and, where look-ups are seldom, by technique.
+    /// Whether any technique makes queries in some iterations only.
+    periodic: bool,
+    /// Sums of what was found of a light sub-path: by class and, where queries are periodic, by technique.
     by_class: Vec<[Vec3; 2]>,
     by_technique: Vec<[Vec3; TECHNIQUES]>,
 }
 
 impl<'a> View<'a> {
-    pub(super) fn new(trial: &Trial, looks: &'a Looks, counts: &Counts) -> Self {
+    pub(super) fn new(pilot: &PilotRender, looks: &'a Looks, counts: &Counts) -> Self {
         Self {
             looks,
             roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
-            common: counts.look_ups.map(|p| (1.0 / p - 1.0) as f32),
-            more: [0, 1].map(|i| (trial.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
-            seldom: counts.look_ups.iter().any(|p| *p < 1.0),
+            common: counts.active.map(|p| (1.0 / p - 1.0) as f32),
+            more: [0, 1].map(|i| (pilot.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
+            periodic: counts.active.iter().any(|p| *p < 1.0),
             by_class: Vec::new(),
             by_technique: Vec::new(),
         }
@@ -113,17 +117,17 @@ impl<'a> View<'a> {
 
     /// A look at what one camera sub-path found.
     pub(super) fn look(&mut self, look: usize) -> Look {
-        if self.seldom { self.look_at::<true>(look) } else { self.look_at::<false>(look) }
+        if self.periodic { self.look_at::<true>(look) } else { self.look_at::<false>(look) }
     }
 
-    fn look_at<const SELDOM: bool>(&mut self, look: usize) -> Look {
+    fn look_at<const PERIODIC: bool>(&mut self, look: usize) -> Look {
         let mut result = Look::default();
         let mut all = [Vec3::ZERO; 2];
         let mut all_by_technique = [Vec3::ZERO; TECHNIQUES];
         let (samples, light_paths) = self.looks.of(look);
         self.by_class.clear();
         self.by_class.resize(light_paths as usize, all);
-        if SELDOM {
+        if PERIODIC {
             self.by_technique.clear();
             self.by_technique.resize(light_paths as usize, all_by_technique);
         }
@@ -142,7 +146,7 @@ impl<'a> View<'a> {
             let own = class(seen.technique);
             let mut others = all[0] + all[1];
             all[own] += y;
-            if SELDOM {
+            if PERIODIC {
                 others += self.common[i] * all_by_technique[i];
                 all_by_technique[i] += y;
             }
@@ -151,14 +155,14 @@ impl<'a> View<'a> {
                 let found = &mut self.by_class[path];
                 others += self.more[0] * found[0] + self.more[own] * found[1];
                 found[own] += y;
-                if SELDOM {
+                if PERIODIC {
                     let found = &mut self.by_technique[path][i];
                     others += self.more[own] * self.common[i] * *found;
                     *found += y;
                 }
             }
-            // A pair is there as often as walks get to the deeper of both, which came before, and each weighs as if it was as often
-            // as walks get to it: what is left is how rare the other is.
+            // A pair is there as often as walks get to the deeper of both, which came before, and each weighs
+            // as if it was as often as walks get to it: what is left is how rare the other is.
             result.products += f64::from(2.0 * rarity * y.dot(others));
         }
         result.sum = (all[0] + all[1]).as_dvec3();
@@ -176,7 +180,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// Densities relative to those of the trial: of light tracing, and of merges.
+/// Densities of light tracing and of merges relative to those of the pilot render.
 pub(super) struct Share {
     splats: f32,
     merges: f32,
@@ -191,7 +195,7 @@ impl Share {
         square * self.inverse
     }
 
-    /// What of it is due to splats and merges.
+    /// The part of it that is due to splats and merges.
     #[inline]
     fn light(&self, square: f32) -> f32 {
         square * self.inverse * ((self.splats + self.merges) * self.inverse)

@@ -2,13 +2,13 @@
 
 use glam::Vec3;
 use proptest::prelude::*;
-use upbp_estimators::Technique;
-use upbp_estimators::scene::PixelRect;
+use upbp_estimators::{LookUps, Technique};
 
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
-use crate::auto::pilot_render::roulette::{COUNT, OF_TRIAL, TRIAL, numbered, relative_reach};
 use crate::auto::pilot_render::{PASSES, Work};
+use crate::auto::roulette::{self, COUNT, OF_PILOT, PILOT, relative_pass_probability};
+use crate::radius::RadiusSchedule;
 
 const SIDE: u32 = 128;
 
@@ -22,8 +22,9 @@ fn uniform(i: usize, sequence: u32) -> f64 {
     (x >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// `∫ 3x² dx = 1` over the unit interval, by one sample of density 1, as if it was an emission hit, and one of density `2x` by another technique.
-fn trial_of(other: Technique) -> Trial {
+/// `∫ 3x² dx = 1` over the unit interval, by one sample of density 1, as if it was an emission hit, and one
+/// of density `2x` by another technique.
+fn pilot_of(other: Technique) -> PilotRender {
     let cells = (SIDE * SIDE) as usize;
     let passes = PASSES as usize;
     let mut samples = Vec::new();
@@ -39,26 +40,51 @@ fn trial_of(other: Technique) -> Trial {
         }
         ends.push(samples.len() as u32);
     }
-    Trial {
-        passes,
+    PilotRender {
+        plan: planned(1),
+        pixels: cells as f64,
         cells,
+        columns: SIDE as usize,
+        passes,
         samples,
         ends,
         splats: Vec::new(),
         thinning: [1.0; 2],
-        planned: [1.0; 2],
-        pixels: cells as f64,
         work: Work::default(),
     }
 }
 
 /// Samples of some techniques, and light sub-paths, relative to those of the plan.
+fn planned(paths: u32) -> Plan {
+    let radii = RadiusSchedule {
+        surf: 0.0,
+        pp3d: 0.0,
+        pb2d: 0.0,
+        bp2d: 0.0,
+        bb1d: 0.0,
+        progressive: true,
+        floor: 1e-6,
+    };
+    Plan {
+        techniques: TechniqueSet::ALL,
+        light_paths: paths,
+        beam_paths: paths,
+        connections: 1.0,
+        next_events: 1.0,
+        roulette: OF_PILOT,
+        look_ups: LookUps::ALL,
+        vertices_per_light_path: 1.0,
+        radii,
+    }
+}
+
 fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts {
     let mut counts = Counts {
         relative: [0.0; TECHNIQUES],
         paths: [paths; 2],
-        look_ups: [1.0; TECHNIQUES],
-        roulette: TRIAL,
+        active: [1.0; TECHNIQUES],
+        roulette: PILOT,
+        light_paths: 1.0,
     };
     for (technique, number) in relative {
         counts.relative[technique as usize] = number;
@@ -66,8 +92,8 @@ fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts
     counts
 }
 
-fn trial() -> Trial {
-    trial_of(Technique::Connect)
+fn pilot() -> PilotRender {
+    pilot_of(Technique::Connect)
 }
 
 fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
@@ -84,11 +110,11 @@ fn variances_are_those_of_the_estimators() {
     // The picture is 1 everywhere.
     let relative = 1.0 / (1.0 + DARKNESS);
     for other in [Technique::Connect, Technique::Surf] {
-        let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
-        let prediction = Prediction::new(trial_of(other), &grid);
+        let prediction = Variance::of(pilot_of(other));
         for [hits, others] in [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
             let counts = counts([(Technique::Hit, hits), (other, others)], 1.0);
-            // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n, where w is the part of n p in a sum.
+            // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n, where w is the part
+            // of n p in a sum.
             let part = |n: f64, p: Function<'_>, sum: Function<'_>| {
                 if n == 0.0 {
                     return 0.0;
@@ -99,7 +125,7 @@ fn variances_are_those_of_the_estimators() {
             };
             let sum = |x: f64| hits + others * 2.0 * x;
             let expected = relative * (part(hits, &|_| 1.0, &sum) + part(others, &|x| 2.0 * x, &sum));
-            let found: f64 = prediction.relative_variance(&counts).iter().sum();
+            let found: f64 = prediction.with(&counts).iter().sum();
             assert!(
                 (found / expected - 1.0).abs() < 0.1,
                 "{other:?}, {hits}, {others}: {found}, expected {expected}"
@@ -136,20 +162,26 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
         }
         ends.push(samples.len() as u32);
     }
-    let trial =
-        Trial { samples, ends, thinning: [TRACED as f64 / PLANNED; 2], planned: [PLANNED; 2], ..trial() };
-    let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
-    let prediction = Prediction::new(trial, &grid);
+    let pilot = PilotRender {
+        samples,
+        ends,
+        thinning: [TRACED as f64 / PLANNED; 2],
+        plan: planned(PLANNED as u32),
+        ..pilot()
+    };
+    let prediction = Variance::of(pilot);
     for paths in [0.25, 1.0, 4.0] {
-        let found: f64 =
-            prediction.relative_variance(&counts([(Technique::Pb2d, paths)], paths)).iter().sum();
+        let found: f64 = prediction
+            .with(&Counts { light_paths: paths * PLANNED, ..counts([(Technique::Pb2d, paths)], paths) })
+            .iter()
+            .sum();
         let expected = (RARE - 1.0) / (paths * PLANNED) / (1.0 + DARKNESS);
         assert!((found / expected - 1.0).abs() < 0.1, "{paths}: {found}, expected {expected}");
     }
 }
 
-/// A trial that has few photons, and by chance of as much from pass to pass as if they did not vary, does not make them vary less than
-/// independent ones.
+/// A pilot render that has few photons, and by chance of as much from pass to pass as if they did not vary,
+/// does not make them vary less than independent ones.
 #[test]
 fn photons_vary_at_least_as_independent_ones_do() {
     const PLANNED: f64 = 1000.0;
@@ -159,18 +191,19 @@ fn photons_vary_at_least_as_independent_ones_do() {
     let photon =
         Sample { technique: Technique::Bb1d, merged: Some(0), albedos: 1.0, value: Vec3::ONE, shares };
     let looks = (SIDE * SIDE * PASSES) as usize;
-    let trial = Trial {
+    let pilot = PilotRender {
         samples: vec![photon; looks],
         ends: (1..=looks as u32).collect(),
         thinning: [TRACED / PLANNED; 2],
-        planned: [PLANNED; 2],
-        ..trial()
+        plan: planned(PLANNED as u32),
+        ..pilot()
     };
-    let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
-    let prediction = Prediction::new(trial, &grid);
+    let prediction = Variance::of(pilot);
     for paths in [0.25, 1.0] {
-        let found: f64 =
-            prediction.relative_variance(&counts([(Technique::Bb1d, paths)], paths)).iter().sum();
+        let found: f64 = prediction
+            .with(&Counts { light_paths: paths * PLANNED, ..counts([(Technique::Bb1d, paths)], paths) })
+            .iter()
+            .sum();
         // So many light sub-paths, each of which comes by with probability 1 / TRACED.
         let expected = (TRACED - 1.0) / (paths * PLANNED) / (1.0 + DARKNESS);
         assert!((found / expected - 1.0).abs() < 1e-3, "{paths}: {found}, expected {expected}");
@@ -181,7 +214,7 @@ fn photons_vary_at_least_as_independent_ones_do() {
 #[test]
 fn variances_know_where_walks_end() {
     const ALBEDO: f32 = 0.3;
-    let reached = OF_TRIAL.reach(ALBEDO);
+    let reached = OF_PILOT.reach(ALBEDO);
     let mut shares = [0.0; TECHNIQUES];
     shares[Technique::Hit as usize] = 1.0;
     let (mut samples, mut ends) = (Vec::new(), Vec::new());
@@ -196,12 +229,11 @@ fn variances_know_where_walks_end() {
         }
         ends.push(samples.len() as u32);
     }
-    let grid = Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE);
-    let prediction = Prediction::new(Trial { samples, ends, ..trial() }, &grid);
+    let prediction = Variance::of(PilotRender { samples, ends, ..pilot() });
     for roulette in 0..COUNT {
         let counts = Counts { roulette, ..counts([(Technique::Hit, 1.0)], 1.0) };
-        let found: f64 = prediction.relative_variance(&counts).iter().sum();
-        let reach = f64::from(numbered(roulette, OF_TRIAL).reach(ALBEDO));
+        let found: f64 = prediction.with(&counts).iter().sum();
+        let reach = f64::from(roulette::all()[roulette].reach(ALBEDO));
         let squares = 1.0 + 1.0 / reach;
         let expected = (1.0 / reach - 1.0).max(LEAST_PART * squares) / (4.0 * (1.0 + DARKNESS));
         assert!((found / expected - 1.0).abs() < 0.1, "{roulette}: {found}, expected {expected}");
@@ -210,17 +242,16 @@ fn variances_know_where_walks_end() {
 
 #[test]
 fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
-    let mut trial = trial();
-    for sample in &mut trial.samples {
+    let mut pilot = pilot();
+    for sample in &mut pilot.samples {
         if sample.technique == Technique::Connect {
             sample.shares = [0.0; TECHNIQUES];
             sample.shares[Technique::Connect as usize] = 1.0;
         }
     }
-    let prediction =
-        Prediction::new(trial, &Grid::new(PixelRect { x: 0, y: 0, width: SIDE, height: SIDE }, SIDE * SIDE));
+    let prediction = Variance::of(pilot);
     let counts = counts([(Technique::Hit, 1.0)], 1.0);
-    assert!(prediction.relative_variance(&counts).iter().sum::<f64>().is_infinite());
+    assert!(prediction.with(&counts).iter().sum::<f64>().is_infinite());
 }
 
 #[test]
@@ -245,11 +276,12 @@ fn products(samples: &[Sample], thinning: [f64; 2], counts: &Counts) -> f64 {
     for (i, a) in samples.iter().enumerate() {
         for b in samples[..i].iter().chain(&samples[i + 1..]) {
             // Walks get to both as often as to the deeper one, and each weighs as if it was alone.
-            let reach = |sample: &Sample| f64::from(relative_reach(counts.roulette, sample.albedos));
+            let reach =
+                |sample: &Sample| f64::from(relative_pass_probability(counts.roulette, sample.albedos));
             let deeper = if a.albedos < b.albedos { a } else { b };
             let mut factor = reach(deeper) / (reach(a) * reach(b));
             if a.technique == b.technique {
-                factor /= counts.look_ups[a.technique as usize];
+                factor /= counts.active[a.technique as usize];
             }
             if a.merged.is_some() && a.merged == b.merged {
                 let class = usize::from(beams(a) && beams(b));
@@ -283,19 +315,19 @@ proptest! {
         mut samples in prop::collection::vec(sample(), 0..24),
         roulette in 0..COUNT,
         paths in prop::array::uniform2(0.25_f64..4.0),
-        seldom in prop::array::uniform(proptest::bool::ANY),
+        periodic in prop::array::uniform(proptest::bool::ANY),
         thinning in prop::array::uniform2(0.1_f64..1.0),
     ) {
-        let seldom: [bool; TECHNIQUES] = seldom;
+        let periodic: [bool; TECHNIQUES] = periodic;
         samples.sort_by_key(|sample| sample.merged);
-        let look_ups: [f64; TECHNIQUES] = std::array::from_fn(|i| {
-            if seldom[i] && Technique::ALL[i].merges() { 0.25 } else { 1.0 }
+        let active: [f64; TECHNIQUES] = std::array::from_fn(|i| {
+            if periodic[i] && Technique::ALL[i].merges() { 0.25 } else { 1.0 }
         });
-        let counts = Counts { relative: look_ups.map(|p| 0.5 + p), paths, look_ups, roulette };
+        let counts = Counts { relative: active.map(|p| 0.5 + p), paths, active, roulette, light_paths: 1.0 };
         let expected = products(&samples, thinning, &counts);
-        let trial = Trial { cells: 1, passes: 1, ends: vec![samples.len() as u32], samples, thinning, ..trial() };
-        let looks = pairs::Looks::new(&trial);
-        let found = View::new(&trial, &looks, &counts).look(0).products;
+        let pilot = PilotRender { cells: 1, passes: 1, ends: vec![samples.len() as u32], samples, thinning, ..pilot() };
+        let looks = pairs::Looks::new(&pilot);
+        let found = View::new(&pilot, &looks, &counts).look(0).products;
         prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
     }
 }

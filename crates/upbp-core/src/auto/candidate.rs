@@ -1,0 +1,252 @@
+//! Plans that may be chosen, and the steps from one to the next.
+
+use std::num::NonZeroU32;
+
+use upbp_estimators::scene::Scene;
+use upbp_estimators::{LookUps, Roulette, Technique, TechniqueSet, World as PreparedScene};
+
+use super::cost::Cost;
+use super::full_plan::BEAMS;
+use super::roulette;
+use super::statistics::Statistics;
+use super::support::TechniqueSupport;
+use crate::plan::Plan;
+use crate::radius::Radius;
+use crate::settings::{CheckedSettings, LightPaths};
+
+/// Numbers of light sub-paths, relative to the full plan's.
+const LIGHT_PATHS: [f64; 3] = [0.0625, 0.25, 1.0];
+/// Numbers of light sub-paths with beams, relative to the full plan's.
+const BEAM_PATHS: [f64; 2] = [0.25, 1.0];
+/// Period of queries that only some iterations make.
+const PERIOD: NonZeroU32 = NonZeroU32::new(8).unwrap();
+/// Factor by which an iteration may take longer with the safeguard.
+const SAFEGUARD_OVERHEAD: f64 = 1.05;
+
+/// All plans that may be chosen: whatever settings do not fix.
+#[derive(Clone, Debug)]
+pub(super) struct Candidates {
+    /// All techniques, all light sub-paths, the widest radius: what pilot renders run, since they can tell
+    /// what less of anything would do.
+    pub(super) full: Plan,
+    /// Techniques that stay on: some paths may have no other.
+    always: TechniqueSet,
+    /// Techniques that a plan with light sub-paths has at least now and then: there may be light that a pilot
+    /// render misses.
+    safeguard: TechniqueSet,
+    light_paths: Vec<u32>,
+    beam_paths: Vec<u32>,
+    /// Radii of surface merging, the usual one first.
+    surf_radii: Vec<f32>,
+    roulettes: Vec<Roulette>,
+}
+
+impl Candidates {
+    /// The candidates beside a full plan.
+    pub(super) fn new<S: Scene>(
+        scene: &PreparedScene<'_, S>,
+        settings: &CheckedSettings,
+        support: &TechniqueSupport,
+        statistics: &Statistics,
+        full: Plan,
+    ) -> Self {
+        let counts = |full: u32, parts: &[f64], is_fixed: bool| {
+            let count = |part: &f64| ((f64::from(full) * part) as u32).max(1);
+            if is_fixed { vec![full] } else { parts.iter().map(count).collect() }
+        };
+        let usual = full.radii.surf;
+        let widest =
+            if settings.radii.surf == Radius::Auto { widest(usual, statistics.footprint) } else { usual };
+        let mut candidates = Self {
+            full: Plan { roulette: settings.roulette.unwrap_or(roulette::OF_PILOT), ..full },
+            always: if support.needs_merges { finds_all(full.techniques) } else { TechniqueSet::EMPTY },
+            safeguard: if scene.scene.has_specular_surfaces() {
+                full.techniques.intersection(TechniqueSet::EMPTY.with(Technique::Surf))
+            } else {
+                TechniqueSet::EMPTY
+            },
+            light_paths: counts(full.light_paths, &LIGHT_PATHS, settings.light_paths != LightPaths::Auto),
+            beam_paths: counts(full.beam_paths, &BEAM_PATHS, settings.beams.is_some()),
+            surf_radii: if widest > usual { vec![usual, widest] } else { vec![usual] },
+            roulettes: settings.roulette.map_or_else(|| roulette::all().to_vec(), |own| vec![own]),
+        };
+        candidates.full.radii.surf = widest;
+        candidates
+    }
+
+    /// The full plan with the usual radius: what runs if there is no time for a choice.
+    pub(super) fn usual(&self) -> Plan {
+        let mut plan = self.full;
+        plan.radii.surf = self.surf_radii[0];
+        plan
+    }
+
+    /// Plans to begin with, the simplest first: camera sub-paths alone, paths alone, everything.
+    pub(super) fn starts(&self) -> [Plan; 3] {
+        let usual = self.usual();
+        let with = |set: TechniqueSet| set.union(self.always).intersection(usual.techniques);
+        // What stays on only for the sake of paths that were not seen is to cost little.
+        let camera = Plan { techniques: with(TechniqueSet::PT), light_paths: self.light_paths[0], ..usual };
+        let mut paths = Plan { techniques: with(TechniqueSet::BPT.union(self.safeguard)), ..usual };
+        for technique in self.safeguard.without(self.always).iter() {
+            paths = with_period(paths, technique, PERIOD);
+        }
+        [camera, paths, usual].map(possible)
+    }
+
+    /// All candidates that differ from a plan in one thing.
+    pub(super) fn steps(&self, from: &Plan) -> Vec<Plan> {
+        let mut steps = Vec::new();
+        for technique in self.full.techniques.without(TechniqueSet::PT).iter() {
+            let always = with_period(*from, technique, NonZeroU32::MIN);
+            let techniques = always.techniques.with(technique);
+            steps.push(Plan { techniques, ..always });
+            if technique.merges() {
+                steps.push(Plan { techniques, ..with_period(always, technique, PERIOD) });
+            }
+            if !self.always.has(technique) {
+                let alone = TechniqueSet::EMPTY.with(technique);
+                steps.push(Plan { techniques: always.techniques.without(alone), ..always });
+            }
+        }
+        steps.extend(self.light_paths(from));
+        if from.techniques.intersects(BEAMS) {
+            steps.extend(self.beam_paths.iter().map(|&beam_paths| Plan { beam_paths, ..*from }));
+        }
+        if from.techniques.has(Technique::Surf) {
+            steps.extend(self.surf_radii.iter().map(|&radius| with_surf_radius(*from, radius)));
+        }
+        steps.extend(self.roulettes.iter().map(|&roulette| Plan { roulette, ..*from }));
+        steps.into_iter().map(possible).filter(|step| step != from).collect()
+    }
+
+    /// The same plan with each number of light sub-paths, if it has any.
+    pub(super) fn light_paths(&self, from: &Plan) -> Vec<Plan> {
+        let counts = if from.uses_light_paths() { self.light_paths.as_slice() } else { &[] };
+        counts.iter().map(|&light_paths| possible(Plan { light_paths, ..*from })).collect()
+    }
+
+    /// A plan with the techniques that may find light that the pilot render missed, if it has light
+    /// sub-paths: in all iterations and with the widest radius where this costs little, since such light is
+    /// bright in few photons, else in all with the radius at hand, else in some.
+    pub(super) fn with_safeguard(&self, plan: Plan, cost: &Cost<'_>) -> Plan {
+        if !plan.uses_light_paths() {
+            return plan;
+        }
+        let (mut always, mut now_and_then) = (plan, plan);
+        for technique in self.safeguard.iter() {
+            let techniques = plan.techniques.with(technique);
+            let is_active = plan.techniques.has(technique) && plan.active_part(technique) == 1.0;
+            always = Plan { techniques, ..with_period(always, technique, NonZeroU32::MIN) };
+            if !is_active {
+                now_and_then = Plan { techniques, ..with_period(now_and_then, technique, PERIOD) };
+            }
+        }
+        let widest = with_surf_radius(always, self.full.radii.surf);
+        let most = SAFEGUARD_OVERHEAD * cost.iteration(&plan);
+        let affordable = [widest, always].into_iter().find(|safe| cost.iteration(safe) <= most);
+        if self.safeguard.is_empty() { plan } else { affordable.unwrap_or(now_and_then) }
+    }
+}
+
+/// The same plan as it is written down: without sub-paths that no technique uses.
+pub(super) fn finished(plan: Plan) -> Plan {
+    let light_paths = if plan.uses_light_paths() { plan.light_paths } else { 0 };
+    let beam_paths = if plan.techniques.intersects(BEAMS) { plan.beam_paths.min(light_paths) } else { 0 };
+    Plan { light_paths, beam_paths, ..plan }
+}
+
+/// The same plan with beams from no more light sub-paths than there are.
+fn possible(plan: Plan) -> Plan {
+    let most = if plan.techniques.intersects(BEAMS) { plan.light_paths } else { u32::MAX };
+    Plan { beam_paths: plan.beam_paths.min(most), ..plan }
+}
+
+fn with_period(plan: Plan, technique: Technique, period: NonZeroU32) -> Plan {
+    let of = |other| NonZeroU32::new(plan.look_ups.period(other)).unwrap_or(NonZeroU32::MIN);
+    let look_ups = LookUps::from_fn(|other| if other == technique { period } else { of(other) });
+    Plan { look_ups, ..plan }
+}
+
+fn with_surf_radius(mut plan: Plan, radius: f32) -> Plan {
+    plan.radii.surf = radius;
+    plan
+}
+
+/// The widest radius of surface merging: the width of a pixel, if that is more than the usual radius, up to
+/// four times as much. It blurs what a pixel blurs anyway, so that the prediction, which knows nothing of
+/// blur, may be asked.
+fn widest(usual: f32, footprint: f32) -> f32 {
+    /// A narrower one is not worth a candidate.
+    const LEAST: f32 = 1.25;
+    const MOST: f32 = 4.0;
+    if footprint >= LEAST * usual { footprint.min(MOST * usual) } else { usual }
+}
+
+/// Merges that find every path with a vertex where anything but specular surfaces scatters: those on
+/// surfaces, and one kind of those in media.
+fn finds_all(techniques: TechniqueSet) -> TechniqueSet {
+    let volume = [Technique::Pb2d, Technique::Pp3d, Technique::Bb1d, Technique::Bp2d];
+    let one = volume.into_iter().find(|technique| techniques.has(*technique));
+    one.into_iter().chain([Technique::Surf]).collect::<TechniqueSet>().intersection(techniques)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+    use crate::radius::RadiusSchedule;
+
+    #[test]
+    fn beams_come_from_light_sub_paths() {
+        let radii = RadiusSchedule {
+            surf: 1e-3,
+            pp3d: 1e-3,
+            pb2d: 1e-3,
+            bp2d: 1e-3,
+            bb1d: 1e-3,
+            progressive: true,
+            floor: 1e-6,
+        };
+        let full = Plan {
+            techniques: TechniqueSet::ALL,
+            light_paths: 1600,
+            beam_paths: 800,
+            connections: 1.0,
+            next_events: 1.0,
+            roulette: roulette::OF_PILOT,
+            look_ups: LookUps::ALL,
+            vertices_per_light_path: 1.0,
+            radii,
+        };
+        let candidates = Candidates {
+            full,
+            always: TechniqueSet::EMPTY,
+            safeguard: TechniqueSet::EMPTY,
+            light_paths: vec![100, 400, 1600],
+            beam_paths: vec![200, 800],
+            surf_radii: vec![1e-3],
+            roulettes: vec![roulette::OF_PILOT],
+        };
+        let mut found = candidates.starts().to_vec();
+        let mut next = VecDeque::from(found.clone());
+        let mut fewer = 0;
+        while let Some(from) = next.pop_front().filter(|_| found.len() < 2000) {
+            for step in candidates.steps(&from) {
+                if found.contains(&step) {
+                    continue;
+                }
+                assert!(
+                    !step.techniques.intersects(BEAMS) || step.beam_paths <= step.light_paths,
+                    "{step:?}"
+                );
+                fewer += u32::from(!candidates.beam_paths.contains(&step.beam_paths));
+                found.push(step);
+                next.push_back(step);
+            }
+        }
+        assert!(fewer > 0, "nothing to hold back in {} candidates", found.len());
+        assert_eq!(finished(candidates.starts()[0]).light_paths, 0);
+    }
+}

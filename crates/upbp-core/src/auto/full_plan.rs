@@ -1,0 +1,157 @@
+//! The full plan: all techniques, a light sub-path per pixel as far as there is memory, and first radii.
+
+use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::{
+    LookUps, PathLengths, Plan as IterationPlan, PlanChoices, Technique, TechniqueSet, World as PreparedScene,
+};
+
+use super::memory::{LightCounts, Room};
+use super::neighbours::Neighbours;
+use super::roulette::usual_roulette;
+use super::statistics::Statistics;
+use crate::budget::Budget;
+use crate::plan::Plan;
+use crate::radius::{Radius, RadiusSchedule};
+use crate::settings::{CheckedSettings, LightPaths, Settings};
+
+/// The techniques with photon beams.
+pub(super) const BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Bp2d).with(Technique::Bb1d);
+
+/// The largest first radius of photon beams, relative to the scene's.
+const LARGEST_BEAM_RADIUS: f32 = 3e-3;
+/// Part of the render's time that the light sub-paths of an iteration may take: a quick look need not wait
+/// for a light sub-path per pixel.
+const LIGHT_TIME: f64 = 0.05;
+
+/// A plan with all of `techniques`, and with as many light sub-paths as settings, memory and time allow.
+pub(super) fn full_plan<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    statistics: &Statistics,
+    room: &Room,
+    budget: &Budget<'_>,
+) -> Plan {
+    let crop = scene.scene.camera().crop();
+    let pixels = crop.width.saturating_mul(crop.height);
+    let wanted = match (settings.light_paths, budget.stop.seconds) {
+        (LightPaths::Count(count), _) => count,
+        (LightPaths::Auto, Some(seconds)) if statistics.light_path_seconds > 0.0 => {
+            ((LIGHT_TIME * seconds / statistics.light_path_seconds) as u32).clamp(1, pixels)
+        }
+        (LightPaths::Auto, _) => pixels,
+    };
+    let wanted_beams = settings
+        .beams
+        .unwrap_or_else(|| enough_beams(scene, settings, statistics).min(wanted / 10).max(1))
+        .min(wanted);
+    // Need grows in proportion: a part of the sub-paths takes this part of the memory.
+    let need = LightCounts::expected(statistics, wanted, wanted_beams).peak_bytes::<S::Bsdf>();
+    let part = (room.light_bytes as f64 / need.max(1.0)).min(1.0);
+    let afford = |count: u32| ((f64::from(count) * part) as u32).max(1);
+    plan_with(scene, settings, techniques, statistics, [wanted, wanted_beams].map(afford))
+}
+
+/// A plan with given numbers of light sub-paths, and of those with beams.
+pub(super) fn plan_with<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    statistics: &Statistics,
+    [light_paths, beam_paths]: [u32; 2],
+) -> Plan {
+    let uses = |set: TechniqueSet, paths: u32| if techniques.intersects(set) { paths } else { 0 };
+    Plan {
+        techniques,
+        light_paths: uses(TechniqueSet::ALL.without(TechniqueSet::PT), light_paths),
+        beam_paths: uses(BEAMS, beam_paths),
+        connections: settings.connections.unwrap_or(1.0),
+        next_events: settings.next_events.unwrap_or(1.0),
+        roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
+        look_ups: LookUps::ALL,
+        vertices_per_light_path: statistics.vertices_per_path,
+        radii: first_radii(scene, settings, techniques, statistics, [light_paths, beam_paths]),
+    }
+}
+
+/// Light sub-paths with beams such that a query beam meets a few beams. More cost more than they tell: their
+/// queries soon take most of an iteration.
+fn enough_beams<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    statistics: &Statistics,
+) -> u32 {
+    /// Photon beams within the kernel of a query beam.
+    const HITS: f64 = 1.0;
+    let largest = LARGEST_BEAM_RADIUS * scene.bounds.radius;
+    let (found, radius) = match (statistics.bb1d, settings.radii.bb1d) {
+        (Some(found), Radius::Auto) => (found, largest),
+        (Some(found), Radius::Scene(fraction)) => (found, fraction * scene.bounds.radius),
+        (Some(found), Radius::Absolute(radius)) => (found, radius),
+        (None, _) => return 1024,
+    };
+    found.paths(HITS, f64::from(radius)).clamp(64.0, 1e6) as u32
+}
+
+/// First radii for numbers of light sub-paths, and of those with beams.
+fn first_radii<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    statistics: &Statistics,
+    [light_paths, beam_paths]: [u32; 2],
+) -> RadiusSchedule {
+    let size = scene.bounds.radius;
+    let radius = |technique, choice, found: Option<Neighbours>, count: f64, paths: u32, most: f32| {
+        if !techniques.has(technique) {
+            return 0.0;
+        }
+        match choice {
+            Radius::Absolute(radius) => radius,
+            Radius::Scene(fraction) => fraction * size,
+            Radius::Auto => found
+                .map_or(most * size, |n| n.radius(count, f64::from(paths)))
+                .clamp(0.1 * most * size, most * size),
+        }
+    };
+    let radii = &settings.radii;
+    RadiusSchedule {
+        surf: radius(Technique::Surf, radii.surf, statistics.surf, 8.0, light_paths, 3e-3),
+        pp3d: radius(Technique::Pp3d, radii.pp3d, statistics.pp3d, 8.0, light_paths, 5e-3),
+        pb2d: radius(Technique::Pb2d, radii.pb2d, statistics.pb2d, 8.0, light_paths, 3e-3),
+        bp2d: radius(Technique::Bp2d, radii.bp2d, statistics.bp2d, 8.0, beam_paths, 3e-3),
+        bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
+        progressive: settings.progressive,
+        // Positions have a relative precision of 6e-8.
+        floor: 1e-6 * size,
+    }
+}
+
+/// The plan of one iteration.
+pub(crate) fn iteration_plan<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &Settings,
+    plan: &Plan,
+    iteration: u64,
+) -> IterationPlan {
+    IterationPlan::new(
+        scene.scene,
+        &PlanChoices {
+            seed: settings.seed,
+            iteration,
+            techniques: plan.techniques,
+            light_paths: plan.light_paths,
+            beam_paths: plan.beam_paths,
+            connections: plan.connections,
+            next_events: plan.next_events,
+            vertices_per_light_path: plan.vertices_per_light_path,
+            lengths: PathLengths { min: settings.min_length, max: settings.max_length },
+            roulette: plan.roulette,
+            kernels: plan.radii.kernels(iteration),
+            look_ups: plan.look_ups,
+            heuristic: settings.heuristic,
+            photon_beams: settings.photon_beams,
+            query_beams: settings.query_beams,
+        },
+    )
+}

@@ -1,0 +1,40 @@
+//! Sub-paths of pilots, traced in parallel with a result that does not depend on the number of threads.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use upbp_estimators::path::Scratch;
+use upbp_estimators::scene::PixelRect;
+
+use crate::budget::Halt;
+
+/// Sub-paths per piece of work.
+pub(super) const PIECE: usize = 16;
+
+/// Traces sub-paths by number, with an output for each piece of [`PIECE`] sub-paths. `None` if it was halted,
+/// or if `trace` breaks off by `false`.
+pub(super) fn in_pieces<B: Copy, O: Default + Send>(
+    paths: u32,
+    halt: &Halt<'_>,
+    trace: impl Fn(u32, &mut Scratch<B>, &mut O) -> bool + Sync,
+) -> Option<Vec<O>> {
+    let pieces: Vec<Range<u32>> =
+        (0..paths).step_by(PIECE).map(|first| first..first.saturating_add(PIECE as u32).min(paths)).collect();
+    let piece = |scratch: &mut Scratch<B>, paths: Range<u32>| {
+        let mut out = O::default();
+        for path in paths {
+            if halt.now() || !trace(path, scratch, &mut out) {
+                return None;
+            }
+        }
+        Some(out)
+    };
+    pieces.into_par_iter().map_init(Scratch::default, piece).collect()
+}
+
+/// A pixel of a sequence that is spread over the picture by a step that is prime to almost every width.
+pub(super) fn pixel(crop: PixelRect, index: u64) -> [u32; 2] {
+    let width = u64::from(crop.width);
+    let place = (index * 7919) % (width * u64::from(crop.height));
+    [crop.x + (place % width) as u32, crop.y + (place / width) as u32]
+}

@@ -1,0 +1,113 @@
+//! The record of a render: times, counts, errors against a reference.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use upbp_estimators::Counters;
+
+/// Wall seconds of the passes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PassSeconds {
+    /// The pilot.
+    pub pilot: f64,
+    /// Light sub-paths.
+    pub light: f64,
+    /// Building look-up structures.
+    pub build: f64,
+    /// Camera sub-paths, with all look-ups.
+    pub camera: f64,
+    /// Splats and film.
+    pub film: f64,
+}
+
+impl PassSeconds {
+    /// All passes together.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.pilot + self.light + self.build + self.camera + self.film
+    }
+}
+
+/// Wall time of the passes, in whole nanoseconds: sums do not depend on the order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct PassTimes {
+    pub(crate) pilot: Duration,
+    pub(crate) light: Duration,
+    pub(crate) build: Duration,
+    pub(crate) camera: Duration,
+    pub(crate) film: Duration,
+}
+
+impl PassTimes {
+    pub(crate) fn add(&mut self, other: &Self) {
+        let sum = |a: &mut Duration, b| *a = a.saturating_add(b);
+        sum(&mut self.pilot, other.pilot);
+        sum(&mut self.light, other.light);
+        sum(&mut self.build, other.build);
+        sum(&mut self.camera, other.camera);
+        sum(&mut self.film, other.film);
+    }
+
+    pub(crate) fn seconds(&self) -> PassSeconds {
+        PassSeconds {
+            pilot: self.pilot.as_secs_f64(),
+            light: self.light.as_secs_f64(),
+            build: self.build.as_secs_f64(),
+            camera: self.camera.as_secs_f64(),
+            film: self.film.as_secs_f64(),
+        }
+    }
+}
+
+/// The error at some moment of a render, against a reference.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorPoint {
+    /// Seconds of rendering, without evaluation of the error.
+    pub seconds: f64,
+    /// Iterations done.
+    pub iterations: u64,
+    /// Mean of `(x − r)² / (r² + 0.01)`.
+    pub relative_mse: f64,
+    /// Root mean squared difference.
+    pub rmse: f64,
+}
+
+/// Errors over time, of any length of a render in bounded space: every iteration up to the hundredth, then
+/// one per hundredth of the number of iterations, and the latest.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ErrorSeries(Vec<ErrorPoint>);
+
+impl ErrorSeries {
+    /// Least ratio of the numbers of iterations of two points that are kept.
+    const SPACING: f64 = 1.01;
+
+    /// Adds a point with more iterations than those before.
+    pub fn push(&mut self, point: ErrorPoint) {
+        if let [.., before, last] = self.0.as_mut_slice()
+            && (last.iterations as f64) < Self::SPACING * before.iterations as f64
+        {
+            *last = point;
+        } else {
+            self.0.push(point);
+        }
+    }
+
+    /// The points that were kept.
+    #[must_use]
+    pub fn points(&self) -> &[ErrorPoint] {
+        &self.0
+    }
+}
+
+/// Times and counts of a render, besides the film. All of them add up.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Record {
+    pub(crate) times: PassTimes,
+    pub(crate) counters: Counters,
+    /// Largest number of bytes that light vertices, beams and look-up structures took.
+    pub(crate) map_bytes: u64,
+    /// Bytes that the render is expected to need.
+    pub(crate) expected_bytes: u64,
+    pub(crate) series: ErrorSeries,
+}
