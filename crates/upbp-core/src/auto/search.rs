@@ -34,8 +34,9 @@ impl Found {
     }
 }
 
-/// Searches from several starts, and compares the ends directly. Ties go to the plan without light sub-paths, then to the one with
-/// more of them: the variance that is lost by tracing fewer sits in rare samples, which a pilot render underestimates.
+/// Searches from several starts, and compares the ends directly. Ties go to the plan without light sub-paths,
+/// then to the one with more of them: the variance that is lost by tracing fewer sits in rare samples, which
+/// a pilot render underestimates.
 pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let cost = Cost::of(variance.pilot());
     let mut judge = Judge { variance, cost, known: Vec::new() };
@@ -84,7 +85,8 @@ impl Judged {
         self.variance.iter().sum::<f64>() * self.cost
     }
 
-    /// This, unless the other's product is less: by [`GAIN`] for each time that it has a quarter of the light sub-paths.
+    /// This, unless the other's product is less: by [`GAIN`] for each time that it has a quarter of the light
+    /// sub-paths.
     fn or_better(self, other: Self) -> Self {
         let needed = (1.0 - GAIN).powf(log4_path_ratio(&self.plan, &other.plan));
         if other.product() < needed * self.product() { other } else { self }
