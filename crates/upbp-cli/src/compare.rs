@@ -177,6 +177,7 @@ impl Errors {
             self.relative_squares[c] += weight * square / scale2(reference[c]);
         }
     }
+
     /// The weighted mean of each channel, and the mean of the three.
     fn mean(&self, sums: [f64; 3]) -> [f64; 4] {
         let [r, g, b] = sums.map(|sum| sum / self.weight);
@@ -230,11 +231,13 @@ impl Comparison {
     }
 }
 
-/// A number with five digits; a dash for one that makes no sense.
+/// A number with at least five digits; a dash for one that makes no sense.
 fn number(value: f64) -> String {
     if !value.is_finite() {
         "-".to_owned()
-    } else if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
+    } else if value == 0.0 {
+        "0".to_owned()
+    } else if (0.1..1e5).contains(&value.abs()) {
         format!("{value:.5}")
     } else {
         format!("{value:.4e}")
