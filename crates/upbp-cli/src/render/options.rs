@@ -21,6 +21,9 @@ const THREADS_PER_CORE: usize = 16;
 #[derive(Debug, Args)]
 pub(crate) struct Options {
     /// Scene file (RON)
+    ///
+    /// The documentation of the crate upbp-scene describes the format (docs.rs/upbp-scene); scenes to
+    /// start from are in examples/scenes of the repository.
     #[arg(value_name = "SCENE.ron", value_hint = ValueHint::FilePath)]
     pub(crate) scene: PathBuf,
     #[command(flatten)]
