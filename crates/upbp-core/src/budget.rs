@@ -40,7 +40,7 @@ impl Halt<'_> {
     }
 }
 
-/// Rules by which a render stops: as soon as any of them holds. Without rules a render goes on until it is
+/// Rules by which a render stops: as soon as one holds. Without rules a render goes on until it is
 /// cancelled.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {

@@ -47,7 +47,7 @@ pub enum RenderError {
         chosen: TechniqueSet,
         /// The techniques that can; none if nothing can be seen in the scene at all.
         possible: TechniqueSet,
-        /// Why not.
+        /// The reasons for which the chosen ones cannot.
         reasons: String,
     },
     /// A setting.
@@ -143,7 +143,7 @@ pub enum OutputError {
     State {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Problem that was found.
         source: StateError,
     },
     /// The file system refuses.
@@ -151,7 +151,7 @@ pub enum OutputError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file system.
         source: std::io::Error,
     },
     /// The image cannot be encoded.
@@ -159,7 +159,7 @@ pub enum OutputError {
     Encode {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Problem that was found.
         reason: String,
     },
     /// The image cannot be read.
@@ -167,7 +167,7 @@ pub enum OutputError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Problem that was found.
         reason: String,
     },
     /// Writing a file would destroy another one that is read or written.

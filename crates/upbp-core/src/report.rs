@@ -23,7 +23,7 @@ pub struct Report {
     pub seed: u64,
     /// Iterations done.
     pub iterations: u64,
-    /// Which ones: ranges with their ends excluded.
+    /// Iterations that are on the film: ranges with their ends excluded.
     pub iteration_set: IterationSet,
     /// A number of the film's bits: equal for equal films, however they came about.
     pub film_fingerprint: String,

@@ -120,7 +120,7 @@ impl Candidates {
         steps.into_iter().map(possible).filter(|step| step != from).collect()
     }
 
-    /// The same plan with each number of light sub-paths, if it has any.
+    /// A plan with each number of light sub-paths, if it has any.
     pub(super) fn light_paths(&self, from: &Plan) -> Vec<Plan> {
         let counts = if from.uses_light_paths() { self.light_paths.as_slice() } else { &[] };
         counts.iter().map(|&light_paths| possible(Plan { light_paths, ..*from })).collect()
@@ -149,14 +149,14 @@ impl Candidates {
     }
 }
 
-/// The same plan as it is written down: without sub-paths that no technique uses.
+/// A plan as it is written down: without sub-paths that no technique uses.
 pub(super) fn finished(plan: Plan) -> Plan {
     let light_paths = if plan.uses_light_paths() { plan.light_paths } else { 0 };
     let beam_paths = if plan.techniques.intersects(BEAMS) { plan.beam_paths.min(light_paths) } else { 0 };
     Plan { light_paths, beam_paths, ..plan }
 }
 
-/// The same plan with beams from no more light sub-paths than there are.
+/// A plan with beams from no more light sub-paths than it has.
 fn possible(plan: Plan) -> Plan {
     let most = if plan.techniques.intersects(BEAMS) { plan.light_paths } else { u32::MAX };
     Plan { beam_paths: plan.beam_paths.min(most), ..plan }

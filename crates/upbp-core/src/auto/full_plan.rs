@@ -1,4 +1,4 @@
-//! The full plan: all techniques, a light sub-path per pixel as far as there is memory, and first radii.
+//! The full plan: all techniques, a light sub-path per pixel if memory and time allow, and first radii.
 
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{

@@ -21,7 +21,7 @@ const LIGHT_BYTES: u64 = 2 << 30;
 /// Bytes that a render may take, and needs for its film.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Room {
-    /// All that the render may take.
+    /// Memory that the render may take, in bytes.
     total: u64,
     film: u64,
     /// The writing of an image, when light vertices have gone.

@@ -58,14 +58,14 @@ pub struct ErrorEstimate {
     pub low: f64,
     /// Upper end of the interval; infinite with a doubt.
     pub high: f64,
-    /// Why there is no upper end.
+    /// The doubt for which there is no upper end.
     pub doubt: Option<Doubt>,
     /// Weight of the tail of the pixels' errors: the exponent of a Pareto distribution inverted:
     /// without a variance from 1/2 on, without a mean from 1 on.
     pub tail_index: f64,
 }
 
-/// Why the error could be anything.
+/// A reason for which the error could be anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Doubt {
     /// Fewer than two halves, or fewer than eight iterations in both.

@@ -141,7 +141,7 @@ impl Film {
         self.iterations.len()
     }
 
-    /// Which iterations they are.
+    /// The iterations that are on the film.
     #[must_use]
     pub const fn iteration_set(&self) -> &IterationSet {
         &self.iterations

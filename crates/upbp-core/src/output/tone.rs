@@ -6,14 +6,15 @@ use std::str::FromStr;
 #[cfg(test)]
 const MIDDLE_GREY: f32 = 0.18;
 
-/// What a PNG makes of linear radiance: exposure first, then the tone curve, then the transfer curve of sRGB.
+/// The way from linear radiance to a PNG: exposure first, then the tone curve, then the transfer curve of
+/// sRGB.
 ///
 /// The default keeps all values that a screen can show and clips the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
     /// Exposure in stops: radiance is multiplied by two to the power of this.
     pub exposure: f32,
-    /// What happens to values near one and above.
+    /// Curve for values near one and above.
     pub curve: ToneCurve,
 }
 

@@ -112,7 +112,7 @@ impl<'a> Renderer<'a> {
         merged
     }
 
-    /// All that was done so far, to be saved or merged.
+    /// The state of the render, to be saved or merged.
     #[must_use]
     pub const fn state(&self) -> &State {
         &self.state

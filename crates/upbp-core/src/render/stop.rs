@@ -4,7 +4,7 @@ use crate::film::ErrorEstimate;
 use crate::film::Film;
 use crate::state::State;
 
-/// Why a render stopped.
+/// The reason for which a render stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
     /// The number of iterations, or nothing is left of the range.
@@ -20,7 +20,7 @@ pub enum StopReason {
 /// The end of a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outcome {
-    /// Why it stopped.
+    /// The reason for the stop.
     pub reason: StopReason,
 }
 
@@ -36,6 +36,6 @@ pub struct Progress<'a> {
     pub estimated_error: ErrorEstimate,
     /// The film.
     pub film: &'a Film,
-    /// All that was done so far, to be saved.
+    /// The state of the render, to be saved.
     pub state: &'a State,
 }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use upbp_estimators::{TechniqueSet, UnknownTechnique};
 
-/// Which techniques run, written as `"auto"` or as a set such as `"bpt+surf"`.
+/// The techniques that run, written as `"auto"` or as a set such as `"bpt+surf"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Techniques {

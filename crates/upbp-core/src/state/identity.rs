@@ -8,7 +8,7 @@ use crate::error::StateError;
 use crate::plan::Plan;
 use crate::settings::Settings;
 
-/// All that the iterations of a render depend on, besides their index.
+/// The identity of a render: whatever its iterations depend on, besides their index.
 ///
 /// The plan is part of it: so slices from machines whose mathematical functions differ in the last bit, and
 /// which therefore chose otherwise, are refused and not mixed.
@@ -41,8 +41,8 @@ impl Identity {
         PixelRect { x, y, width, height }
     }
 
-    /// Compares with another render's. Settings count by what became of them: how much memory is allowed does
-    /// not matter where the number of light sub-paths is the same.
+    /// Compares with the identity of another render. Settings count by their effect: how much memory is
+    /// allowed does not matter where the number of light sub-paths is the same.
     ///
     /// # Errors
     /// [`StateError::Different`] with the names of what differs and both values.
@@ -56,7 +56,8 @@ impl Identity {
         if differences.is_empty() { Ok(()) } else { Err(StateError::Different { differences }) }
     }
 
-    /// All that counts beside the plan, as text: the shortest decimals of two different numbers differ.
+    /// Names and values of whatever counts beside the plan, as text: the shortest decimals of two different
+    /// numbers differ.
     fn fields(&self) -> [(&'static str, String); 11] {
         let s = &self.settings;
         let (width, height) = self.film;

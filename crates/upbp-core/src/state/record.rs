@@ -100,7 +100,7 @@ impl ErrorSeries {
     }
 }
 
-/// Times and counts of a render, besides the film. All of them add up.
+/// Times and counts of a render, besides the film. All add up.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Record {
     pub(crate) times: PassTimes,

@@ -43,7 +43,7 @@ impl Size {
         Self(crop.width.saturating_mul(crop.height).min(16_384))
     }
 
-    /// Pixels from which on a choice is trusted: more of them where no media make them slow.
+    /// Pixels from which on a choice is trusted: more where no media make them slow.
     pub(super) fn enough<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> Self {
         let crop = scene.scene.camera().crop();
         let media = techniques.intersects(TechniqueSet::VOLUME_MERGES);

@@ -202,7 +202,7 @@ impl Share {
     }
 }
 
-/// Which sub-paths a technique's samples go with: 1 for those with beams.
+/// Class of the light sub-paths that a technique uses: 1 for those with beams.
 const fn class(technique: Technique) -> usize {
     matches!(technique, Technique::Bp2d | Technique::Bb1d) as usize
 }

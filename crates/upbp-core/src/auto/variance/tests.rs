@@ -140,7 +140,7 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
     const PLANNED: f64 = 16_000.0;
     const TRACED: usize = 8000;
     const PHOTONS: usize = 3;
-    /// One light sub-path out of so many comes by.
+    /// Light sub-paths for each one that comes by.
     const RARE: f64 = 400.0;
     let cells = (SIDE * SIDE) as usize;
     let mut shares = [0.0; TECHNIQUES];

@@ -59,7 +59,7 @@ fn edge(spread: f64) -> impl Strategy<Value = [f64; 4]> {
         .prop_map(|(d, r, a, b)| [d, r, a, b])
 }
 
-/// What a path starts on.
+/// The kind of light that a path starts on.
 #[derive(Clone, Copy, Debug)]
 enum Light {
     Area,

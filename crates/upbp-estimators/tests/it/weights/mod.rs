@@ -36,7 +36,7 @@ fn strategies(path: &Path) -> Vec<(Way, u32)> {
     ways
 }
 
-/// What a comparison has reached.
+/// The extremes that a comparison has reached.
 #[derive(Default)]
 struct Reached {
     weights: u64,

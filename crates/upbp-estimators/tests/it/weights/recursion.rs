@@ -38,7 +38,7 @@ fn distance_squared(edge: &PathEdge) -> f64 {
     if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 }
 }
 
-/// What a vertex passes on after it has scattered.
+/// The values that a vertex passes on after it has scattered.
 fn scatter<D: Densities>(
     plan: &MisPlan,
     vertex: &PathVertex,
