@@ -38,7 +38,7 @@ fn iteration(criterion: &mut Criterion) {
         })
         .expect("a shipped scene");
         let bpt = Settings { techniques: "bpt".parse().expect("a set"), ..Settings::default() };
-        let everything = Settings { techniques: TechniqueSet::default().into(), ..Settings::default() };
+        let everything = Settings { techniques: TechniqueSet::STANDARD.into(), ..Settings::default() };
         let auto = Settings { deterministic: true, ..Settings::default() };
         for (set, settings) in [("auto", auto), ("everything", everything), ("bpt", bpt)] {
             let settings = settings.validate().expect("valid settings");

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use upbp_estimators::PrepareError;
 use upbp_estimators::TechniqueSet;
-use upbp_estimators::WorldError;
 
 /// A setting that makes no sense.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -55,7 +55,7 @@ pub enum RenderError {
     Settings(#[from] SettingsError),
     /// The scene.
     #[error(transparent)]
-    World(#[from] WorldError),
+    World(#[from] PrepareError),
     /// The film, with what writing it takes, does not fit.
     #[error(
         "film of {width} x {height} pixels: its {needed} MiB exceed the {budget} MiB that the setting `memory` (--memory) allows; \

@@ -34,6 +34,6 @@ pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTec
 pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic};
 pub use upbp_estimators::{
-    BodyId, Counters, Interior, Layer, LookUps, MediumId, MediumStack, Plan as IterationPlan, Ray, Roulette,
+    BodyId, Counters, Interior, IterationPlan, Layer, MediumId, MediumStack, MergePeriods, Ray, Roulette,
     Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
 };

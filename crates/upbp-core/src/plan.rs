@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use upbp_estimators::{LookUps, Roulette, Technique, TechniqueSet};
+use upbp_estimators::{MergePeriods, Roulette, Technique, TechniqueSet};
 
 use crate::radius::RadiusSchedule;
 
@@ -32,7 +32,7 @@ pub struct Plan {
     /// Russian roulette.
     pub roulette: Roulette,
     /// Periods of photon queries, in iterations.
-    pub look_ups: LookUps,
+    pub periods: MergePeriods,
     /// Connectible vertices per light sub-path, by the statistics before the first iteration.
     pub vertices_per_light_path: f64,
     /// First radii and how they shrink.
@@ -71,7 +71,7 @@ impl Plan {
 
     /// The part of the iterations that make the queries of a technique.
     pub(crate) fn active_part(&self, technique: Technique) -> f64 {
-        1.0 / f64::from(self.look_ups.period(technique))
+        1.0 / f64::from(self.periods.period(technique))
     }
 
     fn validate(&self) -> Result<(), String> {
@@ -123,8 +123,8 @@ impl fmt::Display for Plan {
             Roulette::Off => write!(f, ", no roulette")?,
             Roulette::Below(least) => write!(f, ", roulette below {least}")?,
         }
-        for technique in self.techniques.iter().filter(|technique| self.look_ups.period(*technique) > 1) {
-            write!(f, ", {} in one of {} iterations", technique.name(), self.look_ups.period(technique))?;
+        for technique in self.techniques.iter().filter(|technique| self.periods.period(*technique) > 1) {
+            write!(f, ", {} in one of {} iterations", technique.name(), self.periods.period(technique))?;
         }
         Ok(())
     }
@@ -159,7 +159,7 @@ mod tests {
             connections: 1.0,
             next_events: 2.0,
             roulette: Roulette::Below(0.5),
-            look_ups: LookUps { surf: NonZeroU32::new(4).unwrap(), ..LookUps::ALL },
+            periods: MergePeriods { surf: NonZeroU32::new(4).unwrap(), ..MergePeriods::ONE },
             vertices_per_light_path: 3.1,
             radii: RadiusSchedule {
                 surf: 1e-3,

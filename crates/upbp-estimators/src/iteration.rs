@@ -4,7 +4,7 @@ use upbp_media::{Medium, MediumId};
 
 use crate::kernel::Kernel;
 use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
-use crate::periods::LookUps;
+use crate::periods::MergePeriods;
 use crate::roulette::Roulette;
 use crate::scene::Scene;
 use crate::technique::{PerMerge, Technique, TechniqueSet};
@@ -40,7 +40,7 @@ impl PathLengths {
 
 /// Everything that is fixed during one iteration; weights are exact for it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Plan {
+pub struct IterationPlan {
     /// Seed of all random streams.
     pub seed: u64,
     /// Index of the iteration.
@@ -62,16 +62,16 @@ pub struct Plan {
     /// Kernels with the radii of this iteration.
     pub kernels: Kernels,
     /// Periods of photon queries, in iterations.
-    pub look_ups: LookUps,
+    pub periods: MergePeriods,
     /// The techniques that run in this iteration: all but those whose photon queries other iterations make.
-    pub due: TechniqueSet,
+    pub active: TechniqueSet,
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
 }
 
-/// The free choices of a [`Plan`].
+/// The free choices of a [`IterationPlan`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct PlanChoices {
+pub struct IterationChoices {
     /// Seed of all random streams.
     pub seed: u64,
     /// Index of the iteration.
@@ -98,7 +98,7 @@ pub struct PlanChoices {
     /// Kernels.
     pub kernels: Kernels,
     /// Periods of photon queries, in iterations.
-    pub look_ups: LookUps,
+    pub periods: MergePeriods,
     /// Heuristic of the weights.
     pub heuristic: Heuristic,
     /// Extent of photon beams.
@@ -116,15 +116,15 @@ fn trust(kernel: &Kernel, mean_free_path: f32) -> f64 {
     if ratio.is_nan() { 1.0 } else { 1.0 / (1.0 + ratio.powi(4)) }
 }
 
-impl Plan {
+impl IterationPlan {
     /// Derives the weights' constants, so that counts and what runs cannot disagree.
     #[must_use]
-    pub fn new<S: Scene>(scene: &S, choices: &PlanChoices) -> Self {
-        let PlanChoices { techniques, light_paths, kernels, .. } = *choices;
+    pub fn new<S: Scene>(scene: &S, choices: &IterationChoices) -> Self {
+        let IterationChoices { techniques, light_paths, kernels, .. } = *choices;
         let beam_paths = choices.beam_paths.min(light_paths);
-        let look_ups = choices.look_ups;
+        let periods = choices.periods;
         let on = |technique, value: f64| {
-            if techniques.has(technique) { value / f64::from(look_ups.period(technique)) } else { 0.0 }
+            if techniques.has(technique) { value / f64::from(periods.period(technique)) } else { 0.0 }
         };
         let paths = f64::from(light_paths);
         let beams = f64::from(beam_paths);
@@ -176,8 +176,8 @@ impl Plan {
             lengths: choices.lengths,
             roulette: choices.roulette,
             kernels,
-            look_ups,
-            due: techniques.intersection(look_ups.due(choices.seed, choices.iteration)),
+            periods,
+            active: techniques.intersection(periods.active(choices.seed, choices.iteration)),
             mis,
         }
     }
@@ -193,36 +193,36 @@ impl Plan {
     /// Whether vertices of light sub-paths are stored, for connections or merges.
     #[must_use]
     pub fn stores_vertices(&self) -> bool {
-        self.connections > 0.0 || self.looks_up(Technique::Surf) || self.stores_medium_photons()
+        self.connections > 0.0 || self.merges_by(Technique::Surf) || self.stores_medium_photons()
     }
 
     /// Whether photon points in media are stored.
     #[must_use]
     pub fn stores_medium_photons(&self) -> bool {
-        self.looks_up(Technique::Pp3d) || self.looks_up(Technique::Pb2d)
+        self.merges_by(Technique::Pp3d) || self.merges_by(Technique::Pb2d)
     }
 
     /// Whether photon beams are stored.
     #[must_use]
     pub fn stores_beams(&self) -> bool {
-        self.looks_up(Technique::Bp2d) || self.looks_up(Technique::Bb1d)
+        self.merges_by(Technique::Bp2d) || self.merges_by(Technique::Bb1d)
     }
 
     /// Whether this iteration merges by `technique`, anywhere.
     #[must_use]
-    pub fn looks_up(&self, technique: Technique) -> bool {
+    pub fn merges_by(&self, technique: Technique) -> bool {
         let has = match technique {
             Technique::Surf => self.mis.surf > 0.0,
             _ => self.mis.volume.iter().any(|merges| merges.of(technique) > 0.0),
         };
-        has && self.due.has(technique)
+        has && self.active.has(technique)
     }
 
     /// Whether this iteration merges by `technique` in a medium.
     #[inline]
     #[must_use]
     pub(crate) fn merges_in(&self, medium: MediumId, technique: Technique) -> bool {
-        self.mis.merges_in(medium).of(technique) > 0.0 && self.due.has(technique)
+        self.mis.merges_in(medium).of(technique) > 0.0 && self.active.has(technique)
     }
 
     /// Factor of a photon in a merge: one over the number of light sub-paths, times the period of its
@@ -230,14 +230,14 @@ impl Plan {
     #[inline]
     pub(crate) fn per_photon(&self, technique: Technique) -> f32 {
         let paths = if technique.uses_beams() { self.beam_paths } else { self.light_paths };
-        self.look_ups.period(technique) as f32 / paths as f32
+        self.periods.period(technique) as f32 / paths as f32
     }
 
     /// Whether camera sub-paths are query beams beyond where they stop.
     #[must_use]
     pub fn has_long_query_beams(&self) -> bool {
         self.mis.query_beams == BeamExtent::Long
-            && (self.looks_up(Technique::Pb2d) || self.looks_up(Technique::Bb1d))
+            && (self.merges_by(Technique::Pb2d) || self.merges_by(Technique::Bb1d))
     }
 
     /// Whether light sub-paths are of any use.

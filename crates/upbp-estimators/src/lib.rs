@@ -20,11 +20,11 @@ pub mod trace;
 
 pub use counters::Counters;
 pub use film_sample::CameraWalk;
-pub use iteration::{Kernels, PathLengths, Plan, PlanChoices};
+pub use iteration::{IterationChoices, IterationPlan, Kernels, PathLengths};
 pub use kernel::Kernel;
 pub use light_map::LightMap;
-pub use periods::LookUps;
-pub use prepared::{EmitterShares, World, WorldError};
+pub use periods::MergePeriods;
+pub use prepared::{EmitterShares, PrepareError, PreparedScene};
 pub use random::{Stream, StreamKind, half};
 pub use roulette::{Roulette, Survival};
 pub use technique::{Layer, PerMerge, Technique, TechniqueSet, UnknownTechnique};

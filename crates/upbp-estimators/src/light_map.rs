@@ -2,9 +2,9 @@
 
 use upbp_accel::{PointTree, SegmentTree, SplitParams};
 
-use crate::iteration::Plan;
+use crate::iteration::IterationPlan;
 use crate::mis::Densities;
-use crate::path::{LightVertex, PhotonBeam, Site};
+use crate::path::{Interaction, LightVertex, PhotonBeam};
 use crate::technique::Technique;
 
 /// Light vertices and photon beams of an iteration, with the trees that camera sub-paths query.
@@ -24,13 +24,17 @@ pub struct LightMap<B, D = f64> {
 impl<B: Copy + Send + Sync, D: Densities> LightMap<B, D> {
     /// Builds the structures that the plan queries, and no others.
     #[must_use]
-    pub fn build(plan: &Plan, vertices: Vec<LightVertex<B, D>>, beams: Vec<PhotonBeam<D>>) -> Self {
-        let photons = |on: bool, keep: fn(&Site<B>) -> bool| {
-            let chosen = vertices.iter().enumerate().filter(|(_, v)| on && keep(&v.site));
+    pub fn build(plan: &IterationPlan, vertices: Vec<LightVertex<B, D>>, beams: Vec<PhotonBeam<D>>) -> Self {
+        let photons = |on: bool, keep: fn(&Interaction<B>) -> bool| {
+            let chosen = vertices.iter().enumerate().filter(|(_, v)| on && keep(&v.interaction));
             PointTree::build(chosen.map(|(i, v)| (v.position, i as u32)).collect())
         };
-        let surface = photons(plan.looks_up(Technique::Surf), |site| matches!(site, Site::Surface(_)));
-        let medium = photons(plan.stores_medium_photons(), |site| matches!(site, Site::Medium(_)));
+        let surface = photons(plan.merges_by(Technique::Surf), |interaction| {
+            matches!(interaction, Interaction::Surface(_))
+        });
+        let medium = photons(plan.stores_medium_photons(), |interaction| {
+            matches!(interaction, Interaction::Medium(_))
+        });
         let segments: Vec<_> = beams.iter().enumerate().map(|(i, b)| (b.segment, i as u32)).collect();
         let split = SplitParams::choose(&segments);
         let beam_tree = SegmentTree::build(segments, split);

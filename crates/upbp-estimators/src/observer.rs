@@ -4,7 +4,7 @@ use glam::Vec3;
 use upbp_media::Spectrum;
 
 use crate::mis::{Densities, Weight};
-use crate::path::Site;
+use crate::path::Interaction;
 use crate::scene::{EmitterId, EmitterPoint};
 use crate::technique::Technique;
 
@@ -27,7 +27,7 @@ pub struct ObservedVertex<B> {
     /// Position, scene units.
     pub position: Vec3,
     /// Scattering at the vertex.
-    pub site: Site<B>,
+    pub interaction: Interaction<B>,
     /// Whether it scattered by a Dirac lobe.
     pub delta: bool,
     /// Its own probability to continue the walk, 1 without roulette.
@@ -36,7 +36,7 @@ pub struct ObservedVertex<B> {
 
 /// The way the two sub-paths of a sample are joined.
 #[derive(Clone, Copy, Debug)]
-pub enum Joint<B> {
+pub enum Completion<B> {
     /// The camera sub-path went through a medium that emits.
     Emission,
     /// The camera sub-path reached the light.
@@ -46,23 +46,23 @@ pub enum Joint<B> {
         /// The light's point.
         light: LightEnd,
         /// The camera vertex.
-        camera: (Vec3, Site<B>),
+        camera: (Vec3, Interaction<B>),
     },
     /// A light vertex and a camera vertex.
     Connect {
         /// The light sub-path.
         path: u32,
         /// The light vertex, and its depth.
-        light: (Vec3, Site<B>, u32),
+        light: (Vec3, Interaction<B>, u32),
         /// The camera vertex.
-        camera: (Vec3, Site<B>),
+        camera: (Vec3, Interaction<B>),
     },
     /// A light vertex and the lens.
     LightTracing {
         /// The light sub-path.
         path: u32,
         /// The light vertex, and its depth.
-        light: (Vec3, Site<B>, u32),
+        light: (Vec3, Interaction<B>, u32),
         /// The point of the lens.
         lens: Vec3,
         /// Density of the camera ray.
@@ -75,7 +75,7 @@ pub enum Joint<B> {
         /// The photon (a point of the beam), and its depth.
         light: (Vec3, u32),
         /// The query point (a point of the beam).
-        camera: (Vec3, Site<B>),
+        camera: (Vec3, Interaction<B>),
     },
 }
 
@@ -87,7 +87,7 @@ pub struct ObservedSample<B, D = f64> {
     /// Edges of the camera sub-path up to the joint.
     pub camera_depth: u32,
     /// The way the sub-paths are joined.
-    pub joint: Joint<B>,
+    pub completion: Completion<B>,
     /// Weight of the technique.
     pub weight: Weight<D>,
     /// Contribution before weighting.
@@ -122,7 +122,7 @@ pub trait Observer<B> {
 
     /// The walk turns to a technique: to the tracing of one next event or connection, to one look-up. `None`:
     /// it goes on.
-    fn turns_to(&mut self, technique: Option<Technique>) {
+    fn enter_technique(&mut self, technique: Option<Technique>) {
         let _ = technique;
     }
 
@@ -136,7 +136,10 @@ pub trait Observer<B> {
 /// compiled for each type.
 pub type DynObserver<'a, B, D = f64> = dyn Observer<B, Densities = D> + 'a;
 
-/// Nobody looks.
-impl<B> Observer<B> for () {
+/// An observer that sees nothing and costs nothing: for renders.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoObserver;
+
+impl<B> Observer<B> for NoObserver {
     type Densities = f64;
 }

@@ -11,11 +11,11 @@ use crate::random::{Stream, StreamKind, half};
 use crate::technique::{PerMerge, Technique, TechniqueSet};
 
 /// Periods of the photon queries of each merge, in iterations: one iteration of each period makes them.
-pub type LookUps = PerMerge<NonZeroU32>;
+pub type MergePeriods = PerMerge<NonZeroU32>;
 
-impl LookUps {
-    /// Every iteration makes all photon queries.
-    pub const ALL: Self = {
+impl MergePeriods {
+    /// Periods of one: every iteration makes all photon queries.
+    pub const ONE: Self = {
         let one = NonZeroU32::MIN;
         Self { surf: one, pp3d: one, pb2d: one, bp2d: one, bb1d: one }
     };
@@ -30,18 +30,18 @@ impl LookUps {
     /// from a multiple of `m` on, whichever it happens to be. So every iteration has it with probability
     /// `1/m`, and `m` of a half have it once.
     #[must_use]
-    pub fn due(&self, seed: u64, iteration: u64) -> TechniqueSet {
+    pub fn active(&self, seed: u64, iteration: u64) -> TechniqueSet {
         let (half, iteration) = half(iteration);
-        let due = |technique: &Technique| {
+        let active = |technique: &Technique| {
             let period = u64::from(self.period(*technique));
             let turn = || {
                 let block = iteration / period;
                 let index = (half as u64) << 32 | *technique as u64;
-                Stream::new(seed, block, StreamKind::LookUps, index).index(period as usize)
+                Stream::new(seed, block, StreamKind::MergePeriods, index).index(period as usize)
             };
             period == 1 || iteration % period == turn() as u64
         };
-        Technique::ALL.into_iter().filter(due).collect()
+        Technique::ALL.into_iter().filter(active).collect()
     }
 }
 
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn each_block_of_iterations_has_one_turn() {
-        let look_ups = LookUps::from_fn(|technique| match technique {
+        let periods = MergePeriods::from_fn(|technique| match technique {
             Technique::Surf => NonZeroU32::new(8).unwrap(),
             Technique::Bb1d => NonZeroU32::new(3).unwrap(),
             _ => NonZeroU32::MIN,
@@ -59,14 +59,14 @@ mod tests {
         let mut turns = [0_u32; 8];
         for block in 0..4000_u64 {
             let of_block: Vec<_> =
-                (0..8).filter(|i| look_ups.due(7, 2 * (8 * block + i)).has(Technique::Surf)).collect();
+                (0..8).filter(|i| periods.active(7, 2 * (8 * block + i)).has(Technique::Surf)).collect();
             assert_eq!(of_block.len(), 1);
             turns[of_block[0] as usize] += 1;
             let beams =
-                (0..3).filter(|i| look_ups.due(7, 2 * (3 * block + i) + 1).has(Technique::Bb1d)).count();
+                (0..3).filter(|i| periods.active(7, 2 * (3 * block + i) + 1).has(Technique::Bb1d)).count();
             assert_eq!(beams, 1);
             assert!(
-                look_ups.due(7, block).has(Technique::Pb2d) && look_ups.due(7, block).has(Technique::Nee)
+                periods.active(7, block).has(Technique::Pb2d) && periods.active(7, block).has(Technique::Nee)
             );
         }
         // 500 each, with a standard deviation of 21.

@@ -5,7 +5,7 @@ use upbp_media::{Medium, MediumStack, RaySegment, SegmentDensity};
 use crate::scene::{BoundingSphere, Camera, Emitter, EmitterId, EmitterKind, Scene};
 
 /// A [`Scene`] with all that is derived from it once.
-pub struct World<'a, S: Scene> {
+pub struct PreparedScene<'a, S: Scene> {
     /// The scene.
     pub scene: &'a S,
     /// Its bounds.
@@ -21,21 +21,21 @@ pub struct World<'a, S: Scene> {
     dense_media: bool,
 }
 
-impl<'a, S: Scene> World<'a, S> {
+impl<'a, S: Scene> PreparedScene<'a, S> {
     /// Looks at the scene once: emitters' powers, bounds, the camera's surroundings.
     ///
     /// # Errors
     /// Bounds that are not positive and finite, a power that is negative or not finite, a crop outside of the
     /// film, a medium that does not exist around the scene.
-    pub fn new(scene: &'a S) -> Result<Self, WorldError> {
+    pub fn new(scene: &'a S) -> Result<Self, PrepareError> {
         let bounds = scene.bounds();
         if !(bounds.radius > 0.0 && bounds.radius.is_finite() && bounds.centre.is_finite()) {
-            return Err(WorldError::Bounds { centre: bounds.centre.to_array(), radius: bounds.radius });
+            return Err(PrepareError::Bounds { centre: bounds.centre.to_array(), radius: bounds.radius });
         }
         if let Some(outside) = scene.outside()
             && outside.0 as usize >= scene.media().len()
         {
-            return Err(WorldError::Outside { medium: outside.0, media: scene.media().len() });
+            return Err(PrepareError::Outside { medium: outside.0, media: scene.media().len() });
         }
         let camera = scene.camera();
         let (width, height) = camera.resolution();
@@ -44,7 +44,7 @@ impl<'a, S: Scene> World<'a, S> {
             size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
         };
         if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {
-            return Err(WorldError::Crop { width, height });
+            return Err(PrepareError::Crop { width, height });
         }
         let everything =
             RaySegment { origin: bounds.centre, direction: glam::Vec3::Z, start: 0.0, end: f32::INFINITY };
@@ -58,7 +58,7 @@ impl<'a, S: Scene> World<'a, S> {
         for (index, emitter) in scene.emitters().iter().enumerate() {
             let power = emitter.power(&bounds);
             if !(power.is_finite() && power >= 0.0) {
-                return Err(WorldError::Power { emitter: index, power });
+                return Err(PrepareError::Power { emitter: index, power });
             }
             let reaches = !(closed && emitter.kind().is_infinite());
             powers.push(if reaches { f64::from(power) } else { 0.0 });
@@ -175,7 +175,7 @@ impl<'a, S: Scene> World<'a, S> {
 /// boundary, one in ten thousand is within rounding of it.
 const DENSE: f32 = 1e-3;
 
-/// Light that each emitter was seen to bring, as [`World::choose_emitters_by`] takes it.
+/// Light that each emitter was seen to bring, as [`PreparedScene::choose_emitters_by`] takes it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EmitterShares {
     /// Light by emitter, in any unit; emitters that are left out bring nothing.
@@ -269,7 +269,7 @@ impl Selection {
 /// A fault of a scene as a whole.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum WorldError {
+pub enum PrepareError {
     /// Bounds.
     #[error(
         "bounds of the scene: expected a finite centre and a positive finite radius, found {centre:?} and {radius}"

@@ -38,7 +38,7 @@ pub enum StreamKind {
     /// pixel, since it takes away what their common decisions make.
     PilotCamera,
     /// The choice of iterations that make photon queries.
-    LookUps,
+    MergePeriods,
 }
 
 /// A stream of uniform random numbers.
@@ -74,7 +74,7 @@ impl Stream {
                 (point as u32, mix(common ^ of_index) ^ of_half, STRATIFIED_DRAWS)
             }
             StreamKind::PilotCamera => (0, mix(common ^ of_index), COMMON_DRAWS),
-            StreamKind::LookUps => (0, 0, 0),
+            StreamKind::MergePeriods => (0, 0, 0),
         };
         // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in
         // common.

@@ -27,7 +27,7 @@ impl Roulette {
 
     /// The probability that a camera sub-path goes on past vertices with this product of albedos.
     #[must_use]
-    pub fn reach(self, albedos: f32) -> f32 {
+    pub fn survival(self, albedos: f32) -> f32 {
         match self {
             Self::Off => 1.0,
             Self::Below(least) => (albedos / least).min(1.0),
@@ -67,7 +67,7 @@ impl Survival {
     /// The probability to go on at a vertex of this albedo. The walk is taken to do so.
     #[inline]
     pub(crate) fn probability(&mut self, albedo: f32) -> f32 {
-        let probability = self.roulette.reach(self.left * albedo);
+        let probability = self.roulette.survival(self.left * albedo);
         self.left *= albedo / probability;
         probability
     }
@@ -92,7 +92,7 @@ mod tests {
             for albedo in albedos {
                 product *= albedo;
                 reached *= survival.probability(albedo);
-                prop_assert!((reached / roulette.reach(product) - 1.0).abs() < 1e-5);
+                prop_assert!((reached / roulette.survival(product) - 1.0).abs() < 1e-5);
                 prop_assert!(survival.left >= least * (1.0 - 1e-5));
             }
         }

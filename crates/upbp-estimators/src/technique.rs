@@ -172,7 +172,7 @@ impl Layer {
     }
 }
 
-/// A set of techniques, written as in `"bpt+surf+pp3d+pb2d+bb1d"` (the default).
+/// A set of techniques, written as in `"bpt+surf+pp3d+pb2d+bb1d"` ([`STANDARD`](Self::STANDARD)).
 ///
 /// `bpt` stands for `hit+nee+connect+lt`, `pt` for `hit+nee`, `all` for everything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -186,6 +186,8 @@ impl TechniqueSet {
     pub const BPT: Self = Self(0b0_0000_1111);
     /// Path tracing.
     pub const PT: Self = Self(0b0_0000_0011);
+    /// Bidirectional path tracing with all merges but BP2D.
+    pub const STANDARD: Self = Self(0b1_0111_1111);
     /// Every technique.
     pub const ALL: Self = Self(0b1_1111_1111);
     /// The techniques with photons in media.
@@ -242,14 +244,6 @@ impl TechniqueSet {
 impl FromIterator<Technique> for TechniqueSet {
     fn from_iter<I: IntoIterator<Item = Technique>>(techniques: I) -> Self {
         techniques.into_iter().fold(Self::EMPTY, Self::with)
-    }
-}
-
-impl Default for TechniqueSet {
-    fn default() -> Self {
-        [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bb1d]
-            .into_iter()
-            .fold(Self::BPT, Self::with)
     }
 }
 
@@ -322,7 +316,7 @@ mod tests {
             let set = TechniqueSet(bits);
             assert_eq!(set.to_string().parse(), Ok(set));
         }
-        assert_eq!(TechniqueSet::default().to_string(), "bpt+surf+pp3d+pb2d+bb1d");
+        assert_eq!(TechniqueSet::STANDARD.to_string(), "bpt+surf+pp3d+pb2d+bb1d");
         assert_eq!(" BPT + pp3d".parse::<TechniqueSet>(), Ok(TechniqueSet::BPT.with(Technique::Pp3d)));
     }
 

@@ -32,7 +32,7 @@ fn scene(sigma_s: [f32; 3], colour: [f32; 3]) -> ReadyScene {
 
 fn settings() -> Settings {
     Settings {
-        techniques: TechniqueSet::default().into(),
+        techniques: TechniqueSet::STANDARD.into(),
         light_paths: LightPaths::Count(1000),
         max_length: 50,
         ..Settings::default()

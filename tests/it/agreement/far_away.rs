@@ -46,7 +46,7 @@ fn scene(scale: f32, offset: f32) -> ReadyScene {
 #[test]
 fn a_translation_by_a_million_radii_changes_no_bit() {
     let settings = Settings {
-        techniques: TechniqueSet::default().into(),
+        techniques: TechniqueSet::STANDARD.into(),
         light_paths: LightPaths::Count(1000),
         max_length: 50,
         ..Settings::default()

@@ -8,13 +8,13 @@ use std::num::NonZeroU32;
 
 use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
-use upbp_estimators::observer::{ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::observer::{NoObserver, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::scene::Bsdf;
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Spectrum,
-    StreamKind, Technique, World,
+    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
+    PreparedScene, Roulette, Spectrum, StreamKind, Technique,
 };
 
 use upbp_testing::closed_form::scene::ClosedForm;
@@ -23,9 +23,9 @@ const SIZE: u32 = 48;
 
 const ITERATIONS: u64 = 60;
 
-fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> PlanChoices {
+fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoices {
     let radius = 0.02;
-    PlanChoices {
+    IterationChoices {
         seed,
         iteration: 0,
         techniques: techniques.parse().expect("names"),
@@ -33,7 +33,7 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> PlanChoices {
         beam_paths: SIZE * SIZE / 2,
         connections: 1.0,
         next_events: 1.0,
-        look_ups: LookUps::ALL,
+        periods: MergePeriods::ONE,
         vertices_per_light_path: 2.3,
         lengths,
         roulette: Roulette::Below(0.6),
@@ -51,13 +51,13 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> PlanChoices {
 }
 
 /// Mean of the film in one iteration.
-fn iteration(scene: &ClosedForm, choices: &PlanChoices) -> f64 {
-    let world = World::new(scene).expect("the scene is in order");
-    let plan = Plan::new(scene, choices);
-    let context = Context { world: &world, plan: &plan };
+fn iteration(scene: &ClosedForm, choices: &IterationChoices) -> f64 {
+    let world = PreparedScene::new(scene).expect("the scene is in order");
+    let plan = IterationPlan::new(scene, choices);
+    let context = Context { prepared: &world, plan: &plan };
     let mut scratch = Scratch::default();
     let mut chunk = LightChunk::default();
-    let nobody = &mut ();
+    let nobody = &mut NoObserver;
     if plan.needs_light_paths() {
         for index in 0..plan.light_paths {
             trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, nobody);
@@ -78,13 +78,13 @@ fn iteration(scene: &ClosedForm, choices: &PlanChoices) -> f64 {
 }
 
 /// Mean and standard error over the iterations.
-fn mean(scene: &ClosedForm, choices: &PlanChoices) -> (f64, f64) {
+fn mean(scene: &ClosedForm, choices: &IterationChoices) -> (f64, f64) {
     mean_of_blocks(scene, choices, 1)
 }
 
 /// Mean and standard error over blocks of `block` iterations.
-fn mean_of_blocks(scene: &ClosedForm, choices: &PlanChoices, block: u64) -> (f64, f64) {
-    let one = |i| iteration(scene, &PlanChoices { iteration: i, ..choices.clone() });
+fn mean_of_blocks(scene: &ClosedForm, choices: &IterationChoices, block: u64) -> (f64, f64) {
+    let one = |i| iteration(scene, &IterationChoices { iteration: i, ..choices.clone() });
     let mean_of = |first: u64| (first..first + block).map(one).sum::<f64>() / block as f64;
     let values: Vec<f64> = (0..ITERATIONS / block).map(|i| mean_of(block * i)).collect();
     let n = values.len() as f64;
@@ -135,7 +135,7 @@ impl<B: Bsdf> Observer<B> for Seen {
     type Densities = f64;
 
     fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
-        self.scattered |= vertex.site.is_connectible();
+        self.scattered |= vertex.interaction.is_connectible();
     }
 
     fn sample(&mut self, sample: &ObservedSample<B, f64>) {
@@ -149,9 +149,9 @@ impl<B: Bsdf> Observer<B> for Seen {
 #[test]
 fn light_is_seen_up_to_the_first_vertex_that_scatters() {
     let scene = ClosedForm::new(OUTSIDE, SIZE);
-    let world = World::new(&scene).expect("the scene is in order");
-    let plan = Plan::new(&scene, &choices("hit+nee", PathLengths { min: 1, max: 6 }, 7));
-    let context = Context { world: &world, plan: &plan };
+    let world = PreparedScene::new(&scene).expect("the scene is in order");
+    let plan = IterationPlan::new(&scene, &choices("hit+nee", PathLengths { min: 1, max: 6 }, 7));
+    let context = Context { prepared: &world, plan: &plan };
     let map = LightMap::build(&plan, Vec::new(), Vec::new());
     let (mut scratch, mut counters) = (Scratch::default(), Counters::default());
     let (mut deepest, mut less_than_all) = (0, 0);
@@ -205,11 +205,11 @@ fn lights_that_are_never_hit() {
 fn seldom_look_ups_and_other_counts() {
     let scene = ClosedForm::new(OUTSIDE, SIZE);
     let usual = choices("all", PathLengths { min: 1, max: 6 }, 200);
-    let other = PlanChoices {
+    let other = IterationChoices {
         seed: 201,
         next_events: 3.0,
         connections: 0.4,
-        look_ups: LookUps::from_fn(|technique| NonZeroU32::new(1 + technique as u32 % 3).unwrap()),
+        periods: MergePeriods::from_fn(|technique| NonZeroU32::new(1 + technique as u32 % 3).unwrap()),
         ..usual.clone()
     };
     let (expected, expected_error) = mean(&scene, &usual);

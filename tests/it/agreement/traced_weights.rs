@@ -7,13 +7,13 @@
 use glam::Vec3;
 use upbp_estimators::mis::oracle::{Path, Strategy};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
-use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
-use upbp_estimators::path::{Context, EdgeTrace, Extent, LightChunk, Scratch, Site};
+use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::path::{Context, EdgeTrace, Extent, Interaction, LightChunk, Scratch};
 use upbp_estimators::scene::Scene;
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan, PlanChoices, Roulette, Stream,
-    StreamKind, Technique, TechniqueSet, World,
+    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
+    PreparedScene, Roulette, Stream, StreamKind, Technique, TechniqueSet,
 };
 
 use super::rebuild::{Trace, Vertex};
@@ -46,7 +46,7 @@ struct Comparison {
 /// Compares every sample with the enumeration, up to a number of each technique.
 struct Auditor<'a> {
     scene: &'a ClosedForm,
-    plan: &'a Plan,
+    plan: &'a IterationPlan,
     light_ends: Vec<Option<LightEnd>>,
     light_vertices: Vec<Vec<Vertex>>,
     lens: Vec3,
@@ -59,22 +59,22 @@ fn vertex(observed: &ObservedVertex<Material>) -> Vertex {
     Vertex {
         light: position,
         camera: position,
-        in_medium: matches!(observed.site, Site::Medium(_)),
+        in_medium: matches!(observed.interaction, Interaction::Medium(_)),
         delta: observed.delta,
     }
 }
 
-fn joint(light: Vec3, camera: Vec3, site: &Site<Material>) -> Vertex {
+fn joint(light: Vec3, camera: Vec3, interaction: &Interaction<Material>) -> Vertex {
     Vertex {
         light: light.as_dvec3(),
         camera: camera.as_dvec3(),
-        in_medium: matches!(site, Site::Medium(_)),
+        in_medium: matches!(interaction, Interaction::Medium(_)),
         delta: false,
     }
 }
 
 impl<'a> Auditor<'a> {
-    fn new(scene: &'a ClosedForm, plan: &'a Plan) -> Self {
+    fn new(scene: &'a ClosedForm, plan: &'a IterationPlan) -> Self {
         let paths = plan.light_paths as usize;
         Self {
             scene,
@@ -96,27 +96,29 @@ impl<'a> Auditor<'a> {
         };
         let suffix = |vertices: u32| self.camera_vertices[..vertices as usize].iter().rev().copied();
         let depth = sample.camera_depth;
-        let (light, interior, lens, strategy) = match sample.joint {
-            Joint::Emission => unreachable!("no medium of the scene emits"),
-            Joint::Hit(light) => (light, suffix(depth - 1).collect(), self.lens, Strategy::Hit),
-            Joint::Nee { light, camera: (position, site) } => {
-                let interior = [joint(position, position, &site)].into_iter().chain(suffix(depth - 1));
+        let (light, interior, lens, strategy) = match sample.completion {
+            Completion::Emission => unreachable!("no medium of the scene emits"),
+            Completion::Hit(light) => (light, suffix(depth - 1).collect(), self.lens, Strategy::Hit),
+            Completion::Nee { light, camera: (position, interaction) } => {
+                let interior = [joint(position, position, &interaction)].into_iter().chain(suffix(depth - 1));
                 (light, interior.collect(), self.lens, Strategy::Nee)
             }
-            Joint::Connect { path, light: (from, from_site, from_depth), camera: (to, to_site) } => {
+            Completion::Connect { path, light: (from, from_site, from_depth), camera: (to, to_site) } => {
                 let (light, mut interior) = prefix(path, from_depth - 1);
                 interior.extend([joint(from, from, &from_site), joint(to, to, &to_site)]);
                 interior.extend(suffix(depth - 1));
                 (light, interior, self.lens, Strategy::Connect(from_depth as usize + 1))
             }
-            Joint::LightTracing { path, light: (from, site, from_depth), lens, .. } => {
+            Completion::LightTracing { path, light: (from, interaction, from_depth), lens, .. } => {
                 let (light, mut interior) = prefix(path, from_depth - 1);
-                interior.push(joint(from, from, &site));
+                interior.push(joint(from, from, &interaction));
                 (light, interior, lens, Strategy::LightTracing)
             }
-            Joint::Merge { path, light: (photon, photon_depth), camera: (query, site), .. } => {
+            Completion::Merge {
+                path, light: (photon, photon_depth), camera: (query, interaction), ..
+            } => {
                 let (light, mut interior) = prefix(path, photon_depth - 1);
-                interior.push(joint(photon, query, &site));
+                interior.push(joint(photon, query, &interaction));
                 interior.extend(suffix(depth - 1));
                 let at = photon_depth as usize;
                 let strategy = match sample.technique {
@@ -208,8 +210,8 @@ fn kernels(scale: f32) -> Kernels {
     }
 }
 
-fn choices() -> PlanChoices {
-    PlanChoices {
+fn choices() -> IterationChoices {
+    IterationChoices {
         seed: 1,
         iteration: 0,
         techniques: TechniqueSet::ALL,
@@ -217,7 +219,7 @@ fn choices() -> PlanChoices {
         beam_paths: 500,
         connections: 2.0,
         next_events: 1.0,
-        look_ups: LookUps::ALL,
+        periods: MergePeriods::ONE,
         vertices_per_light_path: 2.3,
         lengths: PathLengths { min: 1, max: 8 },
         roulette: Roulette::Below(0.6),
@@ -232,11 +234,11 @@ fn choices() -> PlanChoices {
 const CAMERAS: [Vec3; 2] = [Vec3::new(0.2, 0.3, 3.0), Vec3::new(0.1, 0.4, 1.0)];
 
 /// Renders once and compares; every technique that runs has at least `at_least` weights to compare.
-fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: usize) {
+fn audit(name: &str, camera: Vec3, size: u32, choices: &IterationChoices, at_least: usize) {
     let scene = ClosedForm::new(camera, size);
-    let world = World::new(&scene).expect("the scene is in order");
-    let plan = Plan::new(&scene, choices);
-    let context = Context { world: &world, plan: &plan };
+    let world = PreparedScene::new(&scene).expect("the scene is in order");
+    let plan = IterationPlan::new(&scene, choices);
+    let context = Context { prepared: &world, plan: &plan };
     let mut auditor = Auditor::new(&scene, &plan);
     let mut scratch = Scratch::default();
     let mut chunk = LightChunk::default();
@@ -303,14 +305,14 @@ fn audit(name: &str, camera: Vec3, size: u32, choices: &PlanChoices, at_least: u
 #[test]
 fn all_techniques_with_the_balance_heuristic() {
     for (i, camera) in CAMERAS.into_iter().enumerate() {
-        let choices = PlanChoices { light_paths: 24_000, beam_paths: 1000, ..choices() };
+        let choices = IterationChoices { light_paths: 24_000, beam_paths: 1000, ..choices() };
         audit(&format!("all techniques, camera {i}"), camera, 96, &choices, 3000);
     }
 }
 
 #[test]
 fn the_power_heuristic() {
-    let choices = PlanChoices { heuristic: Heuristic::Power, ..choices() };
+    let choices = IterationChoices { heuristic: Heuristic::Power, ..choices() };
     audit("power heuristic", CAMERAS[1], 48, &choices, 1000);
 }
 
@@ -319,7 +321,7 @@ fn beams_of_all_extents() {
     let (short, long) = (BeamExtent::Short, BeamExtent::Long);
     for (photon_beams, query_beams) in [(short, short), (long, short), (long, long)] {
         let name = format!("{photon_beams:?} photon beams, {query_beams:?} query beams");
-        let choices = PlanChoices { photon_beams, query_beams, ..choices() };
+        let choices = IterationChoices { photon_beams, query_beams, ..choices() };
         audit(&name, CAMERAS[1], 48, &choices, 1000);
     }
 }
@@ -327,7 +329,7 @@ fn beams_of_all_extents() {
 #[test]
 fn some_path_lengths_only() {
     for (min, max) in [(3, 4), (2, 2), (1, 20)] {
-        let choices = PlanChoices { lengths: PathLengths { min, max }, ..choices() };
+        let choices = IterationChoices { lengths: PathLengths { min, max }, ..choices() };
         // Two edges have no connection.
         audit(&format!("lengths {min} to {max}"), CAMERAS[1], 48, &choices, if max > 2 { 400 } else { 0 });
     }
@@ -346,13 +348,13 @@ fn subsets_of_techniques() {
         "lt+bp2d",
     ] {
         let techniques = names.parse().expect("names");
-        audit(names, CAMERAS[1], 48, &PlanChoices { techniques, ..choices() }, 1000);
+        audit(names, CAMERAS[1], 48, &IterationChoices { techniques, ..choices() }, 1000);
     }
 }
 
 #[test]
 fn walks_without_roulette() {
-    audit("no roulette", CAMERAS[0], 48, &PlanChoices { roulette: Roulette::Off, ..choices() }, 500);
+    audit("no roulette", CAMERAS[0], 48, &IterationChoices { roulette: Roulette::Off, ..choices() }, 500);
 }
 
 /// Samples with their weights.
@@ -366,10 +368,10 @@ impl<B, D: Densities> Observer<B> for Weights<D> {
     }
 }
 
-fn weights<D: Densities>(plan: &Plan) -> Vec<(Technique, Weight<D>)> {
+fn weights<D: Densities>(plan: &IterationPlan) -> Vec<(Technique, Weight<D>)> {
     let scene = ClosedForm::new(CAMERAS[1], 24);
-    let world = World::new(&scene).expect("the scene is in order");
-    let context = Context { world: &world, plan };
+    let world = PreparedScene::new(&scene).expect("the scene is in order");
+    let context = Context { prepared: &world, plan };
     let mut weights = Weights(Vec::new());
     let (mut scratch, mut chunk) = (Scratch::default(), LightChunk::default());
     for index in 0..plan.light_paths {
@@ -389,7 +391,10 @@ fn weights<D: Densities>(plan: &Plan) -> Vec<(Technique, Weight<D>)> {
 #[test]
 fn parts_of_techniques_are_what_counting_one_twice_shows() {
     for heuristic in [Heuristic::Balance, Heuristic::Power] {
-        let plan = Plan::new(&ClosedForm::new(CAMERAS[1], 24), &PlanChoices { heuristic, ..choices() });
+        let plan = IterationPlan::new(
+            &ClosedForm::new(CAMERAS[1], 24),
+            &IterationChoices { heuristic, ..choices() },
+        );
         let parts = weights::<ByTechnique>(&plan);
         assert!(parts.len() > 10_000, "{}", parts.len());
         let squared = if heuristic == Heuristic::Power { 2 } else { 1 };

@@ -25,7 +25,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use upbp_core::media::{Homogeneous, PhaseFunction};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
-use upbp_estimators::observer::{ObservedSample, Observer};
+use upbp_estimators::observer::{NoObserver, ObservedSample, Observer};
 use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
@@ -33,8 +33,8 @@ use upbp_estimators::scene::{
 };
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, MediumId, PathLengths, Plan, PlanChoices, Ray, Roulette,
-    Spectrum, StreamKind, TechniqueSet, World,
+    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MediumId, MergePeriods,
+    PathLengths, PreparedScene, Ray, Roulette, Spectrum, StreamKind, TechniqueSet,
 };
 
 /// There are no surfaces.
@@ -237,11 +237,11 @@ impl Setup {
         Space { light: [Laser { start }], medium: [medium], camera: Tube { start } }
     }
 
-    fn plan(&self, space: &Space, batch: u64, paths: u32) -> Plan {
+    fn plan(&self, space: &Space, batch: u64, paths: u32) -> IterationPlan {
         let kernel = self.kernel;
-        Plan::new(
+        IterationPlan::new(
             space,
-            &PlanChoices {
+            &IterationChoices {
                 seed: 7,
                 iteration: batch,
                 techniques: self.technique.parse::<TechniqueSet>().expect("a technique"),
@@ -249,7 +249,7 @@ impl Setup {
                 beam_paths: paths,
                 connections: 1.0,
                 next_events: 1.0,
-                look_ups: LookUps::ALL,
+                periods: MergePeriods::ONE,
                 vertices_per_light_path: 1.0,
                 lengths: PathLengths { min: 2, max: 2 },
                 roulette: Roulette::Off,
@@ -269,12 +269,12 @@ impl Setup {
 
     fn light(&self, batch: u64, paths: u32) -> LightChunk<Nothing> {
         let space = self.space();
-        let world = World::new(&space).expect("a valid scene");
+        let world = PreparedScene::new(&space).expect("a valid scene");
         let plan = self.plan(&space, batch, paths);
-        let context = Context { world: &world, plan: &plan };
+        let context = Context { prepared: &world, plan: &plan };
         let (mut scratch, mut chunk) = (Scratch::default(), LightChunk::default());
         for path in 0..paths {
-            trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut chunk, &mut ());
+            trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut chunk, &mut NoObserver);
         }
         chunk
     }
@@ -287,9 +287,9 @@ impl Setup {
             .map(|batch| {
                 let chunk = self.light(batch, light);
                 let space = self.space();
-                let world = World::new(&space).expect("a valid scene");
+                let world = PreparedScene::new(&space).expect("a valid scene");
                 let plan = self.plan(&space, batch, light);
-                let context = Context { world: &world, plan: &plan };
+                let context = Context { prepared: &world, plan: &plan };
                 let map = LightMap::build(&plan, chunk.vertices, chunk.beams);
                 let (mut scratch, mut counters) = (Scratch::default(), Counters::default());
                 let mut sums = Sums { count: f64::from(light) * f64::from(camera), ..Sums::default() };

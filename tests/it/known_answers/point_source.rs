@@ -5,10 +5,12 @@
 
 use upbp_core::TechniqueSet;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
+use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
-    Kernel, Kernels, LookUps, PathLengths, Plan, PlanChoices, Roulette, StreamKind, World,
+    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, Roulette,
+    StreamKind,
 };
 
 use upbp_testing::Estimate;
@@ -24,10 +26,10 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
         narrow_camera([10.0, 0.0, 0.0], [0.0; 3], 1),
         medium((1.0 - albedo) * sigma_t, albedo * sigma_t, case.optional("g").unwrap_or(0.0)),
     ));
-    let world = World::new(&scene).expect("a valid scene");
-    let plan = Plan::new(
+    let world = PreparedScene::new(&scene).expect("a valid scene");
+    let plan = IterationPlan::new(
         &scene,
-        &PlanChoices {
+        &IterationChoices {
             seed: 1,
             iteration: 0,
             techniques: "pp3d".parse::<TechniqueSet>().expect("a technique"),
@@ -35,7 +37,7 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             beam_paths: 1,
             connections: 1.0,
             next_events: 1.0,
-            look_ups: LookUps::ALL,
+            periods: MergePeriods::ONE,
             vertices_per_light_path: 1.0,
             lengths: PathLengths { min: 1, max: 1_000_000 },
             roulette: Roulette::Below(1.0),
@@ -45,10 +47,10 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             query_beams: BeamExtent::Long,
         },
     );
-    let context = Context { world: &world, plan: &plan };
+    let context = Context { prepared: &world, plan: &plan };
     let (mut scratch, mut chunk, mut list) = (Scratch::default(), LightChunk::default(), Vec::new());
     for path in 0..paths {
-        trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut chunk, &mut ());
+        trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut chunk, &mut NoObserver);
         list.extend(
             chunk.vertices.drain(..).map(|v| (f64::from(v.position.length()), f64::from(v.throughput[0]))),
         );

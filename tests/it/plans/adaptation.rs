@@ -210,7 +210,7 @@ fn a_render_that_is_resumed_keeps_its_plan() {
 #[test]
 fn a_plan_that_does_not_fit_is_refused() {
     let fog = shipped("reference/mirror_fog");
-    let everything = Settings { techniques: TechniqueSet::default().into(), ..settings() };
+    let everything = Settings { techniques: TechniqueSet::STANDARD.into(), ..settings() };
     let plan = renderer(&fog, everything).report().plan;
     let checked = || {
         let settings = Settings { memory: Some(2048), ..settings() };

@@ -155,7 +155,7 @@ fn what_does_not_belong_together_is_refused_by_name() {
     let room = upbp_testing::room(6);
     let render = |change: fn(&mut Settings), scene: &[u8], first: u64| {
         let mut settings = Settings {
-            techniques: TechniqueSet::default().into(),
+            techniques: TechniqueSet::STANDARD.into(),
             light_paths: LightPaths::Count(100),
             ..Settings::default()
         };

@@ -10,7 +10,7 @@ use upbp_testing::readers::sealed;
 /// The render that good states are of.
 fn renderer(room: &ReadyScene) -> Renderer<'_> {
     let settings = Settings {
-        techniques: TechniqueSet::default().into(),
+        techniques: TechniqueSet::STANDARD.into(),
         light_paths: LightPaths::Count(100),
         ..Settings::default()
     };

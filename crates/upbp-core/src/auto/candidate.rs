@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{LookUps, Roulette, Technique, TechniqueSet, World as PreparedScene};
+use upbp_estimators::{MergePeriods, PreparedScene, Roulette, Technique, TechniqueSet};
 
 use super::cost::Cost;
 use super::full_plan::BEAMS;
@@ -163,9 +163,9 @@ fn possible(plan: Plan) -> Plan {
 }
 
 fn with_period(plan: Plan, technique: Technique, period: NonZeroU32) -> Plan {
-    let of = |other| NonZeroU32::new(plan.look_ups.period(other)).unwrap_or(NonZeroU32::MIN);
-    let look_ups = LookUps::from_fn(|other| if other == technique { period } else { of(other) });
-    Plan { look_ups, ..plan }
+    let of = |other| NonZeroU32::new(plan.periods.period(other)).unwrap_or(NonZeroU32::MIN);
+    let periods = MergePeriods::from_fn(|other| if other == technique { period } else { of(other) });
+    Plan { periods, ..plan }
 }
 
 fn with_surf_radius(mut plan: Plan, radius: f32) -> Plan {
@@ -216,7 +216,7 @@ mod tests {
             connections: 1.0,
             next_events: 1.0,
             roulette: roulette::OF_PILOT,
-            look_ups: LookUps::ALL,
+            periods: MergePeriods::ONE,
             vertices_per_light_path: 1.0,
             radii,
         };

@@ -6,13 +6,12 @@
 //! other technique would find them, and emitters are then chosen in proportion (`docs/theory.md`, section
 //! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image.
 
-use upbp_estimators::observer::{DynObserver, Joint, LightEnd, ObservedSample, Observer};
+use upbp_estimators::observer::{Completion, DynObserver, LightEnd, ObservedSample, Observer};
 use upbp_estimators::path::{Context, LightChunk};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, EmitterShares, LightMap, Plan as IterationPlan, StreamKind, TechniqueSet,
-    World as PreparedScene,
+    Counters, EmitterShares, IterationPlan, LightMap, PreparedScene, StreamKind, TechniqueSet,
 };
 
 use super::full_plan::{iteration_plan, plan_with};
@@ -85,7 +84,7 @@ fn measure<S: Scene>(
     let fewer = |count: u32| (part * f64::from(count)).ceil() as u32;
     (plan.light_paths, plan.beam_paths) = (fewer(plan.light_paths), fewer(plan.beam_paths));
     let plan = &plan;
-    let context = Context { world: scene, plan };
+    let context = Context { prepared: scene, plan };
     // The whole film: a crop shows the same camera samples.
     let (width, height) = scene.scene.camera().resolution();
     let film = PixelRect { x: 0, y: 0, width, height };
@@ -235,10 +234,12 @@ impl<B> Observer<B> for Seen {
 
     fn sample(&mut self, sample: &ObservedSample<B>) {
         let seen = Contribution { value: f64::from(sample.value.mean()), weight: sample.weight.value() };
-        match sample.joint {
-            Joint::Emission | Joint::Hit(_) => {}
-            Joint::Nee { light: end, .. } => self.next_event.push((end.emitter.0, seen)),
-            Joint::Connect { path, .. } | Joint::LightTracing { path, .. } | Joint::Merge { path, .. } => {
+        match sample.completion {
+            Completion::Emission | Completion::Hit(_) => {}
+            Completion::Nee { light: end, .. } => self.next_event.push((end.emitter.0, seen)),
+            Completion::Connect { path, .. }
+            | Completion::LightTracing { path, .. }
+            | Completion::Merge { path, .. } => {
                 self.emission.push((path, seen));
             }
         }

@@ -2,7 +2,7 @@
 
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{
-    LookUps, PathLengths, Plan as IterationPlan, PlanChoices, Technique, TechniqueSet, World as PreparedScene,
+    IterationChoices, IterationPlan, MergePeriods, PathLengths, PreparedScene, Technique, TechniqueSet,
 };
 
 use super::memory::{LightCounts, Room};
@@ -68,7 +68,7 @@ pub(super) fn plan_with<S: Scene>(
         connections: settings.connections.unwrap_or(1.0),
         next_events: settings.next_events.unwrap_or(1.0),
         roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
-        look_ups: LookUps::ALL,
+        periods: MergePeriods::ONE,
         vertices_per_light_path: statistics.vertices_per_path,
         radii: first_radii(scene, settings, techniques, statistics, [light_paths, beam_paths]),
     }
@@ -136,7 +136,7 @@ pub(crate) fn iteration_plan<S: Scene>(
 ) -> IterationPlan {
     IterationPlan::new(
         scene.scene,
-        &PlanChoices {
+        &IterationChoices {
             seed: settings.seed,
             iteration,
             techniques: plan.techniques,
@@ -148,7 +148,7 @@ pub(crate) fn iteration_plan<S: Scene>(
             lengths: PathLengths { min: settings.min_length, max: settings.max_length },
             roulette: plan.roulette,
             kernels: plan.radii.kernels(iteration),
-            look_ups: plan.look_ups,
+            periods: plan.periods,
             heuristic: settings.heuristic,
             photon_beams: settings.photon_beams,
             query_beams: settings.query_beams,

@@ -7,7 +7,7 @@
 
 use upbp_estimators::path::{LightVertex, PhotonBeam};
 use upbp_estimators::scene::{Camera, Scene};
-use upbp_estimators::{TechniqueSet, World as PreparedScene};
+use upbp_estimators::{PreparedScene, TechniqueSet};
 
 use super::statistics::Statistics;
 use crate::error::RenderError;

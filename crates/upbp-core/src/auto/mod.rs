@@ -31,8 +31,8 @@ pub(crate) mod statistics;
 pub(crate) mod support;
 mod variance;
 
+use upbp_estimators::PreparedScene;
 use upbp_estimators::TechniqueSet;
-use upbp_estimators::World as PreparedScene;
 use upbp_estimators::scene::Scene;
 
 use crate::budget::Budget;

@@ -30,7 +30,7 @@ pub(super) fn number(roulette: Roulette, of_pilot: Roulette) -> usize {
 pub(super) fn relative_pass_probability(number: usize, albedos: f32) -> f32 {
     // Far beyond all thresholds the ratio does not change.
     let albedos = albedos.max(1e-3);
-    Roulette::Below(THRESHOLDS[number]).reach(albedos) / OF_PILOT.reach(albedos)
+    Roulette::Below(THRESHOLDS[number]).survival(albedos) / OF_PILOT.survival(albedos)
 }
 
 /// The roulette that did best, in geometric mean over many scenes. Where light sub-paths come to meet them,

@@ -152,7 +152,7 @@ impl Judge<'_> {
 mod tests {
     use std::num::NonZeroU32;
 
-    use upbp_estimators::{LookUps, Roulette, TechniqueSet};
+    use upbp_estimators::{MergePeriods, Roulette, TechniqueSet};
 
     use super::*;
     use crate::radius::RadiusSchedule;
@@ -174,7 +174,7 @@ mod tests {
             connections: 1.0,
             next_events: 1.0,
             roulette: Roulette::Off,
-            look_ups: LookUps::from_fn(|_| NonZeroU32::MIN),
+            periods: MergePeriods::from_fn(|_| NonZeroU32::MIN),
             vertices_per_light_path: 1.0,
             radii,
         };

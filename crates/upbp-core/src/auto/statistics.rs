@@ -3,13 +3,13 @@
 use glam::Vec3;
 use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
-use upbp_estimators::observer::{DynObserver, ObservedVertex, Observer};
-use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Site};
+use upbp_estimators::observer::{DynObserver, NoObserver, ObservedVertex, Observer};
+use upbp_estimators::path::{Context, Interaction, LightChunk, LightVertex, PhotonBeam};
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, Kernel, Kernels, LightMap, LookUps, PathLengths, Plan as IterationPlan, PlanChoices,
-    StreamKind, Technique, TechniqueSet, World as PreparedScene,
+    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
+    PreparedScene, StreamKind, Technique, TechniqueSet,
 };
 
 use super::neighbours::{Nearest, Neighbours, median};
@@ -88,7 +88,7 @@ pub(crate) fn measure<S: Scene>(
         let plan = |paths| nominal_plan(scene, settings, techniques, paths);
         let light = LightPaths::trace(scene, plan, light_paths, halt)?;
         let plan = plan(light.paths);
-        let queries = Queries::trace(&Context { world: scene, plan: &plan }, camera_paths, halt)?;
+        let queries = Queries::trace(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?;
         Some(light.statistics(&plan, queries, scene.bounds.radius))
     };
     allowance.largest(run).ok_or(RenderError::Cancelled)
@@ -103,7 +103,7 @@ fn nominal_plan<S: Scene>(
     light_paths: u32,
 ) -> IterationPlan {
     let nominal = 1e-3 * scene.bounds.radius;
-    let choices = PlanChoices {
+    let choices = IterationChoices {
         seed: settings.seed,
         iteration: 0,
         techniques: techniques.without(TechniqueSet::EMPTY.with(Technique::LightTracing)),
@@ -111,7 +111,7 @@ fn nominal_plan<S: Scene>(
         beam_paths: light_paths / PATHS_PER_BEAM_PATH,
         connections: 1.0,
         next_events: 1.0,
-        look_ups: LookUps::ALL,
+        periods: MergePeriods::ONE,
         vertices_per_light_path: 1.0,
         lengths: PathLengths { min: settings.min_length, max: settings.max_length },
         roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
@@ -149,9 +149,9 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
         let trace = |paths| {
             let mut clock = Clock::start();
             let plan = plan(paths);
-            let context = Context { world: scene, plan: &plan };
+            let context = Context { prepared: scene, plan: &plan };
             let pieces = in_pieces(paths, halt, |index, scratch, out: &mut LightChunk<B>| {
-                trace_light_path(&context, StreamKind::PilotLight, index, scratch, out, &mut ());
+                trace_light_path(&context, StreamKind::PilotLight, index, scratch, out, &mut NoObserver);
                 true
             })?;
             let (mut vertices, mut beams) = (Vec::new(), Vec::new());
@@ -170,10 +170,10 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
 
     fn statistics(&self, plan: &IterationPlan, mut queries: Queries, scale: f32) -> Statistics {
         let (paths, beam_paths) = (f64::from(self.paths), f64::from(plan.beam_paths));
-        let on_surfaces = |site: &Site<B>| matches!(site, Site::Surface(_));
-        let in_media = |site: &Site<B>| matches!(site, Site::Medium(_));
-        let per_path = |queried: bool, keep: &dyn Fn(&Site<B>) -> bool| {
-            let count = self.vertices.iter().filter(|vertex| keep(&vertex.site)).count();
+        let on_surfaces = |interaction: &Interaction<B>| matches!(interaction, Interaction::Surface(_));
+        let in_media = |interaction: &Interaction<B>| matches!(interaction, Interaction::Medium(_));
+        let per_path = |queried: bool, keep: &dyn Fn(&Interaction<B>) -> bool| {
+            let count = self.vertices.iter().filter(|vertex| keep(&vertex.interaction)).count();
             if queried { count as f64 / paths } else { 0.0 }
         };
         let (near, near_paths) = first_paths(&self.vertices, paths);
@@ -190,7 +190,7 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
             light_path_seconds: self.seconds,
             vertices_per_path: self.vertices.len() as f64 / paths,
             footprint: median(&mut queries.footprints).unwrap_or(0.0),
-            surface_per_path: per_path(plan.looks_up(Technique::Surf), &on_surfaces),
+            surface_per_path: per_path(plan.merges_by(Technique::Surf), &on_surfaces),
             medium_per_path: per_path(plan.stores_medium_photons(), &in_media),
             pieces_per_path: beams.pieces() as f64 / beam_paths,
             beams_per_path: self.beams.len() as f64 / beam_paths,
@@ -230,8 +230,8 @@ fn first_paths<B>(vertices: &[LightVertex<B>], paths: f64) -> (&[LightVertex<B>]
     }
 }
 
-fn photons<B>(vertices: &[LightVertex<B>], keep: impl Fn(&Site<B>) -> bool) -> PointTree<()> {
-    PointTree::build(vertices.iter().filter(|v| keep(&v.site)).map(|v| (v.position, ())).collect())
+fn photons<B>(vertices: &[LightVertex<B>], keep: impl Fn(&Interaction<B>) -> bool) -> PointTree<()> {
+    PointTree::build(vertices.iter().filter(|v| keep(&v.interaction)).map(|v| (v.position, ())).collect())
 }
 
 /// Queries that camera sub-paths make.
@@ -259,10 +259,10 @@ impl<B> Observer<B> for Queries {
     }
 
     fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
-        match vertex.site {
-            Site::Surface(_) if !vertex.delta => self.surfaces.push(vertex.position),
-            Site::Surface(_) => {}
-            Site::Medium(_) => self.media.push(vertex.position),
+        match vertex.interaction {
+            Interaction::Surface(_) if !vertex.delta => self.surfaces.push(vertex.position),
+            Interaction::Surface(_) => {}
+            Interaction::Medium(_) => self.media.push(vertex.position),
         }
         let between = vertex.position - self.last;
         let length = between.length();
@@ -288,7 +288,7 @@ impl<B> Observer<B> for Queries {
 impl Queries {
     /// The queries of camera sub-paths all over the picture.
     fn trace<S: Scene>(context: &Context<'_, S>, paths: u32, halt: &Halt<'_>) -> Option<Self> {
-        let crop = context.world.scene.camera().crop();
+        let crop = context.prepared.scene.camera().crop();
         let map = LightMap::empty();
         let pieces = in_pieces(paths, halt, |index, scratch, queries: &mut Self| {
             let (kind, index) = (StreamKind::PilotCamera, u64::from(index));

@@ -7,7 +7,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use upbp_estimators::scene::{Emitter, EmitterId, Scene};
-use upbp_estimators::{Technique, TechniqueSet, World as PreparedScene};
+use upbp_estimators::{PreparedScene, Technique, TechniqueSet};
 
 use crate::error::RenderError;
 use crate::media::Medium;

@@ -464,7 +464,7 @@ mod tests {
 
     impl Uniform {
         fn new(seed: u64) -> Self {
-            Self(Stream::new(seed, 0, StreamKind::LookUps, 0))
+            Self(Stream::new(seed, 0, StreamKind::MergePeriods, 0))
         }
 
         fn next(&mut self) -> f64 {

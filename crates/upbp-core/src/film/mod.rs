@@ -478,7 +478,7 @@ mod tests {
 
     #[test]
     fn means_and_halves_are_those_of_the_iterations() {
-        let mut film = Film::new(RECT, TechniqueSet::default());
+        let mut film = Film::new(RECT, TechniqueSet::STANDARD);
         assert!(film.is_empty() && film.estimated_error().relative_mse.is_infinite());
         for (i, value) in [(0, 1.0), (7, 2.0), (3, 6.0)] {
             assert_eq!(film.add(i, &[pixel(value, 1.0), pixel(0.0, 0.0)]), 0);
@@ -501,7 +501,7 @@ mod tests {
     fn parts_add_up_to_the_whole() {
         let rect = PixelRect { x: 1, y: 2, width: 19, height: 17 };
         let iteration = |i: u32| -> Vec<Pixel> { (0..19 * 17).map(|p| pixel((p * i) as f32, 0.5)).collect() };
-        let mut whole = Film::new(rect, TechniqueSet::default());
+        let mut whole = Film::new(rect, TechniqueSet::STANDARD);
         let mut parted = whole.clone();
         for i in [4, 7] {
             whole.add(i.into(), &iteration(i));
@@ -551,7 +551,7 @@ mod tests {
 
     #[test]
     fn what_is_no_radiance_is_left_out_and_counted() {
-        let mut film = Film::new(RECT, TechniqueSet::default());
+        let mut film = Film::new(RECT, TechniqueSet::STANDARD);
         assert_eq!(film.add(0, &[pixel(f32::INFINITY, 1.0), pixel(f32::NAN, -1.0)]), 9);
         assert_eq!(film.image().pixels, [[1.0; 3], [0.0; 3]]);
     }

@@ -8,7 +8,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use upbp_estimators::path::Context;
 use upbp_estimators::scene::{PixelRect, Scene};
-use upbp_estimators::{Counters, LightMap, Plan as IterationPlan, StreamKind, World as PreparedScene};
+use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, StreamKind};
 
 use super::passes::{Lists, add_splats, camera_pass, light_pass};
 use crate::auto;
@@ -79,7 +79,7 @@ impl<S: Scene> Engine for SceneEngine<'_, S> {
         pixels: &mut [Pixel],
         halt: &Halt<'_>,
     ) -> Option<LightDone> {
-        let context = Context { world: &self.scene, plan };
+        let context = Context { prepared: &self.scene, plan };
         // The lists of the iteration before are used again.
         let lists = Lists::of(std::mem::replace(&mut self.map, LightMap::empty()));
         let (map, done) = trace_light(&context, &self.statistics, lists, rect, pixels, halt)?;
@@ -95,7 +95,7 @@ impl<S: Scene> Engine for SceneEngine<'_, S> {
         pixels: &mut [Pixel],
         halt: &Halt<'_>,
     ) -> Option<Counters> {
-        let context = Context { world: &self.scene, plan };
+        let context = Context { prepared: &self.scene, plan };
         camera_pass(&context, &self.map, rect, sets, pixels, halt)
     }
 

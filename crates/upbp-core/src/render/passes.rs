@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
@@ -76,7 +77,7 @@ pub(crate) fn light_pass<S: Scene>(
                 if halt.now() {
                     return None;
                 }
-                trace_light_path(context, kind, index, scratch, out, &mut ());
+                trace_light_path(context, kind, index, scratch, out, &mut NoObserver);
             }
             Some(())
         };
@@ -118,7 +119,8 @@ pub(crate) fn camera_pass<S: Scene>(
             // Addressed by the place on the whole film: a crop shows the same samples as the whole picture.
             let index = u64::from(place[1]) << 32 | u64::from(place[0]);
             let (kind, counters) = (StreamKind::Camera, &mut counters);
-            let walk = trace_camera_path(context, map, kind, place, index, scratch, counters, &mut ());
+            let walk =
+                trace_camera_path(context, map, kind, place, index, scratch, counters, &mut NoObserver);
             for (sum, value) in pixel.layers.iter_mut().zip(walk.layers) {
                 *sum += value;
             }

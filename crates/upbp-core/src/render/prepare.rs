@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use upbp_estimators::scene::{Camera, EmitterId, Scene};
-use upbp_estimators::{LightMap, World as PreparedScene};
+use upbp_estimators::{LightMap, PreparedScene};
 
 use super::engine::{Engine, SceneEngine};
 use crate::auto;

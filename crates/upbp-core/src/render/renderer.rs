@@ -4,7 +4,7 @@ use std::ops::{ControlFlow, Range};
 use std::time::{Duration, Instant};
 
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{Counters, Plan as IterationPlan};
+use upbp_estimators::{Counters, IterationPlan};
 
 use super::engine::Engine;
 use super::prepare::{Prepared, Start, prepare};

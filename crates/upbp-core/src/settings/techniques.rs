@@ -22,7 +22,7 @@ impl Techniques {
     #[must_use]
     pub fn candidates(self) -> TechniqueSet {
         match self {
-            Self::Auto => TechniqueSet::default(),
+            Self::Auto => TechniqueSet::STANDARD,
             Self::Set(set) => set,
         }
     }

@@ -87,7 +87,7 @@ fn plan_fields(plan: &Plan) -> [(&'static str, String); 15] {
         ("connections", plan.connections.to_string()),
         ("next_events", plan.next_events.to_string()),
         ("roulette", format!("{:?}", plan.roulette)),
-        ("look_ups", format!("{:?}", plan.look_ups)),
+        ("periods", format!("{:?}", plan.periods)),
         ("vertices per light sub-path", plan.vertices_per_light_path.to_string()),
         ("radii.surf", r.surf.to_string()),
         ("radii.pp3d", r.pp3d.to_string()),

@@ -5,7 +5,7 @@ use upbp_media::EdgeDensity;
 
 use super::context::Context;
 use super::edge::EdgeTrace;
-use super::interaction::{MediumInterface, Scattered, Site};
+use super::interaction::{Interaction, MediumInterface, Scattered};
 use crate::mis::{Densities, EdgeMis, MergeKind, VertexMis};
 use crate::scene::Scene;
 
@@ -14,7 +14,7 @@ pub(crate) struct Arrived<B> {
     pub(crate) position: Vec3,
     pub(crate) distance: f32,
     pub(crate) density: EdgeDensity,
-    pub(crate) site: Site<B>,
+    pub(crate) interaction: Interaction<B>,
     /// The bodies around it.
     pub(crate) sides: MediumInterface,
 }
@@ -50,7 +50,7 @@ pub(crate) fn arrive<S: Scene>(scene: &S, edge_trace: &EdgeTrace<S::Bsdf>) -> Ar
             position,
             distance: t,
             density: edge_trace.density_to(scene, span, t),
-            site: Site::Medium(medium),
+            interaction: Interaction::Medium(medium),
             sides: MediumInterface::around(edge_trace.stack_in(span, t)),
         });
     }
@@ -59,12 +59,12 @@ pub(crate) fn arrive<S: Scene>(scene: &S, edge_trace: &EdgeTrace<S::Bsdf>) -> Ar
         return if stack.is_empty() { Arrival::Escaped } else { Arrival::Lost };
     };
     let Some(bsdf) = hit.bsdf else { return Arrival::Lost };
-    match Site::at_hit(hit, bsdf, edge_trace.direction, stack) {
-        Some((site, sides)) => Arrival::Vertex(Arrived {
+    match Interaction::at_hit(hit, bsdf, edge_trace.direction, stack) {
+        Some((interaction, sides)) => Arrival::Vertex(Arrived {
             position: hit.position,
             distance: hit.t,
             density: edge_trace.density(scene),
-            site,
+            interaction,
             sides,
         }),
         None => Arrival::Absorbed,
@@ -75,7 +75,7 @@ pub(crate) fn arrive<S: Scene>(scene: &S, edge_trace: &EdgeTrace<S::Bsdf>) -> Ar
 pub(crate) fn scatter<S: Scene, D: Densities>(
     context: &Context<'_, S>,
     mis: &VertexMis<D>,
-    site: &Site<S::Bsdf>,
+    interaction: &Interaction<S::Bsdf>,
     scattered: &Scattered,
 ) -> EdgeMis<D> {
     let smooth = if scattered.delta { VertexMis { connect: D::ZERO, ..*mis } } else { *mis };
@@ -83,9 +83,9 @@ pub(crate) fn scatter<S: Scene, D: Densities>(
         before: smooth.before(&context.plan.mis, scattered.rho_opposite),
         rho: scattered.rho_own,
         cos_out: scattered.cos,
-        kind: if scattered.delta { MergeKind::None } else { site.merge_kind(scattered.sin_theta) },
+        kind: if scattered.delta { MergeKind::None } else { interaction.merge_kind(scattered.sin_theta) },
         distance_factor: mis.distance_factor,
         connectible: !scattered.delta,
-        in_medium: site.in_medium(),
+        in_medium: interaction.in_medium(),
     }
 }

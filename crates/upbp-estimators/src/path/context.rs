@@ -1,16 +1,16 @@
 //! Context and buffers of a walk.
 
 use super::edge::EdgeTrace;
-use crate::iteration::Plan;
-use crate::prepared::World;
+use crate::iteration::IterationPlan;
+use crate::prepared::PreparedScene;
 use crate::scene::{Crossing, Scene};
 
 /// The scene and the plan of an iteration.
 pub struct Context<'a, S: Scene> {
     /// The scene, made ready.
-    pub world: &'a World<'a, S>,
+    pub prepared: &'a PreparedScene<'a, S>,
     /// The plan of the iteration.
-    pub plan: &'a Plan,
+    pub plan: &'a IterationPlan,
 }
 
 impl<S: Scene> Clone for Context<'_, S> {

@@ -9,7 +9,7 @@ use glam::Vec3;
 use upbp_accel::Ray;
 use upbp_media::{EdgeDensity, Interior, Medium, MediumId, MediumStack, RaySegment};
 
-use crate::iteration::Plan;
+use crate::iteration::IterationPlan;
 use crate::mis::BeamExtent;
 use crate::random::Stream;
 use crate::scene::{Crossing, Hit, MAX_CROSSINGS, Scene};
@@ -417,7 +417,7 @@ impl<B: Copy> EdgeTrace<B> {
     /// no light sub-path could complete a path, whose last edge is the `depth`-th from the camera.
     pub(crate) fn query_beams(
         &self,
-        plan: &Plan,
+        plan: &IterationPlan,
         depth: u32,
         technique: Technique,
     ) -> impl Iterator<Item = (&MediumSpan, MediumId, Ray)> {

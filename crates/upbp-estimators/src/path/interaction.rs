@@ -13,7 +13,7 @@ pub(crate) const MIN_COSINE: f32 = 1e-6;
 
 /// A vertex of a path with its scattering: on a surface or in a medium.
 #[derive(Clone, Copy, Debug)]
-pub enum Site<B> {
+pub enum Interaction<B> {
     /// On a surface.
     Surface(SurfaceInteraction<B>),
     /// In a medium.
@@ -107,7 +107,7 @@ fn sine(a: Vec3, b: Vec3) -> f64 {
     f64::from(a.cross(b).length()).min(1.0)
 }
 
-impl<B: Bsdf> Site<B> {
+impl<B: Bsdf> Interaction<B> {
     /// The surface of a hit; `before` are the bodies on the side that the ray comes from. `None` if the
     /// surface is grazed.
     pub fn at_hit(
@@ -128,13 +128,13 @@ impl<B: Bsdf> Site<B> {
         let near = before.ior();
         let far = if sides.boundary.is_some() { sides.towards(true).ior() } else { near };
         let (above, below) = if entering { (near, far) } else { (far, near) };
-        let site = SurfaceInteraction {
+        let interaction = SurfaceInteraction {
             bsdf,
             geometric_normal: hit.geometric_normal,
             shading_normal: hit.shading_normal,
             interface: Interface { above, below },
         };
-        Some((Self::Surface(site), sides))
+        Some((Self::Surface(interaction), sides))
     }
 
     /// Whether paths can be connected and merged here.

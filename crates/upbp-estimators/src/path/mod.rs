@@ -11,7 +11,7 @@ pub(crate) use arrival::{Arrival, Arrived, arrive, scatter};
 pub use context::{Context, Scratch};
 pub use edge::{EdgeTrace, Extent, MediumSpan};
 pub(crate) use interaction::MIN_COSINE;
-pub use interaction::{Evaluation, MediumInterface, Scattered, Site, SurfaceInteraction};
+pub use interaction::{Evaluation, Interaction, MediumInterface, Scattered, SurfaceInteraction};
 pub(crate) use vertex::{CameraEdge, CameraVertex};
 pub use vertex::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
 pub(crate) use visibility::ray_origin;

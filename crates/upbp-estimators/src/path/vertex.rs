@@ -7,7 +7,7 @@ use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
 
 use super::context::Context;
 use super::edge::{EdgeTrace, MediumSpan};
-use super::interaction::{Evaluation, Site};
+use super::interaction::{Evaluation, Interaction};
 use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, VertexMis};
 use crate::scene::{Bsdf, Emitter, EmitterId, EmitterPoint, Scene, Walk};
@@ -29,7 +29,7 @@ pub struct LightVertex<B, D = f64> {
     /// Index of the sub-path.
     pub path: u32,
     /// Scattering at the vertex.
-    pub site: Site<B>,
+    pub interaction: Interaction<B>,
 }
 
 impl<B: Bsdf, D> LightVertex<B, D> {
@@ -40,8 +40,8 @@ impl<B: Bsdf, D> LightVertex<B, D> {
         context: &Context<'_, S>,
         to: Vec3,
     ) -> Option<Evaluation> {
-        let (scene, roulette) = (context.world.scene, context.plan.roulette);
-        self.site.evaluate(scene, roulette, Walk::Light, self.position, self.towards_light, to)
+        let (scene, roulette) = (context.prepared.scene, context.plan.roulette);
+        self.interaction.evaluate(scene, roulette, Walk::Light, self.position, self.towards_light, to)
     }
 }
 
@@ -74,16 +74,16 @@ impl EdgeSource {
         match self {
             Self::Vertex => mis.connections(),
             Self::Emitter { emitter, point, pdf_position } => {
-                let world = context.world;
-                let pdf = world.scene.emitters()[emitter.0 as usize].pdf_incident(
-                    &world.bounds,
+                let prepared = context.prepared;
+                let pdf = prepared.scene.emitters()[emitter.0 as usize].pdf_incident(
+                    &prepared.bounds,
                     point,
                     direction,
                     position,
                     *pdf_position,
                 );
-                let choice = f64::from(world.next_event_probability(*emitter))
-                    / f64::from(world.emission_probability(*emitter));
+                let choice = f64::from(prepared.next_event_probability(*emitter))
+                    / f64::from(prepared.emission_probability(*emitter));
                 let count = mis.nee * choice * f64::from(pdf) / f64::from(*pdf_position);
                 D::of(Technique::Nee, mis.pow(count))
             }
@@ -121,10 +121,10 @@ impl<D: Densities> PhotonBeam<D> {
         context: &Context<'_, S>,
         t: f32,
     ) -> Option<LightVertex<S::Bsdf, D>> {
-        let Context { world, plan } = *context;
+        let Context { prepared, plan } = *context;
         let Segment { origin, direction, start, .. } = self.segment;
         let segment = RaySegment { origin, direction, start, end: t };
-        let density = self.before.with(&world.scene.media()[self.medium.0 as usize].segment(&segment));
+        let density = self.before.with(&prepared.scene.media()[self.medium.0 as usize].segment(&segment));
         let distance = if self.from_infinity { f64::INFINITY } else { f64::from(t) };
         let edge = Edge::new(&density, distance, 1.0, self.mis.in_medium, true);
         if !(edge.forward > 0.0) {
@@ -139,7 +139,7 @@ impl<D: Densities> PhotonBeam<D> {
             mis: self.mis.arrive(&plan.mis, Walk::Light, &edge, connections),
             depth: self.depth,
             path: self.path,
-            site: Site::Medium(self.medium),
+            interaction: Interaction::Medium(self.medium),
         })
     }
 }
@@ -159,7 +159,7 @@ pub(crate) struct CameraVertex<B, D> {
     pub(crate) mis: VertexMis<D>,
     /// Edges from the camera.
     pub(crate) depth: u32,
-    pub(crate) site: Site<B>,
+    pub(crate) interaction: Interaction<B>,
 }
 
 impl<B: Bsdf, D> CameraVertex<B, D> {
@@ -170,8 +170,8 @@ impl<B: Bsdf, D> CameraVertex<B, D> {
         context: &Context<'_, S>,
         to: Vec3,
     ) -> Option<Evaluation> {
-        let (scene, roulette) = (context.world.scene, context.plan.roulette);
-        self.site.evaluate(scene, roulette, Walk::Camera, self.position, self.towards_camera, to)
+        let (scene, roulette) = (context.prepared.scene, context.plan.roulette);
+        self.interaction.evaluate(scene, roulette, Walk::Camera, self.position, self.towards_camera, to)
     }
 }
 
@@ -196,8 +196,8 @@ impl<D: Densities> CameraEdge<D> {
         (span, medium): (&MediumSpan, MediumId),
         t: f32,
     ) -> Option<CameraVertex<S::Bsdf, D>> {
-        let Context { world, plan } = *context;
-        let density = edge_trace.density_to(world.scene, span, t);
+        let Context { prepared, plan } = *context;
+        let density = edge_trace.density_to(prepared.scene, span, t);
         let edge = Edge::new(&density, f64::from(t), 1.0, self.mis.in_medium, true);
         (edge.forward > 0.0).then(|| CameraVertex {
             position: edge_trace.origin + edge_trace.direction * t,
@@ -205,7 +205,7 @@ impl<D: Densities> CameraEdge<D> {
             throughput: self.throughput * transmitted(&density, plan.mis.query_beams),
             mis: self.mis.arrive(&plan.mis, Walk::Camera, &edge, self.connections),
             depth: self.depth,
-            site: Site::Medium(medium),
+            interaction: Interaction::Medium(medium),
         })
     }
 }

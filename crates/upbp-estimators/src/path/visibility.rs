@@ -5,7 +5,7 @@ use upbp_accel::{Ray, offset_origin};
 use upbp_media::{EdgeDensity, Medium, MediumStack, RaySegment};
 
 use super::edge::{correction, correction_of_escape, is_hidden, may_correct, medium_of};
-use super::interaction::Site;
+use super::interaction::Interaction;
 use crate::scene::{Crossing, MAX_CROSSINGS, Scene};
 
 /// The far end of a connection.
@@ -20,10 +20,10 @@ pub struct Target {
 }
 
 /// The start of a ray from a vertex: off the surface, by no more than rounding requires.
-pub(crate) fn ray_origin<B>(site: &Site<B>, position: Vec3, direction: Vec3) -> Vec3 {
-    match site {
-        Site::Surface(surface) => offset_origin(position, surface.geometric_normal, direction),
-        Site::Medium(_) => position,
+pub(crate) fn ray_origin<B>(interaction: &Interaction<B>, position: Vec3, direction: Vec3) -> Vec3 {
+    match interaction {
+        Interaction::Surface(surface) => offset_origin(position, surface.geometric_normal, direction),
+        Interaction::Medium(_) => position,
     }
 }
 

@@ -19,7 +19,7 @@ pub(crate) fn bb1d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let plan = context.plan;
     let kernel = &plan.kernels.bb1d;
     for (span, medium, ray) in edge_trace.query_beams(plan, edge.depth, Technique::Bb1d) {
-        out.observer.turns_to(Some(Technique::Bb1d));
+        out.observer.enter_technique(Some(Technique::Bb1d));
         map.beam_tree.around_ray(&ray, kernel.radius(), |index, approach| {
             let beam = &map.beams[index as usize];
             if beam.medium == medium
@@ -31,6 +31,6 @@ pub(crate) fn bb1d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
                 merge(context, Technique::Bb1d, &light, &vertex, kernel, out);
             }
         });
-        out.observer.turns_to(None);
+        out.observer.enter_technique(None);
     }
 }

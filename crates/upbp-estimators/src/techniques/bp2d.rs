@@ -23,7 +23,7 @@ pub(crate) fn bp2d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let kernel = &plan.kernels.bp2d;
-    out.observer.turns_to(Some(Technique::Bp2d));
+    out.observer.enter_technique(Some(Technique::Bp2d));
     map.beam_tree.around_point(vertex.position, kernel.radius(), |index, t, distance2| {
         let beam = &map.beams[index as usize];
         if beam.medium == medium
@@ -33,5 +33,5 @@ pub(crate) fn bp2d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             merge(context, Technique::Bp2d, &light, vertex, kernel.value(distance2), out);
         }
     });
-    out.observer.turns_to(None);
+    out.observer.enter_technique(None);
 }

@@ -5,9 +5,9 @@
 
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
-use crate::observer::{Joint, ObservedSample, Observer};
+use crate::observer::{Completion, ObservedSample, Observer};
 use crate::path::{
-    CameraVertex, Context, LightVertex, MediumInterface, Site, Target, clear_edge, ray_origin,
+    CameraVertex, Context, Interaction, LightVertex, MediumInterface, Target, clear_edge, ray_origin,
 };
 use crate::random::Stream;
 use crate::scene::{Crossing, Scene, Walk};
@@ -31,11 +31,11 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     for _ in 0..stream.round(plan.connections) {
         let light = &map.vertices[stream.index(map.vertices.len())];
         if plan.lengths.contain(vertex.depth + light.depth + 1) {
-            out.observer.turns_to(Some(Technique::Connect));
+            out.observer.enter_technique(Some(Technique::Connect));
             connect(context, vertex, sides, light, factor, crossings, out);
         }
     }
-    out.observer.turns_to(None);
+    out.observer.enter_technique(None);
 }
 
 fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
@@ -47,8 +47,8 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
 ) {
-    let Context { world, plan } = *context;
-    let (scene, mis) = (world.scene, &plan.mis);
+    let Context { prepared, plan } = *context;
+    let (scene, mis) = (prepared.scene, &plan.mis);
     let between = light.position - vertex.position;
     let distance = between.length();
     let direction = between / distance;
@@ -66,17 +66,17 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     out.counters.shadow_rays += 1;
-    let crosses = vertex.site.crosses(vertex.towards_camera, direction);
+    let crosses = vertex.interaction.crosses(vertex.towards_camera, direction);
     let stack = sides.towards(crosses);
-    let origin = ray_origin(&vertex.site, vertex.position, direction);
-    let surface = match &light.site {
-        Site::Surface(surface) => Some((light.position, surface.geometric_normal)),
-        Site::Medium(_) => None,
+    let origin = ray_origin(&vertex.interaction, vertex.position, direction);
+    let surface = match &light.interaction {
+        Interaction::Surface(surface) => Some((light.position, surface.geometric_normal)),
+        Interaction::Medium(_) => None,
     };
     let target = Target { direction, distance, surface };
     let Some(density) = clear_edge(scene, &stack, origin, &target, crossings) else { return };
 
-    let (near, far) = (vertex.site.in_medium(), light.site.in_medium());
+    let (near, far) = (vertex.interaction.in_medium(), light.interaction.in_medium());
     let distance2 = f64::from(distance).powi(2);
     // C_{s-1} and L_s: what each walk would have sampled instead of this connection.
     let light_density = camera_side.rho_own * light_side.cos / distance2 * density.forward(far);
@@ -85,14 +85,14 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let camera_end = vertex.mis.end(
         mis,
         Walk::Camera,
-        vertex.site.merge_kind(camera_side.sin_theta),
+        vertex.interaction.merge_kind(camera_side.sin_theta),
         factor_of(Walk::Light, near, density.backward(near)),
         camera_side.rho_opposite,
     );
     let light_end = light.mis.end(
         mis,
         Walk::Light,
-        light.site.merge_kind(light_side.sin_theta),
+        light.interaction.merge_kind(light_side.sin_theta),
         factor_of(Walk::Camera, far, density.forward(far)),
         light_side.rho_opposite,
     );
@@ -106,10 +106,10 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out.record(&ObservedSample {
         technique: Technique::Connect,
         camera_depth: vertex.depth,
-        joint: Joint::Connect {
+        completion: Completion::Connect {
             path: light.path,
-            light: (light.position, light.site, light.depth),
-            camera: (vertex.position, vertex.site),
+            light: (light.position, light.interaction, light.depth),
+            camera: (vertex.position, vertex.interaction),
         },
         weight,
         value,

@@ -5,7 +5,7 @@ use upbp_media::{Medium, Spectrum};
 
 use crate::film_sample::Output;
 use crate::mis::{Densities, Edge, Weight};
-use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
+use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::Context;
 use crate::path::{CameraEdge, EdgeTrace};
 use crate::scene::{Emitter, EmitterId, EmitterPoint, Hit, Scene, Walk};
@@ -20,13 +20,13 @@ pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
-    let Context { world, plan } = *context;
+    let Context { prepared, plan } = *context;
     if plan.mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
         return;
     }
     for span in &edge_trace.spans {
         let Some(medium) = span.medium else { continue };
-        let medium = &world.scene.media()[medium.0 as usize];
+        let medium = &prepared.scene.media()[medium.0 as usize];
         if medium.emits() {
             let emitted = medium.emitted(&edge_trace.segment(span, span.end));
             let value = edge.throughput * span.before.transmittance * emitted;
@@ -34,7 +34,7 @@ pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             out.record(&ObservedSample {
                 technique: Technique::Hit,
                 camera_depth: edge.depth,
-                joint: Joint::Emission,
+                completion: Completion::Emission,
                 weight,
                 value,
             });
@@ -67,19 +67,19 @@ pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
-    let world = context.world;
-    if world.environments().is_empty() {
+    let prepared = context.prepared;
+    if prepared.environments().is_empty() {
         return;
     }
-    let density = edge_trace.density(world.scene);
+    let density = edge_trace.density(prepared.scene);
     let throughput = edge.throughput * density.transmittance / density.pass_probability as f32;
     if throughput.is_black() || !throughput.is_finite() {
         return;
     }
     let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.mis.in_medium, false);
-    let away = world.bounds.centre + edge_trace.direction * (2.0 * world.bounds.radius);
+    let away = prepared.bounds.centre + edge_trace.direction * (2.0 * prepared.bounds.radius);
     let point = EmitterPoint { position: away, normal: -edge_trace.direction };
-    for &emitter in world.environments() {
+    for &emitter in prepared.environments() {
         shine(
             context,
             emitter,
@@ -107,13 +107,13 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     edge: &CameraEdge<O::Densities>,
     out: &mut Output<'_, O>,
 ) {
-    let Context { world, plan } = *context;
+    let Context { prepared, plan } = *context;
     let mis = &plan.mis;
     if mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
         return;
     }
-    let Some(light) = world.scene.emitters().get(emitter.0 as usize) else { return };
-    let Some(densities) = light.hit(&world.bounds, point, direction, receiver) else { return };
+    let Some(light) = prepared.scene.emitters().get(emitter.0 as usize) else { return };
+    let Some(densities) = light.hit(&prepared.bounds, point, direction, receiver) else { return };
     let weight = if edge.depth == 1 {
         // Nothing else makes a path of one edge.
         Weight::alone(Technique::Hit)
@@ -123,8 +123,8 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             edge.mis.arrive(mis, Walk::Camera, mis_edge, O::Densities::of(Technique::Nee, mis.pow(mis.nee)));
         mis.hit_weight(
             &vertex_mis,
-            f64::from(world.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
-            f64::from(world.emission_probability(emitter)) * f64::from(densities.pdf_position),
+            f64::from(prepared.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
+            f64::from(prepared.emission_probability(emitter)) * f64::from(densities.pdf_position),
             f64::from(densities.pdf_direction),
         )
     };
@@ -132,7 +132,7 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out.record(&ObservedSample {
         technique: Technique::Hit,
         camera_depth: edge.depth,
-        joint: Joint::Hit(LightEnd { emitter, point: *point, direction }),
+        completion: Completion::Hit(LightEnd { emitter, point: *point, direction }),
         weight,
         value,
     });

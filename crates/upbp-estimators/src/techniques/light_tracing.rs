@@ -1,6 +1,6 @@
 //! Light tracing: a light vertex and the lens.
 
-use crate::observer::{Joint, ObservedSample, Observer};
+use crate::observer::{Completion, ObservedSample, Observer};
 use crate::path::{Context, LightChunk, LightVertex, MediumInterface, Splat, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Camera, Crossing, Scene, Walk};
@@ -16,8 +16,8 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut LightChunk<S::Bsdf, O::Densities>,
     observer: &mut O,
 ) {
-    let Context { world, plan } = *context;
-    let scene = world.scene;
+    let Context { prepared, plan } = *context;
+    let scene = prepared.scene;
     let camera = scene.camera();
     let Some(view) = camera.connect(vertex.position, stream.pair()) else { return };
     let pixel = [view.film.x.floor() as u32, view.film.y.floor() as u32];
@@ -36,13 +36,13 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     out.counters.shadow_rays += 1;
-    let crosses = vertex.site.crosses(vertex.towards_light, direction);
-    let origin = ray_origin(&vertex.site, vertex.position, direction);
+    let crosses = vertex.interaction.crosses(vertex.towards_light, direction);
+    let origin = ray_origin(&vertex.interaction, vertex.position, direction);
     let target = Target { direction, distance, surface: None };
     let Some(density) = clear_edge(scene, &sides.towards(crosses), origin, &target, crossings) else {
         return;
     };
-    let in_medium = vertex.site.in_medium();
+    let in_medium = vertex.interaction.in_medium();
     let distance2 = f64::from(distance) * f64::from(distance);
     // C_{k-1}: the density of this vertex as the camera would sample it.
     let ray_pdf = f64::from(view.pdf) * scattering.cos / distance2;
@@ -50,8 +50,8 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let mis = &plan.mis;
     let opposite =
         mis.distance_factor(Walk::Camera, in_medium, density.pass_probability, density.backward(in_medium));
-    let site = vertex.site.merge_kind(scattering.sin_theta);
-    let end = vertex.mis.end(mis, Walk::Light, site, opposite, scattering.rho_opposite);
+    let interaction = vertex.interaction.merge_kind(scattering.sin_theta);
+    let end = vertex.mis.end(mis, Walk::Light, interaction, opposite, scattering.rho_opposite);
     let weight = mis.light_tracing_weight(end, light_density);
     let value = vertex.throughput
         * scattering.value
@@ -62,9 +62,9 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         observer.sample(&ObservedSample {
             technique: Technique::LightTracing,
             camera_depth: 0,
-            joint: Joint::LightTracing {
+            completion: Completion::LightTracing {
                 path: vertex.path,
-                light: (vertex.position, vertex.site, vertex.depth),
+                light: (vertex.position, vertex.interaction, vertex.depth),
                 lens: view.lens,
                 pdf: view.pdf,
             },

@@ -5,8 +5,8 @@
 
 use crate::film_sample::Output;
 use crate::mis::{Densities, Weight};
-use crate::observer::{Joint, ObservedSample, Observer};
-use crate::path::{CameraVertex, Context, LightVertex, Site};
+use crate::observer::{Completion, ObservedSample, Observer};
+use crate::path::{CameraVertex, Context, Interaction, LightVertex};
 use crate::scene::Scene;
 use crate::technique::Technique;
 
@@ -24,12 +24,12 @@ pub(super) fn merge<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let Some(scattering) = camera.evaluate(context, light.towards_light) else {
         return;
     };
-    let (factor, merges) = match camera.site {
-        Site::Surface(_) => {
+    let (factor, merges) = match camera.interaction {
+        Interaction::Surface(_) => {
             let factor = mis.surface_factor();
             (factor, O::Densities::of(technique, factor))
         }
-        Site::Medium(medium) => {
+        Interaction::Medium(medium) => {
             let (c_light, c_camera) = (light.mis.distance_factor, camera.mis.distance_factor);
             let factors = mis.volume_factors(medium, c_light, c_camera, scattering.sin_theta);
             (factors.of(technique), factors.sum())
@@ -41,10 +41,10 @@ pub(super) fn merge<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out.record(&ObservedSample {
         technique,
         camera_depth: camera.depth,
-        joint: Joint::Merge {
+        completion: Completion::Merge {
             path: light.path,
             light: (light.position, light.depth),
-            camera: (camera.position, camera.site),
+            camera: (camera.position, camera.interaction),
         },
         weight: Weight::of_merge(factor, merges, before_light, before_camera),
         value: camera.throughput * light.throughput * scattering.value * per_photon,

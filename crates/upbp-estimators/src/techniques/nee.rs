@@ -1,7 +1,7 @@
 //! Next event estimation: a camera vertex and a point chosen on a light.
 
 use crate::film_sample::Output;
-use crate::observer::{Joint, LightEnd, ObservedSample, Observer};
+use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, ray_origin};
 use crate::random::Stream;
 use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
@@ -21,10 +21,10 @@ pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     for _ in 0..stream.round(plan.next_events) {
-        out.observer.turns_to(Some(Technique::Nee));
+        out.observer.enter_technique(Some(Technique::Nee));
         next_event(context, vertex, sides, stream, crossings, out);
     }
-    out.observer.turns_to(None);
+    out.observer.enter_technique(None);
 }
 
 fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
@@ -35,11 +35,11 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
 ) {
-    let Context { world, plan } = *context;
-    let (scene, mis) = (world.scene, &plan.mis);
-    let Some((emitter, probability)) = world.choose_next_event(stream.uniform()) else { return };
+    let Context { prepared, plan } = *context;
+    let (scene, mis) = (prepared.scene, &plan.mis);
+    let Some((emitter, probability)) = prepared.choose_next_event(stream.uniform()) else { return };
     let light = &scene.emitters()[emitter.0 as usize];
-    let Some(incident) = light.sample_incident(&world.bounds, vertex.position, stream.pair()) else {
+    let Some(incident) = light.sample_incident(&prepared.bounds, vertex.position, stream.pair()) else {
         return;
     };
     let kind = light.kind();
@@ -58,17 +58,17 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     out.counters.shadow_rays += 1;
-    let crosses = vertex.site.crosses(vertex.towards_camera, direction);
-    let origin = ray_origin(&vertex.site, vertex.position, direction);
+    let crosses = vertex.interaction.crosses(vertex.towards_camera, direction);
+    let origin = ray_origin(&vertex.interaction, vertex.position, direction);
     let surface = (kind == EmitterKind::Area).then_some((incident.point.position, incident.point.normal));
     let target = Target { direction, distance: incident.distance, surface };
     let stack = sides.towards(crosses);
     let Some(density) = clear_edge(scene, &stack, origin, &target, crossings) else { return };
 
-    let in_medium = vertex.site.in_medium();
+    let in_medium = vertex.interaction.in_medium();
     let distance2 = if kind.is_infinite() { 1.0 } else { f64::from(incident.distance).powi(2) };
     let pdf = f64::from(probability) * f64::from(incident.pdf);
-    let pdf_position = f64::from(world.emission_probability(emitter)) * f64::from(incident.pdf_position);
+    let pdf_position = f64::from(prepared.emission_probability(emitter)) * f64::from(incident.pdf_position);
     let geometry = f64::from(cos_light) * scattering.cos / distance2;
 
     let hit_density = if kind.is_hittable() {
@@ -80,8 +80,8 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         f64::from(incident.pdf_direction) * scattering.cos / distance2 * density.backward(in_medium);
     let opposite =
         mis.distance_factor(Walk::Light, in_medium, density.pass_probability, density.backward(in_medium));
-    let site = vertex.site.merge_kind(scattering.sin_theta);
-    let end = vertex.mis.end(mis, Walk::Camera, site, opposite, scattering.rho_opposite);
+    let interaction = vertex.interaction.merge_kind(scattering.sin_theta);
+    let end = vertex.mis.end(mis, Walk::Camera, interaction, opposite, scattering.rho_opposite);
     let weight = mis.nee_weight(pdf, pdf_position, hit_density, end, camera_density);
     let value = vertex.throughput
         * scattering.value
@@ -91,9 +91,9 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out.record(&ObservedSample {
         technique: Technique::Nee,
         camera_depth: vertex.depth,
-        joint: Joint::Nee {
+        completion: Completion::Nee {
             light: LightEnd { emitter, point: incident.point, direction: -direction },
-            camera: (vertex.position, vertex.site),
+            camera: (vertex.position, vertex.interaction),
         },
         weight,
         value,

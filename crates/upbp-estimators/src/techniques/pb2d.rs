@@ -4,7 +4,7 @@ use super::merge::merge;
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::Observer;
-use crate::path::{CameraEdge, Context, EdgeTrace, Site};
+use crate::path::{CameraEdge, Context, EdgeTrace, Interaction};
 use crate::scene::Scene;
 use crate::technique::Technique;
 
@@ -19,16 +19,16 @@ pub(crate) fn pb2d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let plan = context.plan;
     let kernel = &plan.kernels.pb2d;
     for (span, medium, ray) in edge_trace.query_beams(plan, edge.depth, Technique::Pb2d) {
-        out.observer.turns_to(Some(Technique::Pb2d));
+        out.observer.enter_technique(Some(Technique::Pb2d));
         map.medium.around_ray(&ray, kernel.radius(), |index, t, distance2| {
             let photon = &map.vertices[index as usize];
-            if matches!(photon.site, Site::Medium(other) if other == medium)
+            if matches!(photon.interaction, Interaction::Medium(other) if other == medium)
                 && plan.lengths.contain(edge.depth + photon.depth)
                 && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), t)
             {
                 merge(context, Technique::Pb2d, photon, &vertex, kernel.value(distance2), out);
             }
         });
-        out.observer.turns_to(None);
+        out.observer.enter_technique(None);
     }
 }

@@ -6,7 +6,7 @@ use super::merge::merge;
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::Observer;
-use crate::path::{CameraVertex, Context, Site};
+use crate::path::{CameraVertex, Context, Interaction};
 use crate::scene::Scene;
 use crate::technique::Technique;
 
@@ -23,14 +23,14 @@ pub(crate) fn pp3d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let kernel = &plan.kernels.pp3d;
-    out.observer.turns_to(Some(Technique::Pp3d));
+    out.observer.enter_technique(Some(Technique::Pp3d));
     map.medium.in_ball(vertex.position, kernel.radius(), |index, distance2| {
         let photon = &map.vertices[index as usize];
-        if matches!(photon.site, Site::Medium(other) if other == medium)
+        if matches!(photon.interaction, Interaction::Medium(other) if other == medium)
             && plan.lengths.contain(vertex.depth + photon.depth)
         {
             merge(context, Technique::Pp3d, photon, vertex, kernel.value(distance2), out);
         }
     });
-    out.observer.turns_to(None);
+    out.observer.enter_technique(None);
 }

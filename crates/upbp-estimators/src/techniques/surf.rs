@@ -4,7 +4,7 @@ use super::merge::merge;
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::Observer;
-use crate::path::{CameraVertex, Context, LightVertex, Site, SurfaceInteraction};
+use crate::path::{CameraVertex, Context, Interaction, LightVertex, SurfaceInteraction};
 use crate::scene::Scene;
 use crate::technique::Technique;
 
@@ -24,11 +24,11 @@ pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
-    if !plan.looks_up(Technique::Surf) {
+    if !plan.merges_by(Technique::Surf) {
         return;
     }
     let kernel = &plan.kernels.surf;
-    out.observer.turns_to(Some(Technique::Surf));
+    out.observer.enter_technique(Some(Technique::Surf));
     map.surface.in_ball(vertex.position, kernel.radius(), |index, distance2| {
         let photon = &map.vertices[index as usize];
         if plan.lengths.contain(vertex.depth + photon.depth)
@@ -37,7 +37,7 @@ pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             merge(context, Technique::Surf, photon, vertex, kernel.value(distance2), out);
         }
     });
-    out.observer.turns_to(None);
+    out.observer.enter_technique(None);
 }
 
 /// Keeps light from leaking around edges and through thin walls. What it cuts off the kernel vanishes with
@@ -48,7 +48,7 @@ fn lies_on<B, D>(
     photon: &LightVertex<B, D>,
     radius: f32,
 ) -> bool {
-    let Site::Surface(other) = &photon.site else { return false };
+    let Interaction::Surface(other) = &photon.interaction else { return false };
     let normal = surface.geometric_normal;
     normal.dot(other.geometric_normal) > MIN_NORMAL_COSINE
         && (photon.position - vertex.position).dot(normal).abs() < MAX_PLANE_DISTANCE * radius

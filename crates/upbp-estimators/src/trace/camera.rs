@@ -9,7 +9,7 @@ use crate::light_map::LightMap;
 use crate::mis::{Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, CameraEdge, CameraVertex, Context, Extent, Scratch, Site, arrive, ray_origin, scatter,
+    Arrival, CameraEdge, CameraVertex, Context, Extent, Interaction, Scratch, arrive, ray_origin, scatter,
 };
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
@@ -31,8 +31,8 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 ) -> CameraWalk {
     let mut walk = CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
     let mut scattered_before = false;
-    let Context { world, plan } = *context;
-    let scene = world.scene;
+    let Context { prepared, plan } = *context;
+    let scene = prepared.scene;
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, index);
     let [dx, dy] = stream.pair();
     let film = Vec2::new(pixel[0] as f32 + dx, pixel[1] as f32 + dy);
@@ -43,10 +43,10 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     }
     observer.camera_end(ray.origin, ray.direction, ray.pdf);
     let mut out = Output { layers: &mut walk.layers, counters, observer };
-    let emission = plan.mis.hit > 0.0 && world.has_emitting_media();
-    let to_surface = plan.has_long_query_beams() || emission || world.has_dense_media();
+    let emission = plan.mis.hit > 0.0 && prepared.has_emitting_media();
+    let to_surface = plan.has_long_query_beams() || emission || prepared.has_dense_media();
     let extent = if to_surface { Extent::ToSurface } else { Extent::ToStop };
-    let mut stack = world.stack_at_camera(ray.origin);
+    let mut stack = prepared.stack_at_camera(ray.origin);
     let mut origin = ray.origin;
     let mut direction = ray.direction;
     let mut edge = CameraEdge {
@@ -79,7 +79,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
                 break;
             }
         };
-        let in_medium = arrived.site.in_medium();
+        let in_medium = arrived.interaction.in_medium();
         let t = arrived.density.forward(in_medium);
         let throughput = edge.throughput * arrived.density.transmittance / t as f32;
         if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
@@ -89,7 +89,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         let mis_edge = Edge::new(
             &arrived.density,
             f64::from(arrived.distance),
-            arrived.site.cosine(from),
+            arrived.interaction.cosine(from),
             edge.mis.in_medium,
             in_medium,
         );
@@ -97,10 +97,10 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             techniques::emitter_hit(context, hit, direction, origin, &mis_edge, throughput, &edge, &mut out);
         }
         if depth == plan.lengths.max {
-            out.counters.cut_walks += u64::from(arrived.site.is_connectible());
+            out.counters.cut_walks += u64::from(arrived.interaction.is_connectible());
             break;
         }
-        let (connectible, sides) = (arrived.site.is_connectible(), &arrived.sides);
+        let (connectible, sides) = (arrived.interaction.is_connectible(), &arrived.sides);
         let mis = edge.mis.arrive(
             &plan.mis,
             Walk::Camera,
@@ -113,7 +113,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             throughput,
             mis,
             depth,
-            site: arrived.site,
+            interaction: arrived.interaction,
         };
         if connectible {
             if !scattered_before {
@@ -123,33 +123,38 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             let crossings = &mut scratch.crossings;
             techniques::next_events(context, &vertex, sides, &mut stream, crossings, &mut out);
             techniques::connections(context, map, &vertex, sides, &mut stream, crossings, &mut out);
-            match &vertex.site {
-                Site::Surface(surface) => techniques::surf(context, map, &vertex, surface, &mut out),
-                Site::Medium(medium) => {
+            match &vertex.interaction {
+                Interaction::Surface(surface) => techniques::surf(context, map, &vertex, surface, &mut out),
+                Interaction::Medium(medium) => {
                     techniques::pp3d(context, map, &vertex, *medium, &mut out);
                     techniques::bp2d(context, map, &vertex, *medium, &mut out);
                 }
             }
         }
 
-        let Some(scattered) =
-            vertex.site.scatter(scene, &mut survival, Walk::Camera, vertex.position, from, &mut stream)
-        else {
+        let Some(scattered) = vertex.interaction.scatter(
+            scene,
+            &mut survival,
+            Walk::Camera,
+            vertex.position,
+            from,
+            &mut stream,
+        ) else {
             break;
         };
         out.observer.camera_vertex(&ObservedVertex {
             depth,
             position: vertex.position,
-            site: vertex.site,
+            interaction: vertex.interaction,
             delta: scattered.delta,
             albedo: scattered.albedo,
         });
-        origin = ray_origin(&vertex.site, vertex.position, scattered.direction);
+        origin = ray_origin(&vertex.interaction, vertex.position, scattered.direction);
         direction = scattered.direction;
         stack = sides.towards(scattered.transmitted);
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
-            mis: scatter(context, &vertex.mis, &vertex.site, &scattered),
+            mis: scatter(context, &vertex.mis, &vertex.interaction, &scattered),
             connections: plan.mis.connections(),
             depth,
         };

@@ -11,7 +11,7 @@ use crate::path::{
     Arrival, Arrived, Context, EdgeSource, EdgeTrace, Extent, LightChunk, LightVertex, MIN_COSINE,
     MediumSpan, PhotonBeam, Scratch, arrive, ray_origin, scatter,
 };
-use crate::prepared::World;
+use crate::prepared::PreparedScene;
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
 use crate::scene::{Emitter, EmitterKind, Scene, Walk};
@@ -38,15 +38,15 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut LightChunk<S::Bsdf, O::Densities>,
     observer: &mut O,
 ) {
-    let Context { world, plan } = *context;
+    let Context { prepared, plan } = *context;
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
     let Some(mut flight) = emit(context, index, &mut stream, &mut out.counters, observer) else { return };
-    let scene = world.scene;
+    let scene = prepared.scene;
     let mut survival = Survival::of_light(plan.roulette);
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
     let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
-    let extent = if long_beams || world.has_dense_media() { Extent::ToSurface } else { Extent::ToStop };
+    let extent = if long_beams || prepared.has_dense_media() { Extent::ToSurface } else { Extent::ToStop };
 
     // The shortest completion adds one edge, by light tracing or a merge on the camera's first edge.
     for depth in 1..plan.lengths.max {
@@ -67,19 +67,19 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
                 return;
             }
         };
-        let Arrived { position, distance, density, site, sides } = arrival;
-        let in_medium = site.in_medium();
+        let Arrived { position, distance, density, interaction, sides } = arrival;
+        let in_medium = interaction.in_medium();
         let t = density.forward(in_medium);
         let throughput = flight.throughput * density.transmittance / t as f32;
         if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
             return;
         }
         let from = -flight.direction;
-        let connectible = site.is_connectible();
+        let connectible = interaction.is_connectible();
         let edge = Edge::new(
             &density,
             if flight.infinite { f64::INFINITY } else { f64::from(distance) },
-            site.cosine(from),
+            interaction.cosine(from),
             flight.mis.in_medium,
             in_medium,
         );
@@ -89,12 +89,13 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             O::Densities::ZERO
         };
         let mis = flight.mis.arrive(&plan.mis, Walk::Light, &edge, connections);
-        let vertex = LightVertex { position, towards_light: from, throughput, mis, depth, path: index, site };
+        let vertex =
+            LightVertex { position, towards_light: from, throughput, mis, depth, path: index, interaction };
         if connectible {
             if plan.mis.light_tracing > 0.0 && plan.lengths.contain(depth + 1) {
-                observer.turns_to(Some(Technique::LightTracing));
+                observer.enter_technique(Some(Technique::LightTracing));
                 light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
-                observer.turns_to(None);
+                observer.enter_technique(None);
             }
             if plan.stores_vertices() {
                 out.vertices.push(vertex);
@@ -102,19 +103,26 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             }
         }
 
-        let Some(scattered) = site.scatter(scene, &mut survival, Walk::Light, position, from, &mut stream)
+        let Some(scattered) =
+            interaction.scatter(scene, &mut survival, Walk::Light, position, from, &mut stream)
         else {
             return;
         };
         observer.light_vertex(
             index,
-            &ObservedVertex { depth, position, site, delta: scattered.delta, albedo: scattered.albedo },
+            &ObservedVertex {
+                depth,
+                position,
+                interaction,
+                delta: scattered.delta,
+                albedo: scattered.albedo,
+            },
         );
         flight = Flight {
-            origin: ray_origin(&site, position, scattered.direction),
+            origin: ray_origin(&interaction, position, scattered.direction),
             direction: scattered.direction,
             stack: sides.towards(scattered.transmitted),
-            mis: scatter(context, &mis, &site, &scattered),
+            mis: scatter(context, &mis, &interaction, &scattered),
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,
             infinite: false,
@@ -129,10 +137,10 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     counters: &mut Counters,
     observer: &mut O,
 ) -> Option<Flight<O::Densities>> {
-    let world = context.world;
-    let (emitter, probability) = world.choose_emission(stream.uniform())?;
-    let light = &world.scene.emitters()[emitter.0 as usize];
-    let emission = light.sample_emission(&world.bounds, stream.pair(), stream.pair())?;
+    let prepared = context.prepared;
+    let (emitter, probability) = prepared.choose_emission(stream.uniform())?;
+    let light = &prepared.scene.emitters()[emitter.0 as usize];
+    let emission = light.sample_emission(&prepared.bounds, stream.pair(), stream.pair())?;
     if !(emission.point.position.is_finite() && emission.direction.is_finite()) {
         counters.lost_walks += 1;
         return None;
@@ -140,7 +148,7 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let kind = light.kind();
     // With another probability a walk from infinity does not arrive. Those that do have not stopped on the
     // way.
-    let passes = world.passes_from_infinity();
+    let passes = prepared.passes_from_infinity();
     if kind.is_infinite() && passes < 1.0 && f64::from(stream.uniform()) >= passes {
         return None;
     }
@@ -162,10 +170,10 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         _ => emission.point.position,
     };
     let stack = if kind.is_infinite() {
-        MediumStack::new(world.scene.outside())
+        MediumStack::new(prepared.scene.outside())
     } else {
         // Ahead of a point, which may stand on a boundary.
-        world.scene.stack_at(match kind {
+        prepared.scene.stack_at(match kind {
             EmitterKind::Point => offset_origin(origin, emission.direction, emission.direction),
             _ => origin,
         })
@@ -195,14 +203,14 @@ fn store_beams<S: Scene, D: Densities>(
     path: u32,
     out: &mut LightChunk<S::Bsdf, D>,
 ) {
-    let Context { world, plan } = *context;
+    let Context { prepared, plan } = *context;
     for (span, end) in edge_trace.beam_spans(plan.mis.photon_beams) {
         let Some(medium) = span.medium else { continue };
         let merges = plan.mis.merges_in(medium);
         if !(merges.bb1d > 0.0 || merges.bp2d > 0.0) {
             continue;
         }
-        let Some(end) = beam_end(world, edge_trace, span, medium, end) else { continue };
+        let Some(end) = beam_end(prepared, edge_trace, span, medium, end) else { continue };
         out.counters.photon_beams += 1;
         out.beams.push(PhotonBeam {
             segment: Segment {
@@ -235,7 +243,7 @@ const NEGLIGIBLE: f32 = 1e-7;
 /// not attenuated any further. So weights may take it to be without an end. A beam from infinity has none
 /// left before the scene.
 fn beam_end<S: Scene>(
-    world: &World<'_, S>,
+    prepared: &PreparedScene<'_, S>,
     edge_trace: &EdgeTrace<S::Bsdf>,
     span: &MediumSpan,
     medium: MediumId,
@@ -244,10 +252,10 @@ fn beam_end<S: Scene>(
     if end.is_finite() || !span.start.is_finite() {
         return (end > span.start && span.start.is_finite()).then_some(end);
     }
-    let medium = &world.scene.media()[medium.0 as usize];
+    let medium = &prepared.scene.media()[medium.0 as usize];
     let transmittance = |end| medium.segment(&edge_trace.segment(span, end)).transmittance;
     let left = transmittance(f32::INFINITY);
-    let ends = std::iter::successors(Some(world.bounds.radius), |length| Some(2.0 * length))
+    let ends = std::iter::successors(Some(prepared.bounds.radius), |length| Some(2.0 * length))
         .map(|length| (span.start + length).min(f32::MAX));
     let is_enough = |end: &f32| {
         let there = transmittance(*end);

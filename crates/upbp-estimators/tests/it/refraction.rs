@@ -2,7 +2,7 @@
 //! Jacobian of refraction by finite differences.
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
-use upbp_estimators::path::{Scattered, Site, SurfaceInteraction};
+use upbp_estimators::path::{Interaction, Scattered, SurfaceInteraction};
 use upbp_estimators::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
     EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
@@ -144,11 +144,11 @@ fn jacobian(direction: DVec3, normal: DVec3, ratio: f64) -> f64 {
     DMat3::from_cols(ds, dt, refract(direction, normal, ratio)).determinant().abs()
 }
 
-fn transmitted(site: &Site<Glass>, walk: Walk, from: Vec3) -> Option<Scattered> {
+fn transmitted(interaction: &Interaction<Glass>, walk: Walk, from: Vec3) -> Option<Scattered> {
     (0..64).find_map(|index| {
         let mut stream = Stream::new(1, 0, StreamKind::Light, index);
         let mut survival = Survival::of_light(Roulette::Below(1.0));
-        let scattered = site.scatter(&Nothing, &mut survival, walk, Vec3::ZERO, from, &mut stream);
+        let scattered = interaction.scatter(&Nothing, &mut survival, walk, Vec3::ZERO, from, &mut stream);
         scattered.filter(|scattered| scattered.transmitted)
     })
 }
@@ -156,7 +156,8 @@ fn transmitted(site: &Site<Glass>, walk: Walk, from: Vec3) -> Option<Scattered> 
 /// Compares all incident directions under one pair of normals; returns how many were refracted.
 fn compare(geometric_normal: Vec3, shading_normal: Vec3) -> u32 {
     let interface = Interface { above: 1.1, below: 1.6 };
-    let site = Site::Surface(SurfaceInteraction { bsdf: Glass, geometric_normal, shading_normal, interface });
+    let interaction =
+        Interaction::Surface(SurfaceInteraction { bsdf: Glass, geometric_normal, shading_normal, interface });
     let mut refracted = 0;
     for i in 0..200_u32 {
         // A spiral over the sphere.
@@ -166,7 +167,7 @@ fn compare(geometric_normal: Vec3, shading_normal: Vec3) -> u32 {
         let above = from.dot(shading_normal) > 0.0;
         let ratio = if above { 1.1 / 1.6 } else { 1.6 / 1.1 };
         for walk in [Walk::Light, Walk::Camera] {
-            let Some(found) = transmitted(&site, walk, from) else { continue };
+            let Some(found) = transmitted(&interaction, walk, from) else { continue };
             assert!(found.delta);
             let (own, other) = if above { (0, 1) } else { (1, 0) };
             let probability = |side: usize| f64::from(Glass::REFRACT[side] * Glass::CONTINUE[side]);
@@ -182,7 +183,8 @@ fn compare(geometric_normal: Vec3, shading_normal: Vec3) -> u32 {
                 "{from}: {ratio}, expected {expected}, cos {cos}"
             );
             // The reversed walk sees the inverse.
-            let back = transmitted(&site, walk, found.direction).expect("what was refracted can return");
+            let back =
+                transmitted(&interaction, walk, found.direction).expect("what was refracted can return");
             let product = ratio * (back.rho_opposite / back.rho_own);
             assert!((product - 1.0).abs() < 2.0 * tolerance, "{from}: {product}");
             refracted += 1;

@@ -3,9 +3,10 @@
 
 use glam::Vec3;
 use upbp_core::Settings;
+use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::trace::trace_light_path;
-use upbp_estimators::{StreamKind, World};
+use upbp_estimators::{PreparedScene, StreamKind};
 use upbp_scene::ReadyScene;
 
 /// Vertices of the light sub-paths of the first iteration.
@@ -14,11 +15,11 @@ pub(crate) fn photons(scene: &str, settings: &Settings) -> Result<Vec<Vec3>, Str
     let settings = settings.clone().validate().map_err(|error| format!("refused: {error}"))?;
     let mut renderer = scene.renderer(settings).map_err(|error| format!("refused: {error}"))?;
     let plan = renderer.iteration_plan(0);
-    let world = World::new(&scene).map_err(|error| format!("refused: {error}"))?;
-    let context = Context { world: &world, plan: &plan };
+    let world = PreparedScene::new(&scene).map_err(|error| format!("refused: {error}"))?;
+    let context = Context { prepared: &world, plan: &plan };
     let (mut scratch, mut out) = (Scratch::default(), LightChunk::default());
     for path in 0..plan.light_paths {
-        trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut out, &mut ());
+        trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut out, &mut NoObserver);
     }
     renderer.iterate();
     let (counted, own) = (renderer.report().counters, &out.counters);

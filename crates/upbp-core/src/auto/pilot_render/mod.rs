@@ -11,7 +11,7 @@ use upbp_estimators::path::{Context, LightChunk};
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, LightMap, Plan as IterationPlan, StreamKind, Technique, TechniqueSet, World as PreparedScene,
+    Counters, IterationPlan, LightMap, PreparedScene, StreamKind, Technique, TechniqueSet,
 };
 
 use super::full_plan::iteration_plan;
@@ -131,7 +131,7 @@ impl PilotRender {
             .map(|pass| {
                 // Not the iterations of other runs before the first iteration.
                 thinned.iteration = u64::from(pass) + 1;
-                Pass::trace(&Context { world: scene, plan: &thinned }, &grid, &room, halt)
+                Pass::trace(&Context { prepared: scene, plan: &thinned }, &grid, &room, halt)
             })
             .collect::<Option<Vec<_>>>()?;
         for pass in &mut passes {

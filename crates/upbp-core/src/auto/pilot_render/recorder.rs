@@ -7,7 +7,7 @@ use glam::Vec3;
 use upbp_estimators::Technique;
 use upbp_estimators::mis;
 use upbp_estimators::mis::Densities;
-use upbp_estimators::observer::{Joint, LightEnd, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 
 use crate::auto::roulette;
 
@@ -71,20 +71,20 @@ impl<B> Observer<B> for Recorder {
         self.edge();
     }
 
-    fn turns_to(&mut self, technique: Option<Technique>) {
+    fn enter_technique(&mut self, technique: Option<Technique>) {
         if let Some(technique) = technique {
             add(&mut self.calls[technique as usize], &self.passed);
         }
     }
 
     fn sample(&mut self, sample: &ObservedSample<B, mis::ByTechnique>) {
-        let ObservedSample { technique, ref joint, value, weight, .. } = *sample;
+        let ObservedSample { technique, ref completion, value, weight, .. } = *sample;
         self.seen += 1;
         if self.seen > MOST_SAMPLES {
             return;
         }
         let total = weight.all.total();
-        let merged = if let Joint::Merge { path, .. } = joint { Some(*path) } else { None };
+        let merged = if let Completion::Merge { path, .. } = completion { Some(*path) } else { None };
         self.samples.push(Sample {
             technique,
             merged,

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use proptest::prelude::*;
-use upbp_estimators::{LookUps, Technique};
+use upbp_estimators::{MergePeriods, Technique};
 
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
@@ -72,7 +72,7 @@ fn planned(paths: u32) -> Plan {
         connections: 1.0,
         next_events: 1.0,
         roulette: OF_PILOT,
-        look_ups: LookUps::ALL,
+        periods: MergePeriods::ONE,
         vertices_per_light_path: 1.0,
         radii,
     }
@@ -214,7 +214,7 @@ fn photons_vary_at_least_as_independent_ones_do() {
 #[test]
 fn variances_know_where_walks_end() {
     const ALBEDO: f32 = 0.3;
-    let reached = OF_PILOT.reach(ALBEDO);
+    let reached = OF_PILOT.survival(ALBEDO);
     let mut shares = [0.0; TECHNIQUES];
     shares[Technique::Hit as usize] = 1.0;
     let (mut samples, mut ends) = (Vec::new(), Vec::new());
@@ -233,7 +233,7 @@ fn variances_know_where_walks_end() {
     for roulette in 0..COUNT {
         let counts = Counts { roulette, ..counts([(Technique::Hit, 1.0)], 1.0) };
         let found: f64 = prediction.with(&counts).iter().sum();
-        let reach = f64::from(roulette::all()[roulette].reach(ALBEDO));
+        let reach = f64::from(roulette::all()[roulette].survival(ALBEDO));
         let squares = 1.0 + 1.0 / reach;
         let expected = (1.0 / reach - 1.0).max(LEAST_PART * squares) / (4.0 * (1.0 + DARKNESS));
         assert!((found / expected - 1.0).abs() < 0.1, "{roulette}: {found}, expected {expected}");
