@@ -69,7 +69,7 @@ pub struct IterationPlan {
     pub mis: MisPlan,
 }
 
-/// The free choices of a [`IterationPlan`].
+/// The free choices of an [`IterationPlan`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct IterationChoices {
     /// Seed of all random streams.

@@ -120,7 +120,7 @@ pub trait Observer<B> {
         let _ = vertex;
     }
 
-    /// The walk turns to a technique: to the tracing of one next event or connection, to one look-up. `None`:
+    /// The walk turns to a technique: to one next event, connection or photon query. `None`:
     /// it goes on.
     fn enter_technique(&mut self, technique: Option<Technique>) {
         let _ = technique;

@@ -1,9 +1,9 @@
 //! Periods of photon queries, in iterations.
 //!
-//! A look-up that brings little need not be made in every iteration: it is made in one of `m`, its
-//! contributions count `m` times, and in the weights of all iterations its number of samples is `n/m`. So the
-//! weights of a path sum to one for any `m`, and a technique that hardly pays but may be the only one for
-//! some paths stays, at a part of the cost of its look-ups and of what they need.
+//! Photon queries that bring little need not be made in every iteration: they are made in one of `m`, their
+//! contributions count `m` times, and in the weights of all iterations their number of samples is `n/m`. So
+//! the weights of a path sum to one for any `m`, and a technique that hardly pays but may be the only one for
+//! some paths stays, at a part of the cost of its queries and of what they need.
 
 use std::num::NonZeroU32;
 

@@ -123,9 +123,7 @@ impl PilotRender {
             thinning: [part(paths, plan.light_paths), part(beam_paths, plan.beam_paths)],
             work: Work::default(),
         };
-        let mut thinned = iteration_plan(scene, settings, plan, 0);
-        // Fewer light sub-paths, each of which counts for more; weights as in the plan.
-        (thinned.light_paths, thinned.beam_paths) = (paths, beam_paths);
+        let mut thinned = iteration_plan(scene, settings, plan, 0).thinned(paths, beam_paths);
         let room = Room::new(MOST_SAMPLES);
         let mut passes = (0..PASSES)
             .map(|pass| {
