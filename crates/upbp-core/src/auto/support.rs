@@ -56,13 +56,13 @@ impl TechniqueSupport {
     }
 
     /// Looks at the scene and at path lengths of up to `max_length` edges.
-    fn find<S: Scene>(world: &PreparedScene<'_, S>, chosen: TechniqueSet, max_length: u32) -> Self {
-        let scene = world.scene;
+    fn find<S: Scene>(prepared: &PreparedScene<'_, S>, chosen: TechniqueSet, max_length: u32) -> Self {
+        let scene = prepared.scene;
         let all_hittable = scene.emitters().iter().all(|emitter| emitter.kind().is_hittable());
         let mut support = Self {
             techniques: chosen,
             needs_merges: scene.has_specular_surfaces() && !all_hittable,
-            emitting_media: world.has_emitting_media(),
+            emitting_media: prepared.has_emitting_media(),
             reasons: Vec::new(),
         };
         let scattering = scene.media().iter().any(Medium::scatters);
@@ -81,16 +81,16 @@ impl TechniqueSupport {
                 );
             }
         }
-        if !world.has_emitters() && !world.has_emitting_media() {
+        if !prepared.has_emitters() && !prepared.has_emitting_media() {
             support.drop("nothing shines that reaches the scene", TechniqueSet::ALL);
-        } else if !world.has_emitters() {
+        } else if !prepared.has_emitters() {
             let emission_only = chosen.without(TechniqueSet::EMPTY.with(Technique::Hit));
             support.drop("no light but emitting media: only emission hits remain", emission_only);
         }
         let is_hit = |(index, emitter): (usize, &S::Emitter)| {
-            emitter.kind().is_hittable() && world.emission_probability(EmitterId(index as u32)) > 0.0
+            emitter.kind().is_hittable() && prepared.emission_probability(EmitterId(index as u32)) > 0.0
         };
-        if !world.has_emitting_media() && !scene.emitters().iter().enumerate().any(is_hit) {
+        if !prepared.has_emitting_media() && !scene.emitters().iter().enumerate().any(is_hit) {
             support
                 .drop("no light can be hit: emission hits are off", TechniqueSet::EMPTY.with(Technique::Hit));
         }

@@ -218,10 +218,8 @@ impl<B: Copy> EdgeTrace<B> {
         let medium = medium_of(scene, &self.start);
         let mut span = MediumSpan { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
-        for i in 1..=corrections {
-            if self.cross(scene, &mut span, &mut flight, i, stream) {
-                return None;
-            }
+        if (1..=corrections).any(|i| self.cross(scene, &mut span, &mut flight, i, stream)) {
+            return None;
         }
         let mut ray =
             Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.max_distance };
@@ -268,17 +266,14 @@ impl<B: Copy> EdgeTrace<B> {
                     return None;
                 }
             } else if flight.max_distance <= known {
-                if flight.max_distance == f32::INFINITY && !self.end.is_empty() {
-                    let correction = correction_of_escape(&self.end, &self.crossings);
-                    if correction.is_some() {
-                        return correction;
-                    }
+                let escapes = flight.max_distance == f32::INFINITY;
+                let correction = escapes.then(|| correction_of_escape(&self.end, &self.crossings)).flatten();
+                if correction.is_none() {
+                    self.close(scene, &mut span, &flight, f32::INFINITY);
                 }
-                self.close(scene, &mut span, &flight, f32::INFINITY);
-                return None;
+                return correction;
             } else {
-                // The walk goes on in a thinner medium. A boundary at the end of what is known is still to
-                // come.
+                // The medium has become thinner. A boundary at the end of what is known is still to come.
                 ray.t_min = known.next_down();
             }
             ray.t_max = flight.max_distance;
