@@ -129,7 +129,7 @@ impl Candidates {
     /// A plan with the techniques that may find light that the pilot render missed, if it has light
     /// sub-paths: in all iterations and with the widest radius where this costs little, since such light is
     /// bright in few photons, else in all with the radius at hand, else in some.
-    pub(super) fn with_safeguard(&self, plan: Plan, cost: &Cost<'_>) -> Plan {
+    pub(super) fn with_safeguard(&self, plan: Plan, cost: Cost<'_>) -> Plan {
         if !plan.uses_light_paths() {
             return plan;
         }

@@ -46,13 +46,13 @@ impl<'a> Cost<'a> {
     }
 
     /// Processor nanoseconds of the pilot render and of the search in it.
-    pub(super) fn of_pilot(&self) -> f64 {
+    pub(super) fn of_pilot(self) -> f64 {
         let part = (self.0.cells * self.0.passes) as f64 / self.0.pixels;
         RECORDING * part * self.iteration(&self.0.plan)
     }
 
     /// Processor nanoseconds of an iteration.
-    pub(super) fn iteration(&self, plan: &Plan) -> f64 {
+    pub(super) fn iteration(self, plan: &Plan) -> f64 {
         let work = &self.0.work;
         // The part of the iterations that run any of some techniques.
         let any = |techniques: TechniqueSet| {
@@ -83,7 +83,7 @@ impl<'a> Cost<'a> {
 
     /// Time of a call among the photons or beams of a plan over that among those of the pilot render's plan:
     /// by the depth of their tree.
-    fn depth(&self, technique: Technique, plan: &Plan) -> f64 {
+    fn depth(self, technique: Technique, plan: &Plan) -> f64 {
         let per_path = match technique {
             Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => return 1.0,
             Technique::Surf | Technique::Pp3d | Technique::Pb2d => self.0.work.vertices,

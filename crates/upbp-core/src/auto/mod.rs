@@ -89,21 +89,20 @@ pub(crate) fn choose<S: Scene>(
     let allowance = budget.part(TIME_FOR_STATISTICS);
     let statistics = statistics::measure(scene, settings, techniques, statistics::LIGHT_PATHS, &allowance)?;
     budget.step("choosing techniques", 0.5)?;
-    let plan = match given {
-        Some(plan) => room.fits::<S>(&plan, &statistics)?,
-        None => {
-            let full = full_plan::full_plan(scene, settings, techniques, &statistics, &room, budget);
-            if is_auto && full.uses_light_paths() {
-                let candidates = Candidates::new(scene, settings, &support, &statistics, full);
-                let plan = best_plan(scene, settings, &candidates, budget);
-                if !plan.uses_light_paths() {
-                    *scene = PreparedScene::new(scene.scene)?;
-                    emitters::choose(scene, settings, alone, budget)?;
-                }
-                plan
-            } else {
-                full
+    let plan = if let Some(plan) = given {
+        room.fits::<S>(&plan, &statistics)?
+    } else {
+        let full = full_plan::full_plan(scene, settings, techniques, &statistics, &room, budget);
+        if is_auto && full.uses_light_paths() {
+            let candidates = Candidates::new(scene, settings, &support, &statistics, full);
+            let plan = best_plan(scene, settings, &candidates, budget);
+            if !plan.uses_light_paths() {
+                *scene = PreparedScene::new(scene.scene)?;
+                emitters::choose(scene, settings, alone, budget)?;
             }
+            plan
+        } else {
+            full
         }
     };
     if budget.canceller.is_cancelled() {

@@ -47,7 +47,7 @@ pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let least = camera.or_better(paths).or_better(everything);
     let (gain, error) = least.gain_over(&camera);
     let best = if camera.plan.uses_light_paths() || !(gain <= error) { least } else { camera };
-    let plan = finished(candidates.with_safeguard(best.plan, &cost));
+    let plan = finished(candidates.with_safeguard(best.plan, cost));
     Found {
         plan,
         is_clear: !judge.known.iter().any(|other| other.may_beat(&best)),
