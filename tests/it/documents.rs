@@ -244,8 +244,12 @@ fn host<S: Scene>(my_scene: &S, my_window: &Window) -> Result<(), Box<dyn std::e
 }
 
 /// Whatever a host shows pictures with.
-struct Window;
+struct Window {
+    size: [u32; 2],
+}
 
 impl Window {
-    fn show(&self, _: &upbp_core::Image) {}
+    fn show(&self, image: &upbp_core::Image) {
+        assert_eq!([image.width, image.height], self.size);
+    }
 }

@@ -137,7 +137,7 @@ fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
         (0..=SEEDS).map(|seed| renderer(&scene, Settings { seed, ..settings() }).report().plan).collect();
     let render = |seed, plan: &Plan| {
         let settings = Settings { seed, ..settings() }.validate().expect("valid settings");
-        let mut renderer = scene.start_renderer(settings, by(plan.clone())).expect("a plan of this scene");
+        let mut renderer = scene.start_renderer(settings, by(*plan)).expect("a plan of this scene");
         for _ in 0..8 {
             assert!(renderer.iterate());
         }
@@ -157,7 +157,6 @@ fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
 #[test]
 fn a_frozen_plan_makes_the_same_iterations() {
     let scene = shipped("reference/mirror_fog");
-    // With measured time: what was chosen may not be chosen again.
     let measured = Settings { light_paths: LightPaths::Count(2000), ..Settings::default() };
     let mut first = renderer(&scene, measured.clone());
     for _ in 0..4 {
@@ -166,7 +165,7 @@ fn a_frozen_plan_makes_the_same_iterations() {
     let plan = Plan::from_ron(&first.state().identity().plan.to_ron()).expect("a plan");
     let checked = || measured.clone().validate().expect("valid settings");
     let part = |range: std::ops::Range<u64>| {
-        let mut renderer = scene.start_renderer(checked(), by(plan.clone())).expect("the plan fits");
+        let mut renderer = scene.start_renderer(checked(), by(plan)).expect("the plan fits");
         renderer.set_range(range);
         while renderer.iterate() {}
         renderer.state().clone()
