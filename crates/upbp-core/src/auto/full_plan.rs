@@ -17,11 +17,19 @@ use crate::settings::{CheckedSettings, LightPaths, Settings};
 /// The techniques with photon beams.
 pub(super) const BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Bp2d).with(Technique::Bb1d);
 
-/// The largest first radius of photon beams, relative to the scene's.
+/// The largest first radii, relative to the scene's.
+const LARGEST_SURF_RADIUS: f32 = 3e-3;
+const LARGEST_PP3D_RADIUS: f32 = 5e-3;
+const LARGEST_PB2D_RADIUS: f32 = 3e-3;
 const LARGEST_BEAM_RADIUS: f32 = 3e-3;
+/// The smallest first radii, relative to the largest.
+const SMALLEST: f32 = 0.1;
 /// Part of the render's time that the light sub-paths of an iteration may take: a quick look need not wait
 /// for a light sub-path per pixel.
 const LIGHT_TIME: f64 = 0.05;
+/// Photons within a kernel that more light sub-paths only repeat, while each of them costs time: where a
+/// kernel that is small for the scene holds all that is lit, an iteration would never end.
+const CROWD: f64 = 1024.0;
 
 /// A plan with all of `techniques`, and with as many light sub-paths as settings, memory and time allow.
 pub(super) fn full_plan<S: Scene>(
@@ -34,12 +42,17 @@ pub(super) fn full_plan<S: Scene>(
 ) -> Plan {
     let crop = scene.scene.camera().crop();
     let pixels = crop.width.saturating_mul(crop.height);
-    let wanted = match (settings.light_paths, budget.stop.seconds) {
-        (LightPaths::Count(count), _) => count,
-        (LightPaths::Auto, Some(seconds)) if statistics.light_path_seconds > 0.0 => {
-            ((LIGHT_TIME * seconds / statistics.light_path_seconds) as u32).clamp(1, pixels)
+    let wanted = match settings.light_paths {
+        LightPaths::Count(count) => count,
+        LightPaths::Auto => {
+            let in_time = budget
+                .stop
+                .seconds
+                .filter(|_| statistics.light_path_seconds > 0.0)
+                .map_or(f64::INFINITY, |seconds| LIGHT_TIME * seconds / statistics.light_path_seconds);
+            let most = in_time.min(crowding(scene, settings, techniques, statistics));
+            (most as u32).clamp(1, pixels)
         }
-        (LightPaths::Auto, _) => pixels,
     };
     let wanted_beams = settings
         .beams
@@ -72,6 +85,30 @@ pub(super) fn plan_with<S: Scene>(
         vertices_per_light_path: statistics.vertices_per_path,
         radii: first_radii(scene, settings, techniques, statistics, [light_paths, beam_paths]),
     }
+}
+
+/// Number of light sub-paths with which the smallest kernels that are chosen hold a [crowd](CROWD) of photon
+/// points; infinite without such kernels.
+fn crowding<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    techniques: TechniqueSet,
+    statistics: &Statistics,
+) -> f64 {
+    let size = scene.bounds.radius;
+    // No kernel holds more photons than there are.
+    let all = CROWD / statistics.vertices_per_path.max(1.0);
+    let merges = [
+        (Technique::Surf, settings.radii.surf, LARGEST_SURF_RADIUS, statistics.surf),
+        (Technique::Pp3d, settings.radii.pp3d, LARGEST_PP3D_RADIUS, statistics.pp3d),
+        (Technique::Pb2d, settings.radii.pb2d, LARGEST_PB2D_RADIUS, statistics.pb2d),
+    ];
+    let paths = merges.into_iter().filter_map(|(technique, radius, largest, found)| {
+        let is_chosen = techniques.has(technique) && matches!(radius, Radius::Auto);
+        let found = found.filter(|_| is_chosen)?;
+        Some(found.paths(CROWD, f64::from(SMALLEST * largest * size)).max(all))
+    });
+    paths.fold(f64::INFINITY, f64::min)
 }
 
 /// Light sub-paths with beams such that a query beam meets a few beams. More cost more than they tell: their
@@ -111,15 +148,15 @@ fn first_radii<S: Scene>(
             Radius::Scene(fraction) => fraction * size,
             Radius::Auto => found
                 .map_or(most * size, |n| n.radius(count, f64::from(paths)))
-                .clamp(0.1 * most * size, most * size),
+                .clamp(SMALLEST * most * size, most * size),
         }
     };
     let radii = &settings.radii;
     RadiusSchedule {
-        surf: radius(Technique::Surf, radii.surf, statistics.surf, 8.0, light_paths, 3e-3),
-        pp3d: radius(Technique::Pp3d, radii.pp3d, statistics.pp3d, 8.0, light_paths, 5e-3),
-        pb2d: radius(Technique::Pb2d, radii.pb2d, statistics.pb2d, 8.0, light_paths, 3e-3),
-        bp2d: radius(Technique::Bp2d, radii.bp2d, statistics.bp2d, 8.0, beam_paths, 3e-3),
+        surf: radius(Technique::Surf, radii.surf, statistics.surf, 8.0, light_paths, LARGEST_SURF_RADIUS),
+        pp3d: radius(Technique::Pp3d, radii.pp3d, statistics.pp3d, 8.0, light_paths, LARGEST_PP3D_RADIUS),
+        pb2d: radius(Technique::Pb2d, radii.pb2d, statistics.pb2d, 8.0, light_paths, LARGEST_PB2D_RADIUS),
+        bp2d: radius(Technique::Bp2d, radii.bp2d, statistics.bp2d, 8.0, beam_paths, LARGEST_BEAM_RADIUS),
         bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
         progressive: settings.progressive,
         // Positions have a relative precision of 6e-8.
