@@ -88,6 +88,27 @@ fn surface_photons_blur_what_a_pixel_blurs() {
     assert_eq!(first(Settings { radii, ..settings() }, 96), 0.01);
 }
 
+/// In a scene that is wide beside all that is lit, each kernel holds every photon there: a light sub-path per
+/// pixel would make an iteration quadratic in the number of pixels.
+#[test]
+fn kernels_that_hold_all_photons_get_few() {
+    let room = include_str!("../../data/room.ron");
+    let count = |width: f32| {
+        let wide = format!(
+            "(material: \"black\", geometry: Quad(origin: (5, 0, 0), edge_u: ({width}, 0, 0), edge_v: (0, 0, 1))),"
+        );
+        let (before, after) = room.rsplit_once("  ],\n)").expect("shapes at the end");
+        let text =
+            format!("{before}{wide}  ],\n{after})").replace("width: 24, height: 24", "width: 64, height: 64");
+        let scene = ReadyScene::from_ron_str(&text, ".").expect("a valid scene");
+        let plan =
+            renderer(&scene, Settings { techniques: Techniques::Set(TechniqueSet::ALL), ..settings() });
+        plan.report().plan.light_paths
+    };
+    assert_eq!(count(1.0), 64 * 64);
+    assert!((1..=1024).contains(&count(1e6)), "{}", count(1e6));
+}
+
 /// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.
 ///
 /// Kernels have a fifth of their usual width: at first they blur 0.2 % of the light out of the medium of one

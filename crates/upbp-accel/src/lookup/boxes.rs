@@ -83,9 +83,15 @@ impl Boxes for Rounded {
         let Some((low, high)) = boxes.iter().copied().reduce(union) else { return rounded };
         rounded.origin = low.to_array();
         // Divided first: the difference may be more than the greatest number.
-        rounded.step = (high / 255.0 - low / 255.0).max_element();
-        while (0..3).any(|axis| rounded.at(axis, u8::MAX) < high[axis]) {
-            rounded.step = rounded.step.next_up();
+        let least = (high / 255.0 - low / 255.0).max_element().abs();
+        // Far from the origin the last place is rounded by many of the step's last bits, so that their number
+        // doubles until the last place is far enough.
+        let steps = (0..32).map(|power| least.to_bits() + ((1 << power) - 1));
+        for step in steps.map(|bits| f32::from_bits(bits.min(f32::INFINITY.to_bits()))) {
+            rounded.step = step;
+            if (0..3).all(|axis| rounded.at(axis, u8::MAX) >= high[axis]) {
+                break;
+            }
         }
         run(Round { rounded: &mut rounded, boxes });
         rounded
@@ -172,6 +178,8 @@ mod tests {
             (1e-38, 0.0),
             (1e-3, 1e5),
             (1e-9, 1.0),
+            (6e-5, 2.0),
+            (6e-5, 1e3),
             (1e30, 1.0),
             (f32::MAX, 0.0),
         ] {
