@@ -120,7 +120,7 @@ fn series(
         let mut places: Vec<(Option<TechniqueSet>, usize)> = Vec::new();
         for set in sets {
             let settings = Settings { techniques: set.techniques, seed, ..settings.clone() };
-            let renderer = measure::prepare(subject, settings)?;
+            let renderer = measure::prepare(subject, settings, seconds)?;
             let fixed = (!set.is_auto()).then(|| renderer.support().techniques);
             let same = places.iter().find(|(other, _)| fixed.is_some() && *other == fixed);
             let place = same.map_or(renderers.len(), |(_, place)| *place);

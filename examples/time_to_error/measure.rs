@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use upbp_core::{ErrorPoint, Renderer, Settings};
+use upbp_core::{ErrorPoint, Renderer, Settings, Start, Stop};
 
 use crate::subject::Subject;
 
@@ -11,9 +11,14 @@ const SPACING: f64 = 1.1;
 /// Seconds of a turn.
 const TURN: f64 = 0.1;
 
-/// A render that has not begun: the census is taken, the pilot has run.
-pub(crate) fn prepare(subject: &Subject, settings: Settings) -> Result<Renderer<'_>, Box<dyn Error>> {
-    let renderer = subject.scene.renderer(settings.validate()?)?;
+/// A render that is prepared for a number of seconds and has not begun.
+pub(crate) fn prepare(
+    subject: &Subject,
+    settings: Settings,
+    seconds: f64,
+) -> Result<Renderer<'_>, Box<dyn Error>> {
+    let stop = Stop { seconds: Some(seconds), ..Stop::default() };
+    let renderer = subject.scene.start_renderer(settings.validate()?, Start { stop, ..Start::default() })?;
     let (rect, reference) = (renderer.film().rect(), &subject.reference);
     if (reference.width, reference.height) != (rect.width, rect.height) {
         return Err(format!(

@@ -3,9 +3,9 @@
 mod compare;
 mod exit;
 mod files;
-mod merge;
 #[cfg(test)]
-mod reference;
+mod help_page;
+mod merge;
 mod render;
 
 use std::process::ExitCode;

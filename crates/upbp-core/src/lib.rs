@@ -17,7 +17,7 @@ pub use glam;
 /// Participating media, phase functions, spectra.
 pub use upbp_media as media;
 
-pub use auto::support::TechniqueSupport;
+pub use auto::technique_support::TechniqueSupport;
 pub use budget::{Canceller, Preparing, Stop};
 pub use error::{OutputError, RenderError, SettingsError, StateError};
 pub use files::{
@@ -26,7 +26,7 @@ pub use files::{
 };
 pub use film::{Doubt, ErrorEstimate, ErrorMap, Film, HalfImage, Image, IterationSet, MAX_ITERATIONS, Pixel};
 pub use output::{Metadata, ToneCurve, ToneMapping, read_exr, write_exr, write_image, write_png};
-pub use plan::Plan;
+pub use plan::{FrozenPlan, Plan};
 pub use radius::{Radii, Radius, RadiusSchedule};
 pub use render::{Outcome, Progress, Renderer, Start, StopReason};
 pub use report::Report;
@@ -34,6 +34,6 @@ pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTec
 pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic};
 pub use upbp_estimators::{
-    BodyId, Counters, Interior, IterationPlan, Layer, MediumId, MediumStack, MergePeriods, Ray, Roulette,
-    Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
+    BodyId, Counters, EmitterChoice, Interior, IterationPlan, Layer, MediumId, MediumStack, MergePeriods,
+    Ray, Roulette, Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
 };

@@ -2,10 +2,11 @@
 
 use std::fmt;
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use upbp_estimators::{MergePeriods, Roulette, Technique, TechniqueSet};
+use upbp_estimators::{EmitterChoice, MergePeriods, Roulette, Technique, TechniqueSet};
 
 use crate::radius::RadiusSchedule;
 
@@ -40,22 +41,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Reads a plan from RON text, as [`to_ron`](Self::to_ron) writes it.
-    ///
-    /// # Errors
-    /// Line, column and reason of what is not understood or cannot be.
-    pub fn from_ron(text: &str) -> Result<Self, ron::error::SpannedError> {
-        ron::from_str(text)
-    }
-
-    /// The plan as RON text, which begins with `Plan(`.
-    #[must_use]
-    pub fn to_ron(&self) -> String {
-        // Numbers and names: there is nothing that RON cannot spell.
-        let fields = ron::ser::to_string_pretty(self, ron::ser::PrettyConfig::default()).unwrap_or_default();
-        format!("Plan{fields}")
-    }
-
     /// Whether any technique uses light sub-paths.
     pub(crate) fn uses_light_paths(&self) -> bool {
         !self.techniques.without(TechniqueSet::PT).is_empty()
@@ -101,6 +86,34 @@ impl Plan {
         } else {
             Ok(())
         }
+    }
+}
+
+/// A plan with the emitters that its sub-paths begin at: all that is decided before the first iteration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrozenPlan {
+    /// Techniques, sample counts and radii.
+    pub plan: Plan,
+    /// How often sub-paths begin at each emitter of the scene.
+    pub emitters: Arc<EmitterChoice>,
+}
+
+impl FrozenPlan {
+    /// Reads a plan from RON text, as [`to_ron`](Self::to_ron) writes it.
+    ///
+    /// # Errors
+    /// Line, column and reason of what is not understood or cannot be.
+    pub fn from_ron(text: &str) -> Result<Self, ron::error::SpannedError> {
+        ron::from_str(text)
+    }
+
+    /// The plan as RON text, which begins with `FrozenPlan(`.
+    #[must_use]
+    pub fn to_ron(&self) -> String {
+        let pretty = ron::ser::PrettyConfig::default().compact_arrays(true);
+        // Numbers and names: there is nothing that RON cannot spell.
+        format!("FrozenPlan{}", ron::ser::to_string_pretty(self, pretty).unwrap_or_default())
     }
 }
 
@@ -175,7 +188,10 @@ mod tests {
 
     #[test]
     fn a_plan_survives_its_spelling() {
-        assert_eq!(Plan::from_ron(&plan().to_ron()), Ok(plan()));
+        let frozen = FrozenPlan { plan: plan(), emitters: Arc::default() };
+        let text = frozen.to_ron();
+        assert!(text.starts_with("FrozenPlan("), "{text}");
+        assert_eq!(FrozenPlan::from_ron(&text), Ok(frozen));
         assert_eq!(
             plan().to_string(),
             "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, surf in one of 4 iterations"
@@ -187,7 +203,8 @@ mod tests {
         let wrong = |change: fn(&mut Plan)| {
             let mut plan = plan();
             change(&mut plan);
-            Plan::from_ron(&plan.to_ron()).unwrap_err().to_string()
+            let frozen = FrozenPlan { plan, emitters: Arc::default() };
+            FrozenPlan::from_ron(&frozen.to_ron()).unwrap_err().to_string()
         };
         assert!(wrong(|p| p.roulette = Roulette::Below(0.0)).contains("roulette"));
         assert!(wrong(|p| p.light_paths = 0).contains("light_paths"));
@@ -198,6 +215,6 @@ mod tests {
         assert!(without.validate().unwrap_err().contains("techniques"));
         assert!(wrong(|p| p.next_events = 5000.0).contains("next_events"));
         assert!(wrong(|p| p.vertices_per_light_path = f64::INFINITY).contains("vertices"));
-        assert!(Plan::from_ron("(techniques: \"pt\", from: 0)").is_err());
+        assert!(FrozenPlan::from_ron("(plan: (techniques: \"pt\", from: 0))").is_err());
     }
 }

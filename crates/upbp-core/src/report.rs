@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use upbp_estimators::{Counters, Technique};
 
-use crate::auto::support::TechniqueSupport;
+use crate::auto::technique_support::TechniqueSupport;
 use crate::film::{ErrorEstimate, IterationSet};
 use crate::plan::Plan;
 use crate::state::{ErrorSeries, PassSeconds, State};

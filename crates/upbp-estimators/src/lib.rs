@@ -2,6 +2,8 @@
 
 pub mod check;
 mod counters;
+mod emission_guide;
+mod emitter_choice;
 mod film_sample;
 mod iteration;
 mod kernel;
@@ -19,12 +21,14 @@ mod techniques;
 pub mod trace;
 
 pub use counters::Counters;
+pub use emission_guide::{EmissionGuide, EmissionSample};
+pub use emitter_choice::{EmitterChoice, EmitterShares};
 pub use film_sample::CameraWalk;
 pub use iteration::{IterationChoices, IterationPlan, Kernels, PathLengths};
 pub use kernel::Kernel;
 pub use light_map::LightMap;
 pub use periods::MergePeriods;
-pub use prepared::{EmitterShares, PrepareError, PreparedScene};
+pub use prepared::{PrepareError, PreparedScene};
 pub use random::{Stream, StreamKind, half};
 pub use roulette::{Roulette, Survival};
 pub use technique::{Layer, PerMerge, Technique, TechniqueSet, UnknownTechnique};

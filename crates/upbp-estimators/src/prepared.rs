@@ -1,8 +1,12 @@
 //! A scene made ready for the walks: emitters with their probabilities, bounds, the bodies around the camera.
 
+use std::sync::Arc;
+
 use upbp_media::{Medium, MediumStack, RaySegment, SegmentDensity};
 
-use crate::scene::{BoundingSphere, Camera, Emitter, EmitterId, EmitterKind, Scene};
+use crate::emission_guide::EmissionGuide;
+use crate::emitter_choice::{EmitterChoice, EmitterShares, Selection};
+use crate::scene::{BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, Scene};
 
 /// A [`Scene`] with all that is derived from it once.
 pub struct PreparedScene<'a, S: Scene> {
@@ -12,8 +16,7 @@ pub struct PreparedScene<'a, S: Scene> {
     pub bounds: BoundingSphere,
     /// By power.
     power: Selection,
-    emission: Selection,
-    next_event: Selection,
+    choice: Arc<EmitterChoice>,
     environments: Vec<EmitterId>,
     passes_from_infinity: f64,
     camera_stack: Option<MediumStack>,
@@ -83,13 +86,16 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         let dense = |medium: &S::Medium| !(medium.mean_free_path() > DENSE * bounds.radius);
         let dense_media = scene.media().iter().any(|medium| medium.scatters() && dense(medium));
         let power = Selection::new(&powers);
-        let (emission, next_event) = (power.clone(), power.clone());
+        let choice = Arc::new(EmitterChoice {
+            emission: power.clone(),
+            next_event: power.clone(),
+            guides: Vec::new(),
+        });
         Ok(Self {
             scene,
             bounds,
             power,
-            emission,
-            next_event,
+            choice,
             environments,
             passes_from_infinity: from_infinity.pass_probability,
             camera_stack,
@@ -104,32 +110,117 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     ///
     /// Power keeps a share, so that no emitter is lost that was not seen.
     pub fn choose_emitters_by(&mut self, emission: &EmitterShares, next_event: &EmitterShares) {
-        self.emission = self.power.blend(emission);
-        self.next_event = self.power.blend(next_event);
+        let [emission, next_event] = [emission, next_event].map(|shares| self.power.blend(shares));
+        let guides = self.choice.guides.clone();
+        self.choice = Arc::new(EmitterChoice { emission, next_event, guides });
+    }
+
+    /// Starts the light sub-paths of some emitters by guides; those that are left out go by themselves. The
+    /// guides must not depend on samples that they serve.
+    ///
+    /// # Panics
+    /// If there are more guides than emitters.
+    pub fn guide_emission(&mut self, guides: Vec<Option<EmissionGuide>>) {
+        assert!(guides.len() <= self.scene.emitters().len(), "a guide per emitter");
+        let guides = if guides.iter().all(Option::is_none) { Vec::new() } else { guides };
+        self.choice = Arc::new(EmitterChoice { guides, ..EmitterChoice::clone(&self.choice) });
+    }
+
+    /// The choice of emitters, for a plan.
+    #[must_use]
+    pub const fn emitter_choice(&self) -> &Arc<EmitterChoice> {
+        &self.choice
+    }
+
+    /// Chooses emitters as a plan says.
+    ///
+    /// # Errors
+    /// [`PrepareError::EmitterChoice`], if it is of other emitters.
+    pub fn set_emitter_choice(&mut self, choice: &Arc<EmitterChoice>) -> Result<(), PrepareError> {
+        let is_of_these =
+            [&choice.emission, &choice.next_event].iter().all(|selection| selection.fits(&self.power));
+        let guides = &choice.guides;
+        let can_be_followed = guides.len() <= self.scene.emitters().len()
+            && guides.iter().flatten().all(EmissionGuide::is_valid);
+        if !(is_of_these && can_be_followed) {
+            return Err(PrepareError::EmitterChoice { emitters: self.scene.emitters().len() });
+        }
+        self.choice = choice.clone();
+        Ok(())
     }
 
     /// Chooses the emitter of a light sub-path; returns its probability. `None` without light.
     #[must_use]
     pub fn choose_emission(&self, u: f32) -> Option<(EmitterId, f32)> {
-        self.emission.choose(u)
+        self.choice.emission.choose(u)
     }
 
     /// The probability of [`choose_emission`](Self::choose_emission); 0 if the emitter does not exist.
     #[must_use]
     pub fn emission_probability(&self, emitter: EmitterId) -> f32 {
-        self.emission.probability(emitter)
+        self.choice.emission.probability(emitter)
+    }
+
+    /// Starts a light sub-path at an emitter, guided if there is a guide; densities are of the guided start.
+    #[must_use]
+    pub fn sample_emission(
+        &self,
+        emitter: EmitterId,
+        [u_position, u_direction]: [[f32; 2]; 2],
+    ) -> Option<Emission> {
+        let light = &self.scene.emitters()[emitter.0 as usize];
+        let Some(guide) = self.choice.guide(emitter) else {
+            return light.sample_emission(&self.bounds, u_position, u_direction);
+        };
+        let ([a, b, c, d], factor) =
+            guide.warp([u_position[0], u_position[1], u_direction[0], u_direction[1]]);
+        let emission = light.sample_emission(&self.bounds, [a, b], [c, d])?;
+        Some(Emission { pdf_direction: emission.pdf_direction * factor, ..emission })
+    }
+
+    /// The density of light sub-paths that leave `point` of an emitter in `direction` and pass `on_ray`,
+    /// relative to the density of the emitter's own distribution: 1 without a [guide](EmissionGuide).
+    #[must_use]
+    pub fn emission_factor(
+        &self,
+        emitter: EmitterId,
+        point: &EmitterPoint,
+        direction: glam::Vec3,
+        on_ray: glam::Vec3,
+    ) -> f32 {
+        let Some(guide) = self.choice.guide(emitter) else { return 1.0 };
+        // What cannot be started at all is only compared with itself: any factor will do.
+        self.emission_coordinates(emitter, point, direction, on_ray).map_or(1.0, |(at, _)| guide.density(at))
+    }
+
+    /// The random numbers of a start ([`Emitter::emission_coordinates`]), and which of them are known.
+    #[must_use]
+    pub fn emission_coordinates(
+        &self,
+        emitter: EmitterId,
+        point: &EmitterPoint,
+        direction: glam::Vec3,
+        on_ray: glam::Vec3,
+    ) -> Option<([f32; 4], [bool; 4])> {
+        let light = self.scene.emitters().get(emitter.0 as usize)?;
+        let found = light.emission_coordinates(&self.bounds, point, direction, on_ray)?;
+        let [a, b] = found.position.unwrap_or([0.5; 2]);
+        let [c, d] = found.direction.unwrap_or([0.5; 2]);
+        let [position, direction] = [found.position.is_some(), found.direction.is_some()];
+        let at = [a, b, c, d].map(|x| x.clamp(0.0, 1.0 - f32::EPSILON / 2.0));
+        (!at.iter().any(|x| x.is_nan())).then_some((at, [position, position, direction, direction]))
     }
 
     /// Chooses the emitter of a next event; returns its probability. `None` without light.
     #[must_use]
     pub fn choose_next_event(&self, u: f32) -> Option<(EmitterId, f32)> {
-        self.next_event.choose(u)
+        self.choice.next_event.choose(u)
     }
 
     /// The probability of [`choose_next_event`](Self::choose_next_event); 0 if the emitter does not exist.
     #[must_use]
     pub fn next_event_probability(&self, emitter: EmitterId) -> f32 {
-        self.next_event.probability(emitter)
+        self.choice.next_event.probability(emitter)
     }
 
     /// The emitters that every escaping ray hits.
@@ -175,97 +266,6 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 /// boundary, one in ten thousand is within rounding of it.
 const DENSE: f32 = 1e-3;
 
-/// Light that each emitter was seen to bring, as [`PreparedScene::choose_emitters_by`] takes it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct EmitterShares {
-    /// Light by emitter, in any unit; emitters that are left out bring nothing.
-    pub light: Vec<f64>,
-    /// Samples that this was measured with.
-    pub samples: f64,
-}
-
-/// Power keeps at least this share of a choice.
-const POWER_SHARE: f64 = 0.1;
-
-/// Samples per emitter from which on a measured share counts more than power.
-const TELLING_SAMPLES: f64 = 16.0;
-
-/// Random numbers are multiples of 2⁻²⁴.
-const STEPS: u32 = 1 << 24;
-
-/// No light gets less than this part of an even share: it may be all that some corner of the scene sees.
-const LEAST_OF_EVEN_SHARE: f64 = 0.01;
-
-/// A discrete distribution over emitters.
-#[derive(Clone, Debug)]
-struct Selection {
-    /// Running sums of the probabilities, in units of the random numbers: what is chosen with these has
-    /// exactly the probability that it is said to have, and whatever shines is chosen at all.
-    cumulative: Vec<u32>,
-}
-
-impl Selection {
-    fn new(powers: &[f64]) -> Self {
-        let total: f64 = powers.iter().sum();
-        let mut waiting = powers.iter().filter(|power| **power > 0.0).count();
-        let least = LEAST_OF_EVEN_SHARE / waiting as f64;
-        let share = |power: f64| if power > 0.0 { (power / total).max(least) } else { 0.0 };
-        let shares: f64 = powers.iter().copied().map(share).sum();
-        let (mut sum, mut end) = (0.0, 0_u32);
-        let cumulative = powers
-            .iter()
-            .map(|&power| {
-                if power > 0.0 {
-                    sum += share(power);
-                    waiting -= 1;
-                    let last = STEPS.saturating_sub(waiting as u32);
-                    let next = ((sum / shares * f64::from(STEPS)).round() as u32).max(end + 1);
-                    end = if waiting == 0 { STEPS } else { next.min(last) };
-                }
-                end
-            })
-            .collect();
-        Self { cumulative }
-    }
-
-    fn is_empty(&self) -> bool {
-        self.cumulative.last().is_none_or(|&end| end == 0)
-    }
-
-    /// This distribution with a part that follows `shares`, the larger the more samples they stand on.
-    fn blend(&self, shares: &EmitterShares) -> Self {
-        let count = self.cumulative.len();
-        let power = |i: usize| f64::from(self.probability(EmitterId(i as u32)));
-        let light = |i: usize| match shares.light.get(i) {
-            Some(&light) if light > 0.0 && power(i) > 0.0 => light,
-            _ => 0.0,
-        };
-        let sum: f64 = (0..count).map(light).sum();
-        if !(sum > 0.0 && sum.is_finite()) {
-            return self.clone();
-        }
-        let evidence = shares.samples / TELLING_SAMPLES;
-        let trust = (1.0 - POWER_SHARE) * evidence / (evidence + count as f64);
-        let weights: Vec<f64> =
-            (0..count).map(|i| trust * light(i) / sum + (1.0 - trust) * power(i)).collect();
-        Self::new(&weights)
-    }
-
-    fn choose(&self, u: f32) -> Option<(EmitterId, f32)> {
-        let target = (u * STEPS as f32) as u32;
-        let index = self.cumulative.partition_point(|&end| end <= target);
-        let emitter = EmitterId(u32::try_from(index).ok()?);
-        (index < self.cumulative.len()).then(|| (emitter, self.probability(emitter)))
-    }
-
-    fn probability(&self, emitter: EmitterId) -> f32 {
-        let index = emitter.0 as usize;
-        let Some(&end) = self.cumulative.get(index) else { return 0.0 };
-        let start = if index == 0 { 0 } else { self.cumulative[index - 1] };
-        end.saturating_sub(start) as f32 / STEPS as f32
-    }
-}
-
 /// A fault of a scene as a whole.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -288,6 +288,14 @@ pub enum PrepareError {
         /// Its power.
         power: f32,
     },
+    /// The choice of emitters that a plan makes.
+    #[error(
+        "plan: expected a choice among the {emitters} emitters of this scene that leaves out none that shines"
+    )]
+    EmitterChoice {
+        /// Number of emitters.
+        emitters: usize,
+    },
     /// Crop of the camera.
     #[error("crop: expected a non-empty part of the film of {width} x {height} pixels")]
     Crop {
@@ -304,64 +312,4 @@ pub enum PrepareError {
         /// The number of media.
         media: usize,
     },
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn emitters_are_chosen_in_proportion_and_dark_ones_never() {
-        let selection = Selection::new(&[0.0, 1.0, 0.0, 3.0, 0.0]);
-        assert_eq!(selection.choose(0.0), Some((EmitterId(1), 0.25)));
-        assert_eq!(selection.choose(0.249), Some((EmitterId(1), 0.25)));
-        assert_eq!(selection.choose(0.25), Some((EmitterId(3), 0.75)));
-        assert_eq!(selection.choose(1.0 - f32::EPSILON / 2.0), Some((EmitterId(3), 0.75)));
-        assert_eq!(Selection::new(&[]).choose(0.5), None);
-        assert_eq!(Selection::new(&[0.0]).choose(0.5), None);
-        assert_eq!(selection.probability(EmitterId(9)), 0.0);
-    }
-
-    #[test]
-    fn shares_move_the_choice_and_power_keeps_a_floor() {
-        let power = Selection::new(&[0.0, 1.0, 0.0, 3.0]);
-        let seen = |light: &[f64], samples| EmitterShares { light: light.to_vec(), samples };
-        let probabilities = |shares| {
-            let blend = power.blend(&shares);
-            [0, 1, 2, 3].map(|i| blend.probability(EmitterId(i)))
-        };
-        // All the light comes from the weaker one, and there is no doubt about it. What is dark stays out.
-        let [dark, weak, _, strong] = probabilities(seen(&[5.0, 2.0, 0.0, 0.0], 1e9));
-        assert_eq!(dark, 0.0);
-        assert!((weak - 0.925).abs() < 1e-6 && (strong - 0.075).abs() < 1e-6, "{weak}, {strong}");
-        // Nothing seen, or nothing that is a number: power decides.
-        for shares in [seen(&[], 1e9), seen(&[0.0; 4], 1e9), seen(&[0.0, f64::NAN, 0.0, f64::INFINITY], 1.0)]
-        {
-            assert_eq!(probabilities(shares), [0.0, 0.25, 0.0, 0.75]);
-        }
-        // A few samples say little.
-        let [_, weak, ..] = probabilities(seen(&[0.0, 1.0], 4.0));
-        assert!((0.25..0.35).contains(&weak), "{weak}");
-    }
-
-    #[test]
-    fn probabilities_are_exact_whatever_the_ratio_of_powers() {
-        let many = vec![1e-3; 100_000];
-        for powers in [&[1.0, 1e-12][..], &[1e-12, 1.0], &[1e-30, 0.0, 1e30, 1e-30], &[5.0, 1e12, 3.0], &many]
-        {
-            let selection = Selection::new(powers);
-            let mut counts = vec![0_u32; powers.len()];
-            for step in 0..STEPS {
-                let (emitter, _) = selection.choose(step as f32 / STEPS as f32).unwrap();
-                counts[emitter.0 as usize] += 1;
-            }
-            for (i, (&power, &count)) in powers.iter().zip(&counts).enumerate() {
-                assert_eq!(power > 0.0, count > 0, "{i}");
-                let probability = selection.probability(EmitterId(i as u32));
-                assert_eq!(probability, count as f32 / STEPS as f32, "{i}");
-            }
-        }
-        // The strong one gets what its power is worth.
-        assert!(Selection::new(&[1.0, 1e-12]).probability(EmitterId(0)) > 0.99);
-    }
 }

@@ -23,11 +23,57 @@ pub(crate) fn disc(u: [f32; 2]) -> Vec2 {
     radius * Vec2::from_angle(phi)
 }
 
+/// The pair of numbers with which [`disc`] gives a point; `None` outside of the disc.
+pub(crate) fn disc_inverse(point: Vec2) -> Option<[f32; 2]> {
+    let radius = point.length();
+    if radius == 0.0 {
+        return Some([0.5; 2]);
+    }
+    let offset = if point.x.abs() > point.y.abs() {
+        let x = radius.copysign(point.x);
+        Vec2::new(x, x * (point.y / point.x).atan() / FRAC_PI_4)
+    } else {
+        let y = radius.copysign(point.y);
+        Vec2::new(y * (point.x / point.y).atan() / FRAC_PI_4, y)
+    };
+    (radius <= 1.0).then(|| (0.5 * (offset + Vec2::ONE)).to_array())
+}
+
 /// A direction of the hemisphere around +z with density `cos θ / π`.
 pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let p = disc(u);
     // On the rim the height would vanish, and with it the density that others divide by.
     Vec3::new(p.x, p.y, (1.0 - p.length_squared()).max(1e-10).sqrt()).normalize()
+}
+
+/// The pair of numbers with which [`cosine_hemisphere`] gives a direction; `None` below the hemisphere.
+pub(crate) fn cosine_hemisphere_inverse(direction: Vec3) -> Option<[f32; 2]> {
+    (direction.z > 0.0).then(|| disc_inverse(direction.truncate().clamp_length_max(1.0))).flatten()
+}
+
+/// The pair of numbers with which [`sphere`] gives a direction.
+pub(crate) fn sphere_inverse(direction: Vec3) -> [f32; 2] {
+    cone_local_inverse(2.0, direction)
+}
+
+/// The pair of numbers with which [`cone`] gives a direction; the first is above 1 outside of the cone.
+pub(crate) fn cone_inverse(axis: Vec3, height: f32, direction: Vec3) -> [f32; 2] {
+    cone_local_inverse(height, to_local(axis, direction))
+}
+
+fn cone_local_inverse(height: f32, direction: Vec3) -> [f32; 2] {
+    let below_pole = if direction.z > 0.0 {
+        direction.truncate().length_squared() / (1.0 + direction.z)
+    } else {
+        1.0 - direction.z
+    };
+    [below_pole / height, (direction.y.atan2(direction.x) / TAU).rem_euclid(1.0)]
+}
+
+/// Turns a direction of the world into one of the frame in which `axis` is z.
+pub(crate) fn to_local(axis: Vec3, direction: Vec3) -> Vec3 {
+    let (tangent, bitangent) = orthonormal_basis(axis);
+    Vec3::new(direction.dot(tangent), direction.dot(bitangent), direction.dot(axis))
 }
 
 /// A direction, uniform over the sphere: density `1 / 4π`.

@@ -244,6 +244,17 @@ impl Trace {
         starts.zip(self.interior.iter().map(|v| v.light).chain([lens])).collect()
     }
 
+    /// The density of the start by the guide of its light, relative to the light's own.
+    fn guided(&self, scene: &ClosedForm, start: DVec3, outwards: DVec3, receiver: DVec3) -> f64 {
+        let light = self.light.emitter.0 as usize;
+        let Some(Some(guide)) = scene.guides.get(light) else { return 1.0 };
+        let pairs = scene.lights[light].source.coordinates(&scene.bounds(), start, outwards, receiver);
+        pairs.map_or(1.0, |pairs| {
+            let [[a, b], [c, d]] = pairs.map(|pair| pair.unwrap_or([0.5; 2]));
+            f64::from(guide.density([a, b, c, d].map(|u| (u as f32).clamp(0.0, 1.0 - f32::EPSILON / 2.0))))
+        })
+    }
+
     /// All densities of the path.
     pub(crate) fn rebuild(&self, scene: &ClosedForm, roulette: Roulette) -> Result<Path, Doubt> {
         let k = self.length();
@@ -270,6 +281,7 @@ impl Trace {
             _ => 1.0,
         };
         let [pdf_position, pdf_direction] = light.source.pdf_emission(&scene.bounds(), cos);
+        let pdf_direction = pdf_direction * self.guided(scene, start, outwards, receiver);
         let end = PathVertex {
             kind: VertexKind::End,
             rho_light: pdf_direction,

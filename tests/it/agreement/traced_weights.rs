@@ -9,11 +9,11 @@ use upbp_estimators::mis::oracle::{Path, Strategy};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, EdgeTrace, Extent, Interaction, LightChunk, Scratch};
-use upbp_estimators::scene::Scene;
+use upbp_estimators::scene::{EmitterId, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
-    PreparedScene, Roulette, Stream, StreamKind, Technique, TechniqueSet,
+    Counters, EmissionGuide, EmissionSample, IterationChoices, IterationPlan, Kernel, Kernels, LightMap,
+    MergePeriods, PathLengths, PreparedScene, Roulette, Stream, StreamKind, Technique, TechniqueSet,
 };
 
 use super::rebuild::{Trace, Vertex};
@@ -235,11 +235,16 @@ const CAMERAS: [Vec3; 2] = [Vec3::new(0.2, 0.3, 3.0), Vec3::new(0.1, 0.4, 1.0)];
 
 /// Renders once and compares; every technique that runs has at least `at_least` weights to compare.
 fn audit(name: &str, camera: Vec3, size: u32, choices: &IterationChoices, at_least: usize) {
-    let scene = ClosedForm::new(camera, size);
-    let world = PreparedScene::new(&scene).expect("the scene is in order");
-    let plan = IterationPlan::new(&scene, choices);
+    audit_scene(name, &ClosedForm::new(camera, size), choices, at_least);
+}
+
+fn audit_scene(name: &str, scene: &ClosedForm, choices: &IterationChoices, at_least: usize) {
+    let size = scene.camera.size;
+    let mut world = PreparedScene::new(scene).expect("the scene is in order");
+    world.guide_emission(scene.guides.clone());
+    let plan = IterationPlan::new(scene, choices);
     let context = Context { prepared: &world, plan: &plan };
-    let mut auditor = Auditor::new(&scene, &plan);
+    let mut auditor = Auditor::new(scene, &plan);
     let mut scratch = Scratch::default();
     let mut chunk = LightChunk::default();
     for index in 0..plan.light_paths {
@@ -307,6 +312,38 @@ fn all_techniques_with_the_balance_heuristic() {
     for (i, camera) in CAMERAS.into_iter().enumerate() {
         let choices = IterationChoices { light_paths: 24_000, beam_paths: 1000, ..choices() };
         audit(&format!("all techniques, camera {i}"), camera, 96, &choices, 3000);
+    }
+}
+
+/// A guide for every light, to uneven light over the random numbers that it tells.
+fn guides(scene: &ClosedForm) -> Vec<Option<EmissionGuide>> {
+    let world = PreparedScene::new(scene).expect("the scene is in order");
+    let guide = |light: u32| {
+        let mut stream = Stream::new(3, 0, StreamKind::Light, u64::from(light));
+        let mut axes = [false; 4];
+        let samples: Vec<_> = (0..4096)
+            .filter_map(|_| {
+                let start = world.sample_emission(EmitterId(light), [stream.pair(), stream.pair()])?;
+                let (point, direction) = (start.point, start.direction);
+                let at = world.emission_coordinates(EmitterId(light), &point, direction, point.position)?;
+                axes = at.1;
+                let light = at.0.iter().map(|u| (1.0 + (4.0 * u).sin()).powi(4)).product::<f32>();
+                Some(EmissionSample { at: at.0, light: f64::from(light) })
+            })
+            .collect();
+        EmissionGuide::fit(&samples, axes)
+    };
+    (0..scene.lights.len() as u32).map(guide).collect()
+}
+
+#[test]
+fn guided_light_sub_paths() {
+    for camera in CAMERAS {
+        let mut scene = ClosedForm::new(camera, 64);
+        scene.guides = guides(&scene);
+        assert!(scene.guides.iter().all(Option::is_some), "every light is guided");
+        let choices = IterationChoices { light_paths: 12_000, beam_paths: 1000, ..choices() };
+        audit_scene("guided light sub-paths", &scene, &choices, 1000);
     }
 }
 

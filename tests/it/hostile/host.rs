@@ -609,7 +609,7 @@ fn a_render_that_is_resumed_does_not_choose_again() {
 
     let again = Hostile::new(F::None);
     let settings = Settings { deterministic: true, max_length: 20, ..Settings::default() };
-    let start = Start { plan: Some(state.identity().plan), ..Start::default() };
+    let start = Start { plan: Some(state.identity().frozen_plan()), ..Start::default() };
     let mut resumed =
         Renderer::start(&again, settings.validate().expect("good settings"), start).expect("a good scene");
     let rays = again.rays.load(Ordering::Relaxed);

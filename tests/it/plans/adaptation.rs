@@ -3,7 +3,9 @@
 
 use std::path::Path;
 
-use upbp_core::{LightPaths, Plan, Radii, Radius, Settings, Start, Stop, TechniqueSet, Techniques, read_exr};
+use upbp_core::{
+    FrozenPlan, LightPaths, Radii, Radius, Settings, Start, Stop, TechniqueSet, Techniques, read_exr,
+};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::{Count, Film};
 use upbp_testing::{Estimate, assert_same, channels, renderer};
@@ -12,8 +14,13 @@ fn settings() -> Settings {
     Settings { deterministic: true, ..Settings::default() }
 }
 
+/// The plan that a render chooses.
+fn frozen(scene: &ReadyScene, settings: Settings) -> FrozenPlan {
+    renderer(scene, settings).state().identity().frozen_plan()
+}
+
 /// By a plan that is given.
-fn by(plan: Plan) -> Start<'static> {
+fn by(plan: FrozenPlan) -> Start<'static> {
     Start { plan: Some(plan), ..Start::default() }
 }
 
@@ -88,27 +95,6 @@ fn surface_photons_blur_what_a_pixel_blurs() {
     assert_eq!(first(Settings { radii, ..settings() }, 96), 0.01);
 }
 
-/// In a scene that is wide beside all that is lit, each kernel holds every photon there: a light sub-path per
-/// pixel would make an iteration quadratic in the number of pixels.
-#[test]
-fn kernels_that_hold_all_photons_get_few() {
-    let room = include_str!("../../data/room.ron");
-    let count = |width: f32| {
-        let wide = format!(
-            "(material: \"black\", geometry: Quad(origin: (5, 0, 0), edge_u: ({width}, 0, 0), edge_v: (0, 0, 1))),"
-        );
-        let (before, after) = room.rsplit_once("  ],\n)").expect("shapes at the end");
-        let text =
-            format!("{before}{wide}  ],\n{after})").replace("width: 24, height: 24", "width: 64, height: 64");
-        let scene = ReadyScene::from_ron_str(&text, ".").expect("a valid scene");
-        let plan =
-            renderer(&scene, Settings { techniques: Techniques::Set(TechniqueSet::ALL), ..settings() });
-        plan.report().plan.light_paths
-    };
-    assert_eq!(count(1.0), 64 * 64);
-    assert!((1..=1024).contains(&count(1e6)), "{}", count(1e6));
-}
-
 /// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.
 ///
 /// Kernels have a fifth of their usual width: at first they blur 0.2 % of the light out of the medium of one
@@ -154,11 +140,11 @@ fn no_bias_in_a_forward_scattering_box() {
 fn a_plan_knows_nothing_of_the_samples_that_it_serves() {
     const SEEDS: u64 = 16;
     let scene = shipped("reference/forward_hg_box");
-    let plans: Vec<Plan> =
-        (0..=SEEDS).map(|seed| renderer(&scene, Settings { seed, ..settings() }).report().plan).collect();
-    let render = |seed, plan: &Plan| {
+    let plans: Vec<FrozenPlan> =
+        (0..=SEEDS).map(|seed| frozen(&scene, Settings { seed, ..settings() })).collect();
+    let render = |seed, plan: &FrozenPlan| {
         let settings = Settings { seed, ..settings() }.validate().expect("valid settings");
-        let mut renderer = scene.start_renderer(settings, by(*plan)).expect("a plan of this scene");
+        let mut renderer = scene.start_renderer(settings, by(plan.clone())).expect("a plan of this scene");
         for _ in 0..8 {
             assert!(renderer.iterate());
         }
@@ -183,10 +169,10 @@ fn a_frozen_plan_makes_the_same_iterations() {
     for _ in 0..4 {
         assert!(first.iterate());
     }
-    let plan = Plan::from_ron(&first.state().identity().plan.to_ron()).expect("a plan");
+    let plan = FrozenPlan::from_ron(&first.state().identity().frozen_plan().to_ron()).expect("a plan");
     let checked = || measured.clone().validate().expect("valid settings");
     let part = |range: std::ops::Range<u64>| {
-        let mut renderer = scene.start_renderer(checked(), by(plan)).expect("the plan fits");
+        let mut renderer = scene.start_renderer(checked(), by(plan.clone())).expect("the plan fits");
         renderer.set_range(range);
         while renderer.iterate() {}
         renderer.state().clone()
@@ -200,7 +186,7 @@ fn a_frozen_plan_makes_the_same_iterations() {
     resumed.resume(part(0..2)).expect("the same render");
     assert!(resumed.iterate() && resumed.iterate());
     assert_eq!(resumed.report().film_fingerprint, first.report().film_fingerprint);
-    assert_eq!(resumed.report().plan, plan);
+    assert_eq!(resumed.state().identity().frozen_plan(), plan);
 }
 
 /// A plan that the render would not have chosen is kept when it is resumed, whatever its limits are then. The
@@ -211,15 +197,15 @@ fn a_render_that_is_resumed_keeps_its_plan() {
     let auto = || Settings::default().validate().expect("valid settings");
     for names in ["hit+nee", "bpt", "bpt+surf+pb2d"] {
         let techniques = names.parse::<TechniqueSet>().expect("names").into();
-        let plan = renderer(&scene, Settings { techniques, ..settings() }).report().plan;
+        let plan = frozen(&scene, Settings { techniques, ..settings() });
         let run = |iterations| {
-            let mut renderer = scene.start_renderer(auto(), by(plan)).expect("a plan for it");
+            let mut renderer = scene.start_renderer(auto(), by(plan.clone())).expect("a plan for it");
             (0..iterations).for_each(|_| assert!(renderer.iterate()));
             renderer
         };
         let state = run(2).state().clone();
         let stop = Stop { iterations: Some(5), ..Stop::default() };
-        let start = Start { stop, ..by(state.identity().plan) };
+        let start = Start { stop, ..by(state.identity().frozen_plan()) };
         let mut resumed = scene.start_renderer(auto(), start).expect("a valid render");
         resumed.resume(state).expect("the same render");
         (0..3).for_each(|_| assert!(resumed.iterate()));
@@ -227,20 +213,40 @@ fn a_render_that_is_resumed_keeps_its_plan() {
     }
 }
 
+/// A limit of time cuts the measurement of lights short, by the clock: the render that goes on does not
+/// measure them again.
+#[test]
+fn a_render_that_is_resumed_keeps_its_choice_of_emitters() {
+    let scene = shipped("suite/many_lights");
+    let checked = || Settings::default().validate().expect("valid settings");
+    let within = |seconds, start| Start { stop: Stop { seconds: Some(seconds), ..Stop::default() }, ..start };
+    let mut first = scene.start_renderer(checked(), within(0.01, Start::default())).expect("a valid render");
+    assert!(first.iterate());
+    let state = first.state().clone();
+    let start = within(100.0, by(state.identity().frozen_plan()));
+    let mut resumed = scene.start_renderer(checked(), start).expect("a valid render");
+    resumed.resume(state).expect("the same render");
+    assert!(resumed.iterate());
+}
+
 #[test]
 fn a_plan_that_does_not_fit_is_refused() {
     let fog = shipped("reference/mirror_fog");
     let everything = Settings { techniques: TechniqueSet::STANDARD.into(), ..settings() };
-    let plan = renderer(&fog, everything).report().plan;
+    let plan = frozen(&fog, everything);
     let checked = || {
         let settings = Settings { memory: Some(2048), ..settings() };
         settings.validate().expect("valid settings")
     };
     let greedy = plan.to_ron().replace("light_paths: 4096,", "light_paths: 4000000000,");
-    let greedy = Plan::from_ron(&greedy).expect("a plan");
+    let greedy = FrozenPlan::from_ron(&greedy).expect("a plan");
     let error = fog.start_renderer(checked(), by(greedy)).map(|_| ()).expect_err("too much").to_string();
     assert!(error.starts_with("plan: needs") && error.contains("2048"), "{error}");
     let matt = ReadyScene::from_ron_str(MATT, ".").expect("a valid scene");
     let error = matt.start_renderer(checked(), by(plan)).map(|_| ()).expect_err("no media here").to_string();
     assert!(error.contains("pb2d") && error.contains("cannot be used"), "{error}");
+    let lamps = frozen(&shipped("suite/many_lights"), settings());
+    let plan = FrozenPlan { emitters: lamps.emitters, ..frozen(&matt, settings()) };
+    let error = matt.start_renderer(checked(), by(plan)).map(|_| ()).expect_err("other lights").to_string();
+    assert!(error.contains("among the 1 emitters"), "{error}");
 }

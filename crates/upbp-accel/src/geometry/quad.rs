@@ -74,6 +74,16 @@ impl Quad {
         (position.as_vec3(), self.normal)
     }
 
+    /// The random numbers with which [`sample_area`](Self::sample_area) draws `point`, a point of the quad.
+    #[must_use]
+    pub fn area_coordinates(&self, point: Vec3) -> [f32; 2] {
+        let [edge_u, edge_v] = [self.edge_u, self.edge_v].map(Vec3::as_dvec3);
+        let from_corner = point.as_dvec3() - self.origin.as_dvec3();
+        let normal = edge_u.cross(edge_v);
+        let scale = normal.length_squared().recip();
+        [from_corner.cross(edge_v), edge_u.cross(from_corner)].map(|part| (part.dot(normal) * scale) as f32)
+    }
+
     /// The least and the greatest coordinates, rounded outwards.
     #[must_use]
     pub fn aabb(&self) -> (Vec3, Vec3) {

@@ -45,6 +45,17 @@ impl Shape {
         }
     }
 
+    /// The random numbers with which [`sample_area`](Self::sample_area) draws a point of the surface; `None`
+    /// for boxes and meshes, where a search would have to find its face.
+    #[must_use]
+    pub fn area_coordinates(&self, point: Vec3) -> Option<[f32; 2]> {
+        match self {
+            Self::Sphere(sphere) => Some(sphere.area_coordinates(point)),
+            Self::Quad(quad) => Some(quad.area_coordinates(point)),
+            Self::Box(_) | Self::Mesh(_) => None,
+        }
+    }
+
     /// Whether the surface separates an inside from an outside.
     #[must_use]
     pub fn is_closed(&self) -> bool {

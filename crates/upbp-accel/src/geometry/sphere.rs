@@ -65,6 +65,15 @@ impl Sphere {
         (self.on_surface(normal.as_dvec3()), normal)
     }
 
+    /// The random numbers with which [`sample_area`](Self::sample_area) draws the point in the direction of
+    /// `point` from the centre.
+    #[must_use]
+    pub fn area_coordinates(&self, point: Vec3) -> [f32; 2] {
+        let normal = (point.as_dvec3() - self.centre.as_dvec3()).normalize_or(DVec3::Y).as_vec3();
+        let below_pole = 0.5 * (1.0 - normal.y);
+        [below_pole, (normal.z.atan2(normal.x) / TAU).rem_euclid(1.0)]
+    }
+
     /// Whether `point` lies strictly inside.
     #[must_use]
     pub fn contains(&self, point: Vec3) -> bool {

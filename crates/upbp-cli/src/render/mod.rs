@@ -8,9 +8,9 @@ mod progress;
 use std::path::Path;
 
 use upbp_core::{
-    Canceller, CheckedSettings, Image, OutputError, Plan, Preparing, RenderError, Renderer, Start, State,
-    StateError, Stop, StopReason, check_outputs, check_writable, read_exr, read_text, remove_leftovers,
-    write_text,
+    Canceller, CheckedSettings, FrozenPlan, Image, OutputError, Preparing, RenderError, Renderer, Start,
+    State, StateError, Stop, StopReason, check_outputs, check_writable, read_exr, read_text,
+    remove_leftovers, write_text,
 };
 use upbp_scene::{ReadyScene, SceneError};
 
@@ -66,7 +66,7 @@ struct Job {
     scene: ReadyScene,
     settings: CheckedSettings,
     reference: Option<Image>,
-    plan: Option<Plan>,
+    plan: Option<FrozenPlan>,
 }
 
 impl Job {
@@ -90,7 +90,7 @@ impl Job {
         let state = options.saving.state.as_deref();
         let state = state.map(read_state).transpose().map_err(Failure::input)?.flatten();
         // A render that goes on does not choose again.
-        let plan = self.plan.or(state.as_ref().map(|state| state.identity().plan));
+        let plan = self.plan.clone().or_else(|| state.as_ref().map(|state| state.identity().frozen_plan()));
         let stop = Stop { iterations: options.range().map(|range| range.end), ..options.stop() };
         let start = Start { plan, canceller, stop, progress: Some(&mut show) };
         let renderer = self.scene.start_renderer(self.settings.clone(), start);
@@ -134,9 +134,9 @@ fn load(options: &Options) -> Result<ReadyScene, SceneError> {
     })
 }
 
-fn read_plan(path: &Path) -> Result<Plan, String> {
+fn read_plan(path: &Path) -> Result<FrozenPlan, String> {
     let text = read_text(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    Plan::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))
+    FrozenPlan::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))
 }
 
 /// Reads a state file, if there is one.
@@ -160,7 +160,7 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
         attempt(state.save(path));
     }
     if let Some(path) = &options.method.save_plan {
-        attempt(write_text(path, &state.identity().plan.to_ron()));
+        attempt(write_text(path, &state.identity().frozen_plan().to_ron()));
     }
     let (report, images) = (state.report(), options.images());
     // Before the first pixels there is no picture.

@@ -233,7 +233,7 @@ fn kind(bytes: &[u8]) -> Option<&'static str> {
         (b"\x89PNG", "png"),
         (b"UPBPSTAT", "state"),
         (b"{\n  \"version\"", "json"),
-        (b"Plan(\n", "ron"),
+        (b"FrozenPlan(\n", "ron"),
     ];
     kinds.into_iter().find(|(beginning, _)| bytes.starts_with(beginning)).map(|(_, kind)| kind)
 }

@@ -9,7 +9,7 @@ use super::cost::Cost;
 use super::full_plan::BEAMS;
 use super::roulette;
 use super::statistics::Statistics;
-use super::support::TechniqueSupport;
+use super::technique_support::TechniqueSupport;
 use crate::plan::Plan;
 use crate::radius::Radius;
 use crate::settings::{CheckedSettings, LightPaths};

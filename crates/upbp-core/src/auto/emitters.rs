@@ -4,9 +4,13 @@
 //! them are lost: the light goes past the scene, or emission hits find it anyway. So a small run counts the
 //! weighted contributions that come from each emitter, by next events and by light sub-paths, as far as no
 //! other technique would find them, and emitters are then chosen in proportion (`docs/theory.md`, section
-//! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image.
+//! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image. Further
+//! rounds learn where on the emitters light sub-paths should start ([`guides`]).
 
-use upbp_estimators::observer::{Completion, DynObserver, LightEnd, ObservedSample, Observer};
+use glam::Vec3;
+use upbp_estimators::observer::{
+    Completion, DynObserver, LightEnd, ObservedSample, ObservedVertex, Observer,
+};
 use upbp_estimators::path::{Context, LightChunk};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
@@ -15,6 +19,7 @@ use upbp_estimators::{
 };
 
 use super::full_plan::{iteration_plan, plan_with};
+use super::guides::{self, Evidence};
 use super::pieces::{in_pieces, pixel};
 use super::statistics;
 use crate::budget::{Budget, Halt};
@@ -31,6 +36,8 @@ const MANY: usize = 8;
 const LIGHT_VERTICES: f64 = 2e5;
 /// Steps towards probabilities that reproduce themselves.
 const ROUNDS: u32 = 16;
+/// Runs, if starts are guided: one that looks for places, and two that are guided there.
+const GUIDED_ROUNDS: u32 = 3;
 
 /// Part of the time of a preparation that this may take.
 const PART: f64 = 0.2;
@@ -42,8 +49,8 @@ fn enough(emitters: usize) -> f64 {
     emitters.clamp(2, MANY) as f64 / MANY as f64
 }
 
-/// Lets the scene choose its emitters by what they contribute under a plan with `techniques`, if it has
-/// several. The scene has to be as it was prepared, with emitters chosen by power.
+/// Lets the scene choose its emitters, and the starts of light sub-paths on them, by what they contribute
+/// under a plan with `techniques`. The scene has to be as it was prepared, with emitters chosen by power.
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
@@ -54,31 +61,60 @@ pub(crate) fn choose<S: Scene>(
     budget: &Budget<'_>,
 ) -> Result<(), RenderError> {
     let emitters = scene.scene.emitters().len();
-    if emitters < 2 {
+    let is_guided = guides::can_guide(scene, techniques);
+    if emitters < 2 && !is_guided {
         return Ok(());
     }
     let quick = budget.part(QUICK_LOOK * PART);
     let statistics = statistics::measure(scene, settings, techniques, statistics::FEW_LIGHT_PATHS, &quick)?;
     let vertices = statistics.vertices_per_path.max(1.0);
-    let light_paths = (LIGHT_VERTICES / vertices).clamp(64.0, f64::from(LIGHT_PATHS)) * enough(emitters);
-    let light_paths = light_paths as u32;
-    let plan = plan_with(scene, settings, techniques, &statistics, [light_paths, light_paths / 8]);
+    let light_paths = (LIGHT_VERTICES / vertices).clamp(64.0, f64::from(LIGHT_PATHS));
+    let paths = [light_paths, f64::from(CAMERA_PATHS)].map(|paths| (paths * enough(emitters)) as u32);
+    let plan = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / 8]);
     let plan = iteration_plan(scene, settings, &plan, 0);
-    let run = |part, halt: &Halt<'_>| measure(scene, &plan, part, halt);
-    let (emission, next_event) =
-        budget.part((1.0 - QUICK_LOOK) * PART).largest(run).ok_or(RenderError::Cancelled)?;
-    scene.choose_emitters_by(&emission, &next_event);
+    let rounds = if is_guided { GUIDED_ROUNDS } else { 1 };
+    let part = (1.0 - QUICK_LOOK) * PART / f64::from(rounds);
+    for round in 0..rounds {
+        // Each round has random numbers of its own.
+        let plan = IterationPlan { iteration: plan.iteration + u64::from(round), ..plan.clone() };
+        let run = |part, halt: &Halt<'_>| measure(scene, &plan, paths[1], part, halt);
+        let seen = budget.part(part).largest(run).ok_or(RenderError::Cancelled)?;
+        if emitters > 1 {
+            scene.choose_emitters_by(&seen.emission, &seen.next_event);
+        }
+        if is_guided {
+            let guides = match round {
+                0 => guides::first(scene, &plan, &seen.guides),
+                _ => guides::next(scene, &seen.guides),
+            };
+            let is_done = guides.iter().all(Option::is_none);
+            scene.guide_emission(guides);
+            if is_done {
+                break;
+            }
+        }
+    }
     Ok(())
 }
 
-/// The contribution of every emitter under `plan`, by light sub-paths and by next events. A part of the
-/// sub-paths is traced. `None` if it was halted.
+/// What small runs of light and camera sub-paths have seen.
+struct Measured {
+    /// The contribution of every emitter by light sub-paths.
+    emission: EmitterShares,
+    /// The contribution of every emitter by next events.
+    next_event: EmitterShares,
+    guides: Evidence,
+}
+
+/// Traces the light sub-paths of `plan` and some camera sub-paths, or a part of both. `None` if it was
+/// halted.
 fn measure<S: Scene>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
+    camera_paths: u32,
     part: f64,
     halt: &Halt<'_>,
-) -> Option<(EmitterShares, EmitterShares)> {
+) -> Option<Measured> {
     let mut plan = plan.clone();
     // Fewer light sub-paths, each of which counts for more; weights as in the plan.
     let fewer = |count: u32| (part * f64::from(count)).ceil() as u32;
@@ -108,8 +144,8 @@ fn measure<S: Scene>(
         beams.extend(out.beams);
         seen.append(own);
     }
-    for &(path, emitter) in &seen.starts {
-        starts[path as usize] = Some(emitter);
+    for &(path, end) in &seen.starts {
+        starts[path as usize] = Some((end, 0.0));
     }
     let map = if plan.stores_vertices() || plan.stores_beams() {
         LightMap::build(plan, vertices, beams)
@@ -118,14 +154,15 @@ fn measure<S: Scene>(
     };
     let mut by_path = |seen: &[(u32, Contribution)], scale| {
         for &(path, contribution) in seen {
-            if let Some(emitter) = starts[path as usize] {
-                emission.add(emitter, contribution, scale);
+            if let Some((end, light)) = &mut starts[path as usize] {
+                emission.add(end.emitter.0, contribution, scale);
+                *light += scale * contribution.value * contribution.weight;
             }
         }
     };
     by_path(&seen.emission, 1.0);
 
-    let camera_paths = (part * enough(emitters) * f64::from(CAMERA_PATHS)).ceil() as u32;
+    let camera_paths = (part * f64::from(camera_paths)).ceil() as u32;
     let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
         let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
         let observer: &mut DynObserver<'_, S::Bsdf> = seen;
@@ -135,13 +172,17 @@ fn measure<S: Scene>(
     })?;
     // Light tracing fills the whole picture, camera sub-paths a part of it.
     let scale = pixels as f64 / f64::from(camera_paths);
+    let mut guides = Evidence::default();
     for seen in walks {
         by_path(&seen.emission, scale);
-        for (emitter, contribution) in seen.next_event {
-            next_event.add(emitter, contribution, scale);
+        for (end, receiver, contribution) in seen.next_event {
+            next_event.add(end.emitter.0, contribution, scale);
+            guides.lit.push((end, receiver));
         }
+        guides.specular.extend(seen.specular);
     }
-    Some((emission.shares(), next_event.shares()))
+    guides.starts = starts.into_iter().flatten().collect();
+    Some(Measured { emission: emission.shares(), next_event: next_event.shares(), guides })
 }
 
 /// Weighted contributions by emitter.
@@ -202,19 +243,20 @@ impl Tally {
 /// Contributions that sub-paths of one piece of work made.
 #[derive(Default)]
 struct Seen {
-    /// Light sub-paths with their emitters.
-    starts: Vec<(u32, u32)>,
+    /// Light sub-paths with their starts.
+    starts: Vec<(u32, LightEnd)>,
     /// By light sub-path.
     emission: Vec<(u32, Contribution)>,
-    /// By emitter.
-    next_event: Vec<(u32, Contribution)>,
+    /// By light and receiver.
+    next_event: Vec<(LightEnd, Vec3, Contribution)>,
+    /// Where camera sub-paths were reflected or refracted in one direction.
+    specular: Vec<Vec3>,
 }
 
 impl Seen {
     fn append(&mut self, mut more: Self) {
         self.starts.append(&mut more.starts);
         self.emission.append(&mut more.emission);
-        self.next_event.append(&mut more.next_event);
     }
 }
 
@@ -229,14 +271,20 @@ impl<B> Observer<B> for Seen {
     type Densities = f64;
 
     fn light_end(&mut self, path: u32, end: &LightEnd) {
-        self.starts.push((path, end.emitter.0));
+        self.starts.push((path, *end));
+    }
+
+    fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
+        if vertex.delta {
+            self.specular.push(vertex.position);
+        }
     }
 
     fn sample(&mut self, sample: &ObservedSample<B>) {
         let seen = Contribution { value: f64::from(sample.value.mean()), weight: sample.weight.value() };
         match sample.completion {
             Completion::Emission | Completion::Hit(_) => {}
-            Completion::Nee { light: end, .. } => self.next_event.push((end.emitter.0, seen)),
+            Completion::Nee { light, camera: (receiver, _) } => self.next_event.push((light, receiver, seen)),
             Completion::Connect { path, .. }
             | Completion::LightTracing { path, .. }
             | Completion::Merge { path, .. } => {

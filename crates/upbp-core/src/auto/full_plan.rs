@@ -6,7 +6,7 @@ use upbp_estimators::{
 };
 
 use super::memory::{LightCounts, Room};
-use super::neighbours::Neighbours;
+use super::photon_distances::Neighbours;
 use super::roulette::usual_roulette;
 use super::statistics::Statistics;
 use crate::budget::Budget;
@@ -17,7 +17,7 @@ use crate::settings::{CheckedSettings, LightPaths, Settings};
 /// The techniques with photon beams.
 pub(super) const BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Bp2d).with(Technique::Bb1d);
 
-/// The largest first radii, relative to the scene's.
+/// The largest first radii, relative to the [size](size) of what the picture shows.
 const LARGEST_SURF_RADIUS: f32 = 3e-3;
 const LARGEST_PP3D_RADIUS: f32 = 5e-3;
 const LARGEST_PB2D_RADIUS: f32 = 3e-3;
@@ -95,7 +95,7 @@ fn crowding<S: Scene>(
     techniques: TechniqueSet,
     statistics: &Statistics,
 ) -> f64 {
-    let size = scene.bounds.radius;
+    let size = size(scene, statistics);
     // No kernel holds more photons than there are.
     let all = CROWD / statistics.vertices_per_path.max(1.0);
     let merges = [
@@ -120,7 +120,7 @@ fn enough_beams<S: Scene>(
 ) -> u32 {
     /// Photon beams within the kernel of a query beam.
     const HITS: f64 = 1.0;
-    let largest = LARGEST_BEAM_RADIUS * scene.bounds.radius;
+    let largest = LARGEST_BEAM_RADIUS * size(scene, statistics);
     let (found, radius) = match (statistics.bb1d, settings.radii.bb1d) {
         (Some(found), Radius::Auto) => (found, largest),
         (Some(found), Radius::Scene(fraction)) => (found, fraction * scene.bounds.radius),
@@ -128,6 +128,14 @@ fn enough_beams<S: Scene>(
         (None, _) => return 1024,
     };
     found.paths(HITS, f64::from(radius)).clamp(64.0, 1e6) as u32
+}
+
+/// Width of what the picture shows, where its camera sub-paths first scatter, and at most the radius of the
+/// scene: what kernels may blur has nothing to do with what lies around the picture.
+fn size<S: Scene>(scene: &PreparedScene<'_, S>, statistics: &Statistics) -> f32 {
+    let (width, height) = scene.scene.camera().resolution();
+    let picture = statistics.footprint * width.max(height) as f32;
+    if picture > 0.0 { picture.min(scene.bounds.radius) } else { scene.bounds.radius }
 }
 
 /// First radii for numbers of light sub-paths, and of those with beams.
@@ -138,14 +146,15 @@ fn first_radii<S: Scene>(
     statistics: &Statistics,
     [light_paths, beam_paths]: [u32; 2],
 ) -> RadiusSchedule {
-    let size = scene.bounds.radius;
+    let scene_radius = scene.bounds.radius;
+    let size = size(scene, statistics);
     let radius = |technique, choice, found: Option<Neighbours>, count: f64, paths: u32, most: f32| {
         if !techniques.has(technique) {
             return 0.0;
         }
         match choice {
             Radius::Absolute(radius) => radius,
-            Radius::Scene(fraction) => fraction * size,
+            Radius::Scene(fraction) => fraction * scene_radius,
             Radius::Auto => found
                 .map_or(most * size, |n| n.radius(count, f64::from(paths)))
                 .clamp(SMALLEST * most * size, most * size),
@@ -160,7 +169,7 @@ fn first_radii<S: Scene>(
         bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
         progressive: settings.progressive,
         // Positions have a relative precision of 6e-8.
-        floor: 1e-6 * size,
+        floor: 1e-6 * scene_radius,
     }
 }
 

@@ -1,9 +1,10 @@
 //! The choice of the plan of a render (`docs/theory.md`, section 6.2).
 //!
-//! First techniques are left out that cannot contribute to the picture ([support]); this is exact. Then small
-//! runs with random numbers of their own look at the scene: they tell radii and the room that light sub-paths
-//! need ([statistics]), and which lights are worth samples ([emitters]). From these follows the [full
-//! plan](full_plan): all techniques, a light sub-path per pixel.
+//! First [techniques](technique_support) are left out that cannot contribute to the picture; this is exact.
+//! Then small runs with random numbers of their own look at the scene: they tell radii and the room that
+//! light sub-paths need ([statistics]), which lights are worth samples ([emitters]), and where on them light
+//! sub-paths should start ([guides]). From these follows the [full plan](full_plan): all techniques, a light
+//! sub-path per pixel.
 //!
 //! If techniques are to be chosen, a [pilot render](pilot_render) runs the full plan at a few hundred pixels
 //! and writes down every sample with the density of each technique there. From it follow the [variance] and
@@ -21,14 +22,15 @@ mod candidate;
 mod cost;
 mod emitters;
 mod full_plan;
+mod guides;
 pub(crate) mod memory;
-mod neighbours;
+mod photon_distances;
 mod pieces;
 mod pilot_render;
 mod roulette;
 mod search;
 pub(crate) mod statistics;
-pub(crate) mod support;
+pub(crate) mod technique_support;
 mod variance;
 
 use upbp_estimators::PreparedScene;
@@ -37,14 +39,14 @@ use upbp_estimators::scene::Scene;
 
 use crate::budget::Budget;
 use crate::error::RenderError;
-use crate::plan::Plan;
+use crate::plan::{FrozenPlan, Plan};
 use crate::settings::{CheckedSettings, Techniques};
 use candidate::Candidates;
 use cost::Cost;
 use memory::Room;
 use pilot_render::{PilotRender, Size};
 use statistics::Statistics;
-use support::TechniqueSupport;
+use technique_support::TechniqueSupport;
 use variance::Variance;
 
 pub(crate) use full_plan::iteration_plan;
@@ -71,34 +73,34 @@ pub(crate) struct Choice {
 pub(crate) fn choose<S: Scene>(
     scene: &mut PreparedScene<'_, S>,
     settings: &CheckedSettings,
-    given: Option<Plan>,
+    given: Option<FrozenPlan>,
     budget: &mut Budget<'_>,
 ) -> Result<Choice, RenderError> {
     let is_auto = settings.techniques == Techniques::Auto;
-    let support = TechniqueSupport::of(scene, settings, given.as_ref())?;
+    let support = TechniqueSupport::of(scene, settings, given.as_ref().map(|frozen| &frozen.plan))?;
     let techniques = support.techniques;
     let room = Room::of(scene, settings, techniques)?;
-    // Without light sub-paths next events have to find what those would have found.
-    let alone = techniques.intersection(TechniqueSet::PT);
-    let for_emitters =
-        if is_auto && given.is_some_and(|plan| plan.light_paths == 0) { alone } else { techniques };
 
     budget.step("measuring lights", 0.0)?;
-    emitters::choose(scene, settings, for_emitters, budget)?;
+    match &given {
+        Some(frozen) => scene.set_emitter_choice(&frozen.emitters)?,
+        None => emitters::choose(scene, settings, techniques, budget)?,
+    }
     budget.step("looking around", 0.3)?;
     let allowance = budget.part(TIME_FOR_STATISTICS);
     let statistics = statistics::measure(scene, settings, techniques, statistics::LIGHT_PATHS, &allowance)?;
     budget.step("choosing techniques", 0.5)?;
-    let plan = if let Some(plan) = given {
-        room.fits::<S>(&plan, &statistics)?
+    let plan = if let Some(frozen) = given {
+        room.fits::<S>(&frozen.plan, &statistics)?
     } else {
         let full = full_plan::full_plan(scene, settings, techniques, &statistics, &room, budget);
         if is_auto && full.uses_light_paths() {
             let candidates = Candidates::new(scene, settings, &support, &statistics, full);
             let plan = best_plan(scene, settings, &candidates, budget);
             if !plan.uses_light_paths() {
+                // Next events have to find what light sub-paths would have found.
                 *scene = PreparedScene::new(scene.scene)?;
-                emitters::choose(scene, settings, alone, budget)?;
+                emitters::choose(scene, settings, techniques.intersection(TechniqueSet::PT), budget)?;
             }
             plan
         } else {

@@ -12,7 +12,7 @@ use upbp_estimators::{
     PreparedScene, StreamKind, Technique, TechniqueSet,
 };
 
-use super::neighbours::{Nearest, Neighbours, median};
+use super::photon_distances::{Nearest, Neighbours, median};
 use super::pieces::{in_pieces, pixel};
 use super::roulette::usual_roulette;
 use crate::budget::{Allowance, Clock, Halt};

@@ -44,7 +44,7 @@ impl Content {
             Self::Exr => b"\x76\x2f\x31\x01",
             Self::Png => b"\x89PNG\r\n\x1a\n",
             Self::Report => b"{",
-            Self::Plan => b"Plan(",
+            Self::Plan => b"FrozenPlan(",
             Self::State => b"UPBPSTAT",
             Self::Text(beginning) => beginning.as_bytes(),
         }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use upbp_estimators::scene::{Camera, EmitterId, Scene};
+use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{LightMap, PreparedScene};
 
 use super::engine::{Engine, SceneEngine};
@@ -10,9 +10,9 @@ use crate::auto;
 use crate::budget::{Budget, Canceller, Preparing, Stop};
 use crate::error::RenderError;
 use crate::film::Film;
-use crate::plan::Plan;
+use crate::plan::FrozenPlan;
 use crate::settings::CheckedSettings;
-use crate::state::{Identity, PassTimes, Record, State, fingerprint};
+use crate::state::{Identity, PassTimes, Record, State};
 
 /// A render that has not begun.
 pub(super) struct Prepared<'a> {
@@ -25,8 +25,9 @@ pub(super) struct Prepared<'a> {
 #[derive(Default)]
 pub struct Start<'a> {
     /// A plan that was made before, perhaps on another machine: that of a state which is going to be
-    /// [resumed](crate::Renderer::resume), or one from a file. `None` for one that is made now.
-    pub plan: Option<Plan>,
+    /// [resumed](crate::Renderer::resume), by [`Identity::frozen_plan`], or one from a file. `None` for one
+    /// that is made now.
+    pub plan: Option<FrozenPlan>,
     /// Stops the preparation, and the render after it.
     pub canceller: Canceller,
     /// The rules by which the render is going to end, as far as they are known: the choice of a plan takes
@@ -59,8 +60,8 @@ pub(super) fn prepare<'a, S: Scene>(
         part: (rect.x, rect.y, rect.width, rect.height),
         settings: settings.into_inner(),
         support: choice.support,
-        emitters: emitters(&prepared),
         plan: choice.plan,
+        emitters: prepared.emitter_choice().clone(),
     };
     let record = Record {
         times: PassTimes { pilot: begun.elapsed(), ..PassTimes::default() },
@@ -70,14 +71,4 @@ pub(super) fn prepare<'a, S: Scene>(
     let film = Film::new(rect, choice.plan.techniques);
     let engine = SceneEngine { scene: prepared, statistics: choice.statistics, map: LightMap::empty() };
     Ok(Prepared { engine: Box::new(engine), canceller, state: State { identity, record, film } })
-}
-
-/// Fingerprint of the probabilities with which emitters are chosen.
-fn emitters<S: Scene>(scene: &PreparedScene<'_, S>) -> String {
-    let mut probabilities = Vec::new();
-    for emitter in (0..scene.scene.emitters().len() as u32).map(EmitterId) {
-        let chosen = [scene.emission_probability(emitter), scene.next_event_probability(emitter)];
-        probabilities.extend(chosen.map(f32::to_le_bytes).as_flattened());
-    }
-    fingerprint(&probabilities)
 }

@@ -9,7 +9,7 @@ use upbp_estimators::{Counters, IterationPlan};
 use super::engine::Engine;
 use super::prepare::{Prepared, Start, prepare};
 use super::stop::{Outcome, Progress, StopReason};
-use crate::auto::support::TechniqueSupport;
+use crate::auto::technique_support::TechniqueSupport;
 use crate::budget::{Canceller, Clock, Halt, Stop};
 use crate::error::{RenderError, StateError};
 use crate::film::{ErrorEstimate, Film, MAX_ITERATIONS, Pixel};

@@ -1,12 +1,16 @@
 //! Identity of a render: all that its iterations depend on, besides their index.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
+use upbp_estimators::EmitterChoice;
 use upbp_estimators::scene::PixelRect;
 
-use crate::auto::support::TechniqueSupport;
+use crate::auto::technique_support::TechniqueSupport;
 use crate::error::StateError;
-use crate::plan::Plan;
+use crate::plan::{FrozenPlan, Plan};
 use crate::settings::Settings;
+use crate::state::fingerprint;
 
 /// The identity of a render: whatever its iterations depend on, besides their index.
 ///
@@ -28,13 +32,19 @@ pub struct Identity {
     pub settings: Settings,
     /// Techniques that the scene can use.
     pub support: TechniqueSupport,
-    /// Fingerprint of the probabilities with which emitters are chosen.
-    pub emitters: String,
     /// Techniques, sample counts and first radii.
     pub plan: Plan,
+    /// The emitters that sub-paths begin at.
+    pub emitters: Arc<EmitterChoice>,
 }
 
 impl Identity {
+    /// The plan, for another render that is to fit to this one.
+    #[must_use]
+    pub fn frozen_plan(&self) -> FrozenPlan {
+        FrozenPlan { plan: self.plan, emitters: self.emitters.clone() }
+    }
+
     /// The part of the film.
     pub(crate) const fn rect(&self) -> PixelRect {
         let (x, y, width, height) = self.part;
@@ -73,7 +83,7 @@ impl Identity {
             ("heuristic", format!("{:?}", s.heuristic)),
             ("photon_beams", format!("{:?}", s.photon_beams)),
             ("query_beams", format!("{:?}", s.query_beams)),
-            ("choice of emitters", self.emitters.clone()),
+            ("choice of emitters", fingerprint(format!("{:?}", self.emitters).as_bytes())),
         ]
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::Vec3;
 
 use super::{Check, DRAWS, Random, direction, is_density, is_light, is_unit, require, same, same_spectrum};
-use crate::scene::{BoundingSphere, Emitter, EmitterKind, EmitterPoint};
+use crate::scene::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint};
 
 /// Checks the contract of [`Emitter`] for receivers at the given points, of which a light that shines
 /// should reach at least one.
@@ -30,7 +30,8 @@ pub fn check_emitter(emitter: &impl Emitter, bounds: &BoundingSphere, receivers:
 }
 
 fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Check {
-    let Some(emission) = emitter.sample_emission(bounds, random.pair(), random.pair()) else {
+    let (u_position, u_direction) = (random.pair(), random.pair());
+    let Some(emission) = emitter.sample_emission(bounds, u_position, u_direction) else {
         return Ok(());
     };
     let kind = emitter.kind();
@@ -53,6 +54,7 @@ fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut 
         require(cosine > 0.0, "a surface emits on the side of its normal", emission)?;
     }
     let receiver = emission.point.position + emission.direction * bounds.radius;
+    check_coordinates(emitter, bounds, [u_position, u_direction], &emission, receiver)?;
     let seen = emitter.hit(bounds, &emission.point, emission.direction, receiver);
     require(seen.is_some() == kind.is_hittable(), "hit answers for lights that can be hit", emission)?;
     let Some(seen) = seen else { return Ok(()) };
@@ -60,6 +62,27 @@ fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut 
         && same(seen.pdf_position, emission.pdf_position)
         && same(seen.pdf_direction, emission.pdf_direction);
     require(agrees, "hit agrees with sample_emission", (emission, seen))
+}
+
+/// Coordinates that are known start the same light again.
+fn check_coordinates(
+    emitter: &impl Emitter,
+    bounds: &BoundingSphere,
+    [u_position, u_direction]: [[f32; 2]; 2],
+    emission: &Emission,
+    receiver: Vec3,
+) -> Check {
+    let found = emitter.emission_coordinates(bounds, &emission.point, emission.direction, receiver);
+    let Some(found) = found else { return Ok(()) };
+    let pairs = [found.position.unwrap_or(u_position), found.direction.unwrap_or(u_direction)];
+    let is_number = pairs.as_flattened().iter().all(|u| (-1e-4..=1.0001).contains(u));
+    require(is_number, "coordinates of a start are random numbers", (emission, found))?;
+    let [u_position, u_direction] = pairs.map(|pair| pair.map(|u| u.clamp(0.0, 1.0 - f32::EPSILON / 2.0)));
+    // At the border rounding may draw nothing.
+    let Some(again) = emitter.sample_emission(bounds, u_position, u_direction) else { return Ok(()) };
+    let off = again.point.position.distance(emission.point.position);
+    let is_same = off <= 1e-3 * bounds.radius && again.direction.distance(emission.direction) <= 1e-3;
+    require(is_same, "coordinates of a start give that start", (emission, found, again))
 }
 
 fn check_incident(

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use upbp_media::MediumId;
 
-use super::densities::Densities;
+use super::density_sum::Densities;
 use crate::scene::Walk;
 use crate::technique::Technique;
 

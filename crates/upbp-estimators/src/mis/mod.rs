@@ -7,11 +7,11 @@
 //! follow. [`oracle`] enumerates the same weights the slow, obvious way, and the tests hold one to the other.
 
 mod counts;
-mod densities;
+mod density_sum;
 pub mod oracle;
 mod recursion;
 mod weights;
 
 pub use counts::{BeamExtent, Heuristic, MergeKind, MisPlan, PARALLEL_SIN2, VolumeMerges};
-pub use densities::{ByTechnique, Densities, Weight};
+pub use density_sum::{ByTechnique, Densities, Weight};
 pub use recursion::{Edge, EdgeMis, End, VertexMis};

@@ -8,7 +8,7 @@
 use upbp_media::EdgeDensity;
 
 use super::counts::{BeamExtent, MergeKind, MisPlan};
-use super::densities::Densities;
+use super::density_sum::Densities;
 use crate::scene::Walk;
 use crate::technique::Technique;
 

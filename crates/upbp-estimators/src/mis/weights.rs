@@ -1,7 +1,7 @@
 //! Weights of completed paths from the two sub-path ends (`docs/theory.md`, section 4.4).
 
 use super::counts::MisPlan;
-use super::densities::{Densities, Weight};
+use super::density_sum::{Densities, Weight};
 use super::recursion::{End, VertexMis};
 use crate::technique::Technique;
 

@@ -102,6 +102,18 @@ pub struct HitDensities {
     pub pdf_direction: f32,
 }
 
+/// The random numbers with which [`Emitter::sample_emission`] starts some light sub-path.
+///
+/// A pair is `None` if no start depends on it, or if it cannot be told: light sub-paths then follow the
+/// emitter's own distribution there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EmissionCoordinates {
+    /// The first pair.
+    pub position: Option<[f32; 2]>,
+    /// The second pair.
+    pub direction: Option<[f32; 2]>,
+}
+
 /// A light.
 ///
 /// Emitters are chosen in proportion to [`power`](Self::power); the walks multiply that probability in. The
@@ -136,6 +148,24 @@ pub trait Emitter: Send + Sync {
         direction: Vec3,
         receiver: Vec3,
     ) -> Option<HitDensities>;
+
+    /// The random numbers with which [`sample_emission`](Self::sample_emission) starts the light that leaves
+    /// `point` in `direction` and passes `on_ray`; an infinite emitter is asked for that ray alone, and
+    /// `point` has no meaning.
+    ///
+    /// With them light sub-paths are [guided](crate::EmissionGuide) to where the picture needs them. The
+    /// default is an emitter that cannot be guided. Whether a pair is given must not depend on the ray,
+    /// except that there are none for a ray that the emitter cannot start.
+    fn emission_coordinates(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        on_ray: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        let _ = (bounds, point, direction, on_ray);
+        None
+    }
 
     /// The density [`Incident::pdf`] with which [`sample_incident`](Self::sample_incident) at `receiver`
     /// chooses `point`, in direction `direction` of the light. The default serves emitters whose choice does

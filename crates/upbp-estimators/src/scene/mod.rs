@@ -20,7 +20,9 @@ mod hit;
 
 pub use bsdf::{Bsdf, BsdfSample, Interface, Walk};
 pub use camera::{Camera, CameraConnection, CameraRay, PixelRect};
-pub use emitter::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident};
+pub use emitter::{
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+};
 pub use hit::{Crossing, EmitterId, Hit};
 
 /// A scene to render: the host's geometry and everything on it.

@@ -125,7 +125,9 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             &vertex_mis,
             f64::from(prepared.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
             f64::from(prepared.emission_probability(emitter)) * f64::from(densities.pdf_position),
-            f64::from(densities.pdf_direction),
+            f64::from(
+                densities.pdf_direction * prepared.emission_factor(emitter, point, direction, receiver),
+            ),
         )
     };
     let value = throughput * densities.radiance;

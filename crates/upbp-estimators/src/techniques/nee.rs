@@ -76,8 +76,9 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     } else {
         0.0
     };
+    let factor = prepared.emission_factor(emitter, &incident.point, -direction, vertex.position);
     let camera_density =
-        f64::from(incident.pdf_direction) * scattering.cos / distance2 * density.backward(in_medium);
+        f64::from(incident.pdf_direction * factor) * scattering.cos / distance2 * density.backward(in_medium);
     let opposite =
         mis.distance_factor(Walk::Light, in_medium, density.pass_probability, density.backward(in_medium));
     let interaction = vertex.interaction.merge_kind(scattering.sin_theta);

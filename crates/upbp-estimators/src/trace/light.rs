@@ -140,7 +140,7 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let prepared = context.prepared;
     let (emitter, probability) = prepared.choose_emission(stream.uniform())?;
     let light = &prepared.scene.emitters()[emitter.0 as usize];
-    let emission = light.sample_emission(&prepared.bounds, stream.pair(), stream.pair())?;
+    let emission = prepared.sample_emission(emitter, [stream.pair(), stream.pair()])?;
     if !(emission.point.position.is_finite() && emission.direction.is_finite()) {
         counters.lost_walks += 1;
         return None;

@@ -8,7 +8,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::Vec3;
 use upbp_accel::{Shape, Sphere};
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -148,5 +148,17 @@ impl Emitter for AreaLight {
         let pdf = pdf_solid_angle * direction.dot(point.normal).max(0.0)
             / receiver.distance_squared(point.position);
         if pdf.is_finite() { pdf } else { 0.0 }
+    }
+
+    fn emission_coordinates(
+        &self,
+        _: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        _: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        let local = sampling::to_local(point.normal, direction);
+        let direction = Some(sampling::cosine_hemisphere_inverse(local)?);
+        Some(EmissionCoordinates { position: self.shape.area_coordinates(point.position), direction })
     }
 }

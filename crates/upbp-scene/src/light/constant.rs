@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -58,5 +58,19 @@ impl Emitter for ConstantEnvironment {
         _: Vec3,
     ) -> Option<HitDensities> {
         Some(self.along(direction).hit(bounds))
+    }
+
+    fn emission_coordinates(
+        &self,
+        bounds: &BoundingSphere,
+        _: &EmitterPoint,
+        direction: Vec3,
+        on_ray: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        let position = self.along(direction).place(bounds, on_ray)?;
+        Some(EmissionCoordinates {
+            position: Some(position),
+            direction: Some(sampling::sphere_inverse(direction)),
+        })
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -42,5 +42,16 @@ impl Emitter for DirectionalLight {
 
     fn hit(&self, _: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> {
         None
+    }
+
+    fn emission_coordinates(
+        &self,
+        bounds: &BoundingSphere,
+        _: &EmitterPoint,
+        _: Vec3,
+        on_ray: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        let position = self.parallel().place(bounds, on_ray)?;
+        Some(EmissionCoordinates { position: Some(position), direction: None })
     }
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use upbp_core::open_exr;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -195,6 +195,27 @@ impl EnvironmentImage {
         Vec3::new((sine * longitude.sin()) as f32, cosine as f32, (-sine * longitude.cos()) as f32)
             .normalize()
     }
+
+    /// The random numbers with which [`sample`](Self::sample) draws a direction.
+    fn coordinates(&self, direction: Vec3) -> [f32; 2] {
+        let longitude = direction.x.atan2(-direction.z);
+        let column = (longitude / TAU + 0.5) * self.width as f32;
+        let polar = f64::from(direction.x.hypot(direction.z).atan2(direction.y));
+        let row = polar * std::f64::consts::FRAC_1_PI * self.height as f64;
+        let x = (column as usize).min(self.width - 1);
+        let y = (row as usize).min(self.height - 1);
+        let (top, bottom) = (polar_angle(self.height, y), polar_angle(self.height, y + 1));
+        // Differences of cosines as products, which keep their digits at the poles.
+        let belt = |from: f64, to: f64| (0.5 * (from + to)).sin() * (0.5 * (to - from)).sin();
+        let v = (belt(top, polar) / belt(top, bottom)).clamp(0.0, 1.0) as f32;
+        let u = (column - x as f32).clamp(0.0, 1.0);
+        let between = |ends: &[f32], step: usize, within: f32| {
+            let start = if step == 0 { 0.0 } else { ends[step - 1] };
+            start + within * (ends[step] - start)
+        };
+        let row = &self.columns[y * self.width..(y + 1) * self.width];
+        [between(&self.rows, y, v), between(row, x, u)]
+    }
 }
 
 /// Polar angle of the upper edge of row `y`.
@@ -302,5 +323,17 @@ impl Emitter for ImageEnvironment {
         _: Vec3,
     ) -> Option<HitDensities> {
         Some(self.along(direction).hit(bounds))
+    }
+
+    fn emission_coordinates(
+        &self,
+        bounds: &BoundingSphere,
+        _: &EmitterPoint,
+        direction: Vec3,
+        on_ray: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        let position = self.along(direction).place(bounds, on_ray)?;
+        let direction = self.image.coordinates(self.rotation.inverse().apply(-direction));
+        Some(EmissionCoordinates { position: Some(position), direction: Some(direction) })
     }
 }

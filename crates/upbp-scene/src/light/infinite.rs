@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use upbp_estimators::scene::{BoundingSphere, Emission, EmitterPoint, HitDensities, Incident};
 use upbp_media::{Spectrum, orthonormal_basis};
 
@@ -41,6 +41,13 @@ impl Parallel {
             pdf_position: self.pdf,
             pdf_direction: 1.0 / disc_area(bounds),
         }
+    }
+
+    /// The random numbers that start the ray of this light through a point; `None` beside the disc.
+    pub(super) fn place(&self, bounds: &BoundingSphere, on_ray: Vec3) -> Option<[f32; 2]> {
+        let (tangent, bitangent) = orthonormal_basis(self.direction);
+        let offset = on_ray - bounds.centre;
+        sampling::disc_inverse(Vec2::new(offset.dot(tangent), offset.dot(bitangent)) / bounds.radius)
     }
 
     pub(super) fn hit(&self, bounds: &BoundingSphere) -> HitDensities {

@@ -14,7 +14,7 @@ mod spot;
 
 use glam::Vec3;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
 
 pub use self::area::AreaLight;
@@ -95,6 +95,16 @@ impl Emitter for Light {
         receiver: Vec3,
     ) -> Option<HitDensities> {
         dispatch!(self, light => light.hit(bounds, point, direction, receiver))
+    }
+
+    fn emission_coordinates(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        on_ray: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        dispatch!(self, light => light.emission_coordinates(bounds, point, direction, on_ray))
     }
 
     fn pdf_incident(

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -58,5 +58,15 @@ impl Emitter for PointLight {
 
     fn hit(&self, _: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> {
         None
+    }
+
+    fn emission_coordinates(
+        &self,
+        _: &BoundingSphere,
+        _: &EmitterPoint,
+        direction: Vec3,
+        _: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        Some(EmissionCoordinates { position: None, direction: Some(sampling::sphere_inverse(direction)) })
     }
 }

@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -114,5 +114,16 @@ impl Emitter for SpotLight {
 
     fn hit(&self, _: &BoundingSphere, _: &EmitterPoint, _: Vec3, _: Vec3) -> Option<HitDensities> {
         None
+    }
+
+    fn emission_coordinates(
+        &self,
+        _: &BoundingSphere,
+        _: &EmitterPoint,
+        direction: Vec3,
+        _: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        let at = sampling::cone_inverse(self.cone.axis, self.cone.height(), direction);
+        (at[0] <= 1.0).then_some(EmissionCoordinates { position: None, direction: Some(at) })
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_1_PI, TAU};
 use glam::{DVec3, Vec3};
 use upbp_estimators::Spectrum;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
 use upbp_media::orthonormal_basis;
 
@@ -65,6 +65,39 @@ impl Source {
             Self::Directional(_) => [1.0, disc],
             Self::Environment => [0.25 * FRAC_1_PI, disc],
         }
+    }
+
+    /// The random numbers of a start, by pairs; `None` beside the disc of an infinite light.
+    pub fn coordinates(
+        &self,
+        bounds: &BoundingSphere,
+        point: DVec3,
+        direction: DVec3,
+        on_ray: DVec3,
+    ) -> Option<[Option<[f64; 2]>; 2]> {
+        let turn = |x: f64, y: f64| (y.atan2(x) / TAU).rem_euclid(1.0);
+        let frame = |axis: DVec3| {
+            let (s, t) = orthonormal_basis(axis.as_vec3());
+            (s.as_dvec3(), t.as_dvec3())
+        };
+        let disc = || {
+            let (s, t) = frame(direction);
+            let from_centre = (on_ray - bounds.centre.as_dvec3()) / f64::from(bounds.radius);
+            let (x, y) = (from_centre.dot(s), from_centre.dot(t));
+            (x * x + y * y <= 1.0).then(|| [x * x + y * y, turn(x, y)])
+        };
+        let sphere = [0.5 * (1.0 - direction.z), turn(direction.x, direction.y)];
+        Some(match self {
+            Self::Area(Shape::Rectangle { corner, edges }) => {
+                let (s, t) = frame(edges[0].cross(edges[1]).normalize());
+                let (x, y) = (direction.dot(s), direction.dot(t));
+                [Some(Shape::coordinates(*corner, edges, point)), Some([x * x + y * y, turn(x, y)])]
+            }
+            Self::Area(Shape::Sphere { .. }) => return None,
+            Self::Point(_) => [None, Some(sphere)],
+            Self::Directional(_) => [Some(disc()?), None],
+            Self::Environment => [Some(disc()?), Some(sphere)],
+        })
     }
 
     /// `p_nee`.
@@ -189,6 +222,19 @@ impl Emitter for Light {
             pdf_position: pdf_position as f32,
             pdf_direction: pdf_direction as f32,
         })
+    }
+
+    fn emission_coordinates(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        on_ray: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        let [point, direction, on_ray] = [point.position, direction, on_ray].map(Vec3::as_dvec3);
+        let pairs = self.source.coordinates(bounds, point, direction, on_ray)?;
+        let [position, direction] = pairs.map(|pair| pair.map(|pair| pair.map(|u| u as f32)));
+        Some(EmissionCoordinates { position, direction })
     }
 
     fn pdf_incident(

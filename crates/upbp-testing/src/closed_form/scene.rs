@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use upbp_estimators::scene::{BoundingSphere, EmitterId, Hit, Scene};
-use upbp_estimators::{BodyId, Interior, MediumId, Ray};
+use upbp_estimators::{BodyId, EmissionGuide, Interior, MediumId, Ray};
 
 use super::camera::Pinhole;
 use super::fog::Fog;
@@ -58,6 +58,8 @@ pub struct ClosedForm {
     pub media: Vec<Fog>,
     /// Camera.
     pub camera: Pinhole,
+    /// Guides of light sub-paths, at the positions of their [`EmitterId`], for oracles; none at first.
+    pub guides: Vec<Option<EmissionGuide>>,
 }
 
 impl ClosedForm {
@@ -114,7 +116,7 @@ impl ClosedForm {
             light(Source::Environment, 2.0),
         ];
         let camera = Pinhole { centre, size, film_distance: size as f32 };
-        Self { objects, lights, media, camera }
+        Self { objects, lights, media, camera, guides: Vec::new() }
     }
 
     /// The body that counts at a point, by asking every body.

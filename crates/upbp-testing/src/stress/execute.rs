@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
-use upbp_core::{Counters, Film, RenderError, Settings};
+use upbp_core::{Counters, Film, FrozenPlan, RenderError, Settings, Start};
 use upbp_scene::ReadyScene;
 
 use crate::processor;
@@ -52,15 +52,20 @@ impl Render {
 }
 
 /// Renders in a thread of its own: a panic, an endless loop and whatever may not be on a film are errors.
-pub(crate) fn render(scene: &str, settings: &Settings, iterations: u64) -> Result<Render, String> {
+pub(crate) fn render(
+    scene: &str,
+    settings: &Settings,
+    plan: Option<FrozenPlan>,
+    iterations: u64,
+) -> Result<Render, String> {
     let (text, settings) = (scene.to_owned(), settings.clone());
     let (send, receive) = mpsc::channel();
     let id = Arc::new(OnceLock::new());
     let own_id = Arc::clone(&id);
     let thread = std::thread::spawn(move || {
-        let render = || {
+        let render = move || {
             let _ = own_id.set(std::fs::read_link("/proc/thread-self"));
-            render_here(&text, settings, iterations)
+            render_here(&text, settings, plan, iterations)
         };
         let result = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
@@ -98,11 +103,16 @@ fn message(panic: &(dyn std::any::Any + Send)) -> String {
         .unwrap_or_default()
 }
 
-fn render_here(text: &str, settings: Settings, iterations: u64) -> Result<Render, String> {
+fn render_here(
+    text: &str,
+    settings: Settings,
+    plan: Option<FrozenPlan>,
+    iterations: u64,
+) -> Result<Render, String> {
     let start = Instant::now();
     let scene = ReadyScene::from_ron_str(text, "").map_err(|error| format!("refused: {error}"))?;
     let settings = settings.validate().map_err(|error| format!("refused: {error}"))?;
-    let mut renderer = match scene.renderer(settings) {
+    let mut renderer = match scene.start_renderer(settings, Start { plan, ..Start::default() }) {
         // Where nothing scatters and no light can be hit: rightly so.
         Err(RenderError::NoLight { possible, .. }) if possible.is_empty() => return Ok(Render::black(start)),
         renderer => renderer.map_err(|error| format!("refused: {error}"))?,

@@ -112,15 +112,17 @@ impl Case {
     /// Looks up where the photons are, puts the camera on one, and sees that it is there.
     fn on_photon(&self, index: usize) -> Result<f64, String> {
         let seed = 1;
-        let watch = |axes: &Axes| photons(&axes.scene(), &with_seed(axes, seed));
-        let places = watch(&self.axes)?;
+        let watch = |axes: &Axes, plan| photons(&axes.scene(), &with_seed(axes, seed), plan);
+        let (places, plan) = watch(&self.axes, None)?;
         let place = *places.get(index % places.len().max(1)).ok_or("no photons")?;
         let view = View::OnPhoton(place.to_array().map(f64::from));
         let axes = Axes { view, ..self.axes.clone() };
-        if !watch(&axes)?.contains(&place) {
+        let (places, plan) = watch(&axes, Some(plan))?;
+        if !places.contains(&place) {
             return Err(format!("no photon at {place} any more"));
         }
-        render_axes(&axes, ITERATIONS, seed).map(|render| render.seconds)
+        let render = render(&axes.scene(), &with_seed(&axes, seed), Some(plan), ITERATIONS);
+        render.map(|render| render.seconds)
     }
 
     fn oracle(&self, render: &Render, attempt: u32) -> Option<String> {
@@ -133,7 +135,7 @@ impl Case {
 }
 
 fn render_axes(axes: &Axes, iterations: u64, seed: u32) -> Result<Render, String> {
-    render(&axes.scene(), &with_seed(axes, seed), iterations)
+    render(&axes.scene(), &with_seed(axes, seed), None, iterations)
 }
 
 fn with_seed(axes: &Axes, seed: u32) -> upbp_core::Settings {
@@ -455,10 +457,6 @@ fn slabs(cases: &mut Vec<Case>) {
 /// A camera exactly on a photon of its first iteration, with kernels from nothing to everything.
 fn on_photons(cases: &mut Vec<Case>) {
     for light in LIGHTS {
-        // Which of two lights a photon comes from depends on what the camera sees.
-        if matches!(light, Light::Uneven(_)) {
-            continue;
-        }
         for layout in [Layout::Ball, Layout::Floor, Layout::Room] {
             for (tau, radius) in
                 [(1.0, None), (1.0, Some(1e-7)), (1.0, Some(1.0)), (1e2, None), (1e2, Some(1e-7))]

@@ -1,21 +1,28 @@
-//! The places of photons. With a single light their places depend on seed, iteration and index alone, so a
-//! camera can be put exactly on one of them.
+//! The places of photons. By a given plan they depend on seed, iteration and index alone, so a camera can be
+//! put exactly on one of them.
 
 use glam::Vec3;
-use upbp_core::Settings;
+use upbp_core::{FrozenPlan, Settings, Start};
 use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{PreparedScene, StreamKind};
 use upbp_scene::ReadyScene;
 
-/// Vertices of the light sub-paths of the first iteration.
-pub(crate) fn photons(scene: &str, settings: &Settings) -> Result<Vec<Vec3>, String> {
+/// Vertices of the light sub-paths of the first iteration by a plan, or by the one that is chosen, with it.
+pub(crate) fn photons(
+    scene: &str,
+    settings: &Settings,
+    plan: Option<FrozenPlan>,
+) -> Result<(Vec<Vec3>, FrozenPlan), String> {
     let scene = ReadyScene::from_ron_str(scene, "").map_err(|error| format!("refused: {error}"))?;
     let settings = settings.clone().validate().map_err(|error| format!("refused: {error}"))?;
-    let mut renderer = scene.renderer(settings).map_err(|error| format!("refused: {error}"))?;
+    let start = Start { plan, ..Start::default() };
+    let mut renderer = scene.start_renderer(settings, start).map_err(|error| format!("refused: {error}"))?;
+    let frozen = renderer.state().identity().frozen_plan();
     let plan = renderer.iteration_plan(0);
-    let world = PreparedScene::new(&scene).map_err(|error| format!("refused: {error}"))?;
+    let mut world = PreparedScene::new(&scene).map_err(|error| format!("refused: {error}"))?;
+    world.set_emitter_choice(&frozen.emitters).map_err(|error| format!("refused: {error}"))?;
     let context = Context { prepared: &world, plan: &plan };
     let (mut scratch, mut out) = (Scratch::default(), LightChunk::default());
     for path in 0..plan.light_paths {
@@ -26,5 +33,5 @@ pub(crate) fn photons(scene: &str, settings: &Settings) -> Result<Vec<Vec3>, Str
     if (counted.light_edges, counted.light_vertices) != (own.light_edges, own.light_vertices) {
         return Err("the renderer has other light sub-paths".to_owned());
     }
-    Ok(out.vertices.iter().map(|vertex| vertex.position).collect())
+    Ok((out.vertices.iter().map(|vertex| vertex.position).collect(), frozen))
 }

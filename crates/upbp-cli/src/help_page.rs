@@ -14,7 +14,7 @@ fn page() -> String {
     program.build();
     let mut page = format!(
         "# The program `upbp`\n\n\
-         <!-- Written from the options: `UPDATE=1 cargo test -p upbp-cli reference`. -->\n\n\
+         <!-- Written from the options: `UPDATE=1 cargo test -p upbp-cli help_page`. -->\n\n\
          {}.\n\n\
          ```sh\ncargo install --path crates/upbp-cli\n```\n\n\
          | command | |\n|---|---|\n",
@@ -132,7 +132,7 @@ fn the_page_says_what_the_help_says() {
     let line = found.lines().zip(page.lines()).position(|(found, expected)| found != expected);
     assert!(
         found == page,
-        "docs/cli.md is not what the options say (line {}): `UPDATE=1 cargo test -p upbp-cli reference` writes it",
+        "docs/cli.md is not what the options say (line {}): `UPDATE=1 cargo test -p upbp-cli help_page` writes it",
         line.unwrap_or(found.lines().count().min(page.lines().count())) + 1
     );
 }

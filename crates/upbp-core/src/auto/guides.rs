@@ -1,0 +1,111 @@
+//! Guides to the starts of light sub-paths that the picture needs (`docs/theory.md`, section 6.11).
+//!
+//! Where a glass ball is a millionth of what the sun shines on, no light sub-path of a small run meets it. So
+//! the first guides lead to where camera sub-paths have been: to points of specular surfaces, behind which
+//! there may be a caustic, and to points that next events found lit. What the light sub-paths that follow
+//! these guides bring to the picture makes the next ones. A guide stays if it lowers the variance.
+
+use glam::Vec3;
+use upbp_estimators::observer::LightEnd;
+use upbp_estimators::scene::{Emitter, EmitterId, Scene};
+use upbp_estimators::{
+    EmissionGuide, EmissionSample, IterationPlan, PreparedScene, Stream, StreamKind, TechniqueSet,
+};
+
+/// Part of the first guide that leads to specular surfaces; the rest leads to lit points.
+const SPECULAR: f64 = 0.6;
+/// Points of specular surfaces that are enough.
+const MOST_POINTS: usize = 4096;
+/// The most that a guide may leave of the second moment of contributions. Half of the starts stay where they
+/// are, so that other light loses up to a factor of two, of which a small run may see nothing.
+const WORTH: f64 = 0.25;
+
+/// What a run knows of useful starts.
+#[derive(Default)]
+pub(super) struct Evidence {
+    /// Starts of light sub-paths, with the weighted light that they brought to the picture.
+    pub(super) starts: Vec<(LightEnd, f64)>,
+    /// Points on lights, with receivers that see them.
+    pub(super) lit: Vec<(LightEnd, Vec3)>,
+    /// Points of specular surfaces that camera sub-paths have met.
+    pub(super) specular: Vec<Vec3>,
+}
+
+/// Random numbers of starts at one emitter, and the axes that matter.
+#[derive(Clone, Default)]
+struct Starts {
+    axes: [bool; 4],
+    samples: Vec<EmissionSample>,
+}
+
+impl Starts {
+    fn fit(&self) -> Option<EmissionGuide> {
+        EmissionGuide::fit(&self.samples, self.axes)
+    }
+}
+
+/// Whether techniques start light sub-paths, at an emitter that tells its random numbers.
+pub(super) fn can_guide<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> bool {
+    let tells = |(index, emitter): (usize, &S::Emitter)| {
+        let [u_position, u_direction] = [[0.3, 0.6]; 2];
+        let start = emitter.sample_emission(&scene.bounds, u_position, u_direction);
+        start.is_some_and(|start| {
+            let (id, position) = (EmitterId(index as u32), start.point.position);
+            scene.emission_coordinates(id, &start.point, start.direction, position).is_some()
+        })
+    };
+    !techniques.without(TechniqueSet::PT).is_empty() && scene.scene.emitters().iter().enumerate().any(tells)
+}
+
+/// Guides to where camera sub-paths have been.
+pub(super) fn first<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    plan: &IterationPlan,
+    seen: &Evidence,
+) -> Vec<Option<EmissionGuide>> {
+    let mut starts = vec![Starts::default(); scene.scene.emitters().len()];
+    let mut add = |end: &LightEnd, on_ray: Vec3, light: f64| {
+        let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, on_ray);
+        if let (Some((at, axes)), Some(starts)) = (at, starts.get_mut(end.emitter.0 as usize)) {
+            starts.axes = axes;
+            starts.samples.push(EmissionSample { at, light });
+        }
+    };
+    for (end, receiver) in &seen.lit {
+        add(end, *receiver, (1.0 - SPECULAR) / seen.lit.len() as f64);
+    }
+    let step = seen.specular.len().div_ceil(MOST_POINTS).max(1);
+    let points = seen.specular.len().div_ceil(step);
+    for (index, &point) in seen.specular.iter().step_by(step).enumerate() {
+        let mut stream = Stream::new(plan.seed, plan.iteration, StreamKind::PilotLight, index as u64);
+        let Some((emitter, _)) = scene.choose_next_event(stream.uniform()) else { continue };
+        let light = &scene.scene.emitters()[emitter.0 as usize];
+        if let Some(incident) = light.sample_incident(&scene.bounds, point, stream.pair()) {
+            let end = LightEnd { emitter, point: incident.point, direction: -incident.towards_light };
+            add(&end, point, SPECULAR / points as f64);
+        }
+    }
+    starts.iter().map(Starts::fit).collect()
+}
+
+/// Guides to the starts that brought light to the picture, at emitters whose guide has been worth it: the one
+/// that was followed is judged, since it does not know what it brought.
+pub(super) fn next<S: Scene>(scene: &PreparedScene<'_, S>, seen: &Evidence) -> Vec<Option<EmissionGuide>> {
+    let mut starts = vec![Starts::default(); scene.scene.emitters().len()];
+    // Second moments, by the guides that were followed and by the emitters' own distributions.
+    let mut moments = vec![[0.0; 2]; starts.len()];
+    for (end, light) in &seen.starts {
+        let on_ray = end.point.position;
+        let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, on_ray);
+        let Some((at, axes)) = at else { continue };
+        let emitter = end.emitter.0 as usize;
+        let factor = scene.emission_factor(end.emitter, &end.point, end.direction, on_ray);
+        starts[emitter].axes = axes;
+        starts[emitter].samples.push(EmissionSample { at, light: *light });
+        moments[emitter][0] += light * light;
+        moments[emitter][1] += light * light * f64::from(factor);
+    }
+    let is_worth = |[guided, plain]: [f64; 2]| guided < WORTH * plain;
+    let guides = starts.iter().zip(moments);
+    guides.map(|(starts, moments)| is_worth(moments).then(|| starts.fit()).flatten()).collect()
+}

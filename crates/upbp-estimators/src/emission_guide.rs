@@ -1,0 +1,320 @@
+//! Guided emission: light sub-paths that start where the picture needs them (`docs/theory.md`, section 6.11).
+//!
+//! An emitter maps four uniform random numbers to a place and a direction. A guide warps these numbers by a
+//! density that is constant within the cells of a binary tree over the unit hypercube, so that it serves
+//! every kind of emitter and stays exact.
+
+use serde::{Deserialize, Serialize};
+
+/// Random numbers of a start: two for the place, two for the direction.
+pub(crate) const AXES: usize = 4;
+/// Part of the starts that stays with the emitter's own distribution: no contribution has more than twice the
+/// weight that it has without a guide.
+const DEFENSIVE: f64 = 0.5;
+/// Samples that a cell needs to be split.
+const SPLIT_SAMPLES: usize = 16;
+/// Part of all light that a cell needs to be split.
+const SPLIT_LIGHT: f64 = 1.0 / 2048.0;
+/// Most splits along one axis: random numbers have 24 bits, and positions of a scene hardly more.
+const MOST_SPLITS: u8 = 20;
+/// Shares are multiples of one over this.
+const SHARES: u16 = 4096;
+/// The least share of a half.
+const LEAST_SHARE: u16 = 4;
+/// Bins per axis by which a cell is judged.
+const BINS: usize = 8;
+/// Concentration of the light in the bins of a cell, 1 if it is even, from which on the cell is split.
+const UNEVEN: f64 = 1.15;
+
+/// A start of a light sub-path with the light that it brought to the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmissionSample {
+    /// The random numbers that it was made with: two for the place, two for the direction.
+    pub at: [f32; 4],
+    /// Its light, not negative: contributions that already count for their density, in any unit.
+    pub light: f64,
+}
+
+/// A distribution over the random numbers with which light sub-paths start at an emitter.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct EmissionGuide {
+    /// A binary tree in preorder: the lower half follows its node.
+    nodes: Vec<Node>,
+}
+
+/// Axis, index of the upper half, and share of the lower half; the upper half of a leaf is 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Node(u8, u32, u16);
+
+const LEAF: Node = Node(0, 0, 0);
+
+impl Node {
+    fn lower_share(self) -> f64 {
+        f64::from(self.2) / f64::from(SHARES)
+    }
+
+    const fn is_leaf(self) -> bool {
+        self.1 == 0
+    }
+}
+
+impl EmissionGuide {
+    /// The guide to the light that was seen, which splits only the `axes` that matter. `None` if the light
+    /// says nothing, or is even.
+    #[must_use]
+    pub fn fit(samples: &[EmissionSample], axes: [bool; 4]) -> Option<Self> {
+        let mut samples: Vec<_> =
+            samples.iter().filter(|sample| sample.light > 0.0 && sample.light.is_finite()).copied().collect();
+        let total: f64 = samples.iter().map(|sample| sample.light).sum();
+        let mut fit = Fit { nodes: Vec::new(), axes, total };
+        let cell = Cell { low: [0.0; AXES], splits: [0; AXES] };
+        (total > 0.0 && total.is_finite()).then(|| fit.grow(cell, &mut samples));
+        (fit.nodes.len() > 1).then_some(Self { nodes: fit.nodes })
+    }
+
+    /// Maps uniform random numbers to guided ones; returns the guided density there, relative to uniform.
+    #[must_use]
+    pub fn warp(&self, uniform: [f32; 4]) -> ([f32; 4], f32) {
+        let mut within = uniform.map(f64::from);
+        let (mut low, mut width) = ([0.0; AXES], [1.0; AXES]);
+        let (mut index, mut density) = (0, 1.0);
+        while !self.nodes[index].is_leaf() {
+            let node = self.nodes[index];
+            let (axis, share) = (node.0 as usize, node.lower_share());
+            width[axis] *= 0.5;
+            if within[axis] < share {
+                within[axis] /= share;
+                density *= 2.0 * share;
+                index += 1;
+            } else {
+                within[axis] = (within[axis] - share) / (1.0 - share);
+                low[axis] += width[axis];
+                density *= 2.0 * (1.0 - share);
+                index = node.1 as usize;
+            }
+        }
+        let at = std::array::from_fn(|axis| {
+            let end = ((low[axis] + width[axis]) as f32).next_down();
+            ((low[axis] + width[axis] * within[axis]) as f32).min(end)
+        });
+        (at, density as f32)
+    }
+
+    /// The guided density at random numbers, relative to uniform.
+    #[must_use]
+    pub fn density(&self, at: [f32; 4]) -> f32 {
+        let mut within = at;
+        let (mut index, mut density) = (0, 1.0);
+        while !self.nodes[index].is_leaf() {
+            let node = self.nodes[index];
+            let (axis, share) = (node.0 as usize, node.lower_share());
+            // Exact: a multiplication by two and a difference of neighbours.
+            within[axis] *= 2.0;
+            if within[axis] < 1.0 {
+                density *= 2.0 * share;
+                index += 1;
+            } else {
+                within[axis] -= 1.0;
+                density *= 2.0 * (1.0 - share);
+                index = node.1 as usize;
+            }
+        }
+        density as f32
+    }
+
+    /// Whether this is a tree: what is read from a file may be anything.
+    pub(crate) fn is_valid(&self) -> bool {
+        // The subtree at an index, whose end it returns. Deeper than any tree that is built is no tree.
+        fn end(nodes: &[Node], index: usize, depth: usize) -> Option<usize> {
+            let node = *nodes.get(index)?;
+            if node.is_leaf() {
+                return Some(index + 1);
+            }
+            let is_node = (node.0 as usize) < AXES && (LEAST_SHARE..=SHARES - LEAST_SHARE).contains(&node.2);
+            if !is_node || depth > AXES * MOST_SPLITS as usize {
+                return None;
+            }
+            let middle = end(nodes, index + 1, depth + 1)?;
+            (middle == node.1 as usize).then(|| end(nodes, middle, depth + 1)).flatten()
+        }
+        end(&self.nodes, 0, 0) == Some(self.nodes.len())
+    }
+}
+
+/// A cell of the hypercube.
+#[derive(Clone, Copy)]
+struct Cell {
+    low: [f32; AXES],
+    splits: [u8; AXES],
+}
+
+impl Cell {
+    fn width(&self, axis: usize) -> f32 {
+        0.5_f32.powi(i32::from(self.splits[axis]))
+    }
+
+    fn volume(&self) -> f64 {
+        (0..AXES).map(|axis| f64::from(self.width(axis))).product()
+    }
+}
+
+/// A tree that grows.
+struct Fit {
+    nodes: Vec<Node>,
+    axes: [bool; AXES],
+    total: f64,
+}
+
+impl Fit {
+    /// Appends the tree of a cell; returns the probability of the cell.
+    fn grow(&mut self, cell: Cell, samples: &mut [EmissionSample]) -> f64 {
+        let index = self.nodes.len();
+        self.nodes.push(LEAF);
+        let light: f64 = samples.iter().map(|sample| sample.light).sum();
+        let Some(axis) = self.axis_to_split(&cell, samples, light) else {
+            return DEFENSIVE * cell.volume() + (1.0 - DEFENSIVE) * light / self.total;
+        };
+        let half = 0.5 * cell.width(axis);
+        let middle = cell.low[axis] + half;
+        samples.sort_unstable_by(|a, b| a.at[axis].total_cmp(&b.at[axis]));
+        let (below, above) = samples.split_at_mut(samples.partition_point(|sample| sample.at[axis] < middle));
+        let mut lower = cell;
+        lower.splits[axis] += 1;
+        let mut upper = lower;
+        upper.low[axis] = middle;
+        let lower = self.grow(lower, below);
+        let start = self.nodes.len() as u32;
+        let upper = self.grow(upper, above);
+        let share = (lower / (lower + upper) * f64::from(SHARES)).round() as u16;
+        self.nodes[index] = Node(axis as u8, start, share.clamp(LEAST_SHARE, SHARES - LEAST_SHARE));
+        lower + upper
+    }
+
+    /// The axis along which the light of a cell is least even; `None` if it is even, or too little is known.
+    fn axis_to_split(&self, cell: &Cell, samples: &[EmissionSample], light: f64) -> Option<usize> {
+        if samples.len() < SPLIT_SAMPLES || light < SPLIT_LIGHT * self.total {
+            return None;
+        }
+        let squares: f64 = samples.iter().map(|sample| sample.light * sample.light).sum();
+        let effective = light * light / squares;
+        let concentration = |axis: usize| {
+            let mut bins = [0.0; BINS];
+            for sample in samples {
+                let place = (sample.at[axis] - cell.low[axis]) / cell.width(axis) * BINS as f32;
+                bins[(place as usize).min(BINS - 1)] += sample.light / light;
+            }
+            BINS as f64 * bins.iter().map(|bin| bin * bin).sum::<f64>()
+        };
+        // Even light in few samples has a concentration of its own.
+        let least = UNEVEN + 2.0 * (BINS - 1) as f64 / effective;
+        (0..AXES)
+            .filter(|&axis| self.axes[axis] && cell.splits[axis] < MOST_SPLITS)
+            .map(|axis| (axis, concentration(axis)))
+            .filter(|(_, concentration)| *concentration > least)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(axis, _)| axis)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rand_xoshiro::rand_core::SeedableRng as _;
+
+    use super::*;
+
+    fn uniform(random: &mut Xoshiro256PlusPlus) -> [f32; 4] {
+        [0; 4].map(|_| (random.next_u64() >> 40) as f32 / (1_u32 << 24) as f32)
+    }
+
+    /// Light in a small box, and a little everywhere.
+    fn spot(seed: u64, centre: [f32; 4], width: f32, axes: [bool; 4]) -> Vec<EmissionSample> {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let inside = |at: [f32; 4], random: &mut Xoshiro256PlusPlus| {
+            let u = uniform(random);
+            std::array::from_fn(|i| {
+                if axes[i] { (centre[i] + width * (u[i] - 0.5)).clamp(0.0, 0.999_999_9) } else { at[i] }
+            })
+        };
+        (0..4096)
+            .map(|i| {
+                let at = uniform(&mut random);
+                if i % 16 == 0 {
+                    EmissionSample { at, light: 1e-3 }
+                } else {
+                    EmissionSample { at: inside(at, &mut random), light: 1.0 }
+                }
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_warped_has_the_density_that_it_is_said_to_have(
+            seed in 0_u64..1000,
+            centre in prop::array::uniform4(0.0_f32..1.0),
+            width in 1e-4_f32..0.5,
+            axes in prop::array::uniform4(any::<bool>()),
+        ) {
+            let Some(guide) = EmissionGuide::fit(&spot(seed, centre, width, axes), axes) else { return Ok(()) };
+            prop_assert!(guide.is_valid());
+            let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+            // The mean of 1 / density over guided numbers is the volume: one.
+            let (mut volume, mut squares, n) = (0.0, 0.0, 20_000);
+            for _ in 0..n {
+                let (at, density) = guide.warp(uniform(&mut random));
+                prop_assert!(at.iter().all(|x| (0.0..1.0).contains(x)), "{at:?}");
+                prop_assert_eq!(guide.density(at), density);
+                prop_assert!(density > 0.2 * DEFENSIVE as f32, "{}", density);
+                volume += 1.0 / f64::from(density);
+                squares += f64::from(density).powi(-2);
+            }
+            let mean = volume / f64::from(n);
+            let error = ((squares / f64::from(n) - mean * mean) / f64::from(n)).sqrt();
+            prop_assert!((mean - 1.0).abs() < 5.0 * error + 1e-3, "{} +- {}", mean, error);
+        }
+    }
+
+    #[test]
+    fn light_in_a_millionth_of_the_cube_gets_most_starts() {
+        for centre in [[0.5; 4], [0.3, 0.7, 0.5, 0.5]] {
+            let axes = [true, true, false, false];
+            let guide = EmissionGuide::fit(&spot(3, centre, 1e-3, axes), axes).expect("uneven light");
+            let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+            let hits = (0..1000)
+                .map(|_| guide.warp(uniform(&mut random)).0)
+                .filter(|at| (0..2).all(|axis| (at[axis] - centre[axis]).abs() < 1e-3))
+                .count();
+            assert!(hits > 400, "{hits} of 1000");
+            assert!(guide.nodes.len() < 500, "{}", guide.nodes.len());
+        }
+    }
+
+    #[test]
+    fn even_light_and_none_need_no_guide() {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let even: Vec<_> =
+            (0..4096).map(|_| EmissionSample { at: uniform(&mut random), light: 1.0 }).collect();
+        assert_eq!(EmissionGuide::fit(&even, [true; 4]), None);
+        assert_eq!(EmissionGuide::fit(&[], [true; 4]), None);
+        let dark = EmissionSample { at: [0.1; 4], light: f64::NAN };
+        assert_eq!(EmissionGuide::fit(&[dark; 100], [true; 4]), None);
+    }
+
+    #[test]
+    fn what_is_no_tree_is_refused() {
+        let is_valid = |nodes: &[Node]| EmissionGuide { nodes: nodes.to_vec() }.is_valid();
+        assert!(is_valid(&[LEAF]));
+        assert!(is_valid(&[Node(1, 2, 2000), LEAF, LEAF]));
+        assert!(!is_valid(&[]));
+        assert!(!is_valid(&[Node(1, 2, 2000), LEAF]), "cut off");
+        assert!(!is_valid(&[Node(1, 1, 2000), LEAF, LEAF]), "overlap");
+        assert!(!is_valid(&[Node(4, 2, 2000), LEAF, LEAF]), "no axis");
+        assert!(!is_valid(&[Node(0, 2, 0), LEAF, LEAF]), "an impossible half");
+        assert!(!is_valid(&[LEAF, LEAF]), "more than a tree");
+        let deep: Vec<_> = (0..1000).map(|i| Node(0, 2000 - i, 2000)).chain([LEAF; 1001]).collect();
+        assert!(!is_valid(&deep));
+    }
+}
