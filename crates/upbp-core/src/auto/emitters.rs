@@ -19,7 +19,7 @@ use upbp_estimators::{
 };
 
 use super::full_plan::{iteration_plan, plan_with};
-use super::guides::{self, Evidence};
+use super::guides::{self, Evidence, Starts};
 use super::pieces::{in_pieces, pixel};
 use super::statistics;
 use crate::budget::{Budget, Halt};
@@ -74,6 +74,7 @@ pub(crate) fn choose<S: Scene>(
     let plan = iteration_plan(scene, settings, &plan, 0);
     let rounds = if is_guided { GUIDED_ROUNDS } else { 1 };
     let part = (1.0 - QUICK_LOOK) * PART / f64::from(rounds);
+    let mut first = Vec::new();
     for round in 0..rounds {
         // Each round has random numbers of its own.
         let plan = IterationPlan { iteration: plan.iteration + u64::from(round), ..plan.clone() };
@@ -83,9 +84,11 @@ pub(crate) fn choose<S: Scene>(
             scene.choose_emitters_by(&seen.emission, &seen.next_event);
         }
         if is_guided {
-            let guides = match round {
-                0 => guides::first(scene, &plan, &seen.guides),
-                _ => guides::next(scene, &seen.guides),
+            let guides: Vec<_> = if round == 0 {
+                first = guides::first(scene, &plan, &seen.guides);
+                first.iter().map(Starts::fit).collect()
+            } else {
+                guides::next(scene, &seen.guides, &first)
             };
             let is_done = guides.iter().all(Option::is_none);
             scene.guide_emission(guides);

@@ -14,6 +14,9 @@ use upbp_estimators::{
 
 /// Part of the first guide that leads to specular surfaces; the rest leads to lit points.
 const SPECULAR: f64 = 0.6;
+/// Part of all further guides that leads where the first one leads: the few starts that have brought light do
+/// not outline what they met, and what lies beside their cells is bright and rare.
+const FIRST: f64 = 0.3;
 /// Points of specular surfaces that are enough.
 const MOST_POINTS: usize = 4096;
 /// The most that a guide may leave of the second moment of contributions. Half of the starts stay where they
@@ -33,14 +36,26 @@ pub(super) struct Evidence {
 
 /// Random numbers of starts at one emitter, and the axes that matter.
 #[derive(Clone, Default)]
-struct Starts {
+pub(super) struct Starts {
     axes: [bool; 4],
     samples: Vec<EmissionSample>,
 }
 
 impl Starts {
-    fn fit(&self) -> Option<EmissionGuide> {
+    /// The guide to these starts.
+    pub(super) fn fit(&self) -> Option<EmissionGuide> {
         EmissionGuide::fit(&self.samples, self.axes)
+    }
+
+    fn light(&self) -> f64 {
+        self.samples.iter().map(|sample| sample.light).sum()
+    }
+
+    /// Adds other starts as a part of all light.
+    fn add(&mut self, other: &Self, part: f64) {
+        let scale = part / (1.0 - part) * self.light() / other.light();
+        let scaled = |sample: &EmissionSample| EmissionSample { light: scale * sample.light, ..*sample };
+        self.samples.extend(other.samples.iter().map(scaled));
     }
 }
 
@@ -57,12 +72,12 @@ pub(super) fn can_guide<S: Scene>(scene: &PreparedScene<'_, S>, techniques: Tech
     !techniques.without(TechniqueSet::PT).is_empty() && scene.scene.emitters().iter().enumerate().any(tells)
 }
 
-/// Guides to where camera sub-paths have been.
+/// Starts, by emitter, that lead to where camera sub-paths have been.
 pub(super) fn first<S: Scene>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
     seen: &Evidence,
-) -> Vec<Option<EmissionGuide>> {
+) -> Vec<Starts> {
     let mut starts = vec![Starts::default(); scene.scene.emitters().len()];
     let mut add = |end: &LightEnd, on_ray: Vec3, light: f64| {
         let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, on_ray);
@@ -85,12 +100,16 @@ pub(super) fn first<S: Scene>(
             add(&end, point, SPECULAR / points as f64);
         }
     }
-    starts.iter().map(Starts::fit).collect()
+    starts
 }
 
 /// Guides to the starts that brought light to the picture, at emitters whose guide has been worth it: the one
 /// that was followed is judged, since it does not know what it brought.
-pub(super) fn next<S: Scene>(scene: &PreparedScene<'_, S>, seen: &Evidence) -> Vec<Option<EmissionGuide>> {
+pub(super) fn next<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    seen: &Evidence,
+    first: &[Starts],
+) -> Vec<Option<EmissionGuide>> {
     let mut starts = vec![Starts::default(); scene.scene.emitters().len()];
     // Second moments, by the guides that were followed and by the emitters' own distributions.
     let mut moments = vec![[0.0; 2]; starts.len()];
@@ -106,6 +125,9 @@ pub(super) fn next<S: Scene>(scene: &PreparedScene<'_, S>, seen: &Evidence) -> V
         moments[emitter][1] += light * light * f64::from(factor);
     }
     let is_worth = |[guided, plain]: [f64; 2]| guided < WORTH * plain;
+    for (starts, first) in starts.iter_mut().zip(first) {
+        starts.add(first, FIRST);
+    }
     let guides = starts.iter().zip(moments);
     guides.map(|(starts, moments)| is_worth(moments).then(|| starts.fit()).flatten()).collect()
 }
