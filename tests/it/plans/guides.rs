@@ -24,10 +24,10 @@ fn ball(size: f32) -> ReadyScene {
 }
 
 /// Mean of the shadow with the caustic in it.
-fn shadow(scene: &ReadyScene, techniques: &Techniques) -> [Estimate; 3] {
+fn shadow(scene: &ReadyScene, techniques: Techniques) -> [Estimate; 3] {
     let means: Vec<[f64; 3]> = (0..8)
         .map(|seed| {
-            let settings = Settings { seed, techniques: techniques.clone(), ..Settings::default() };
+            let settings = Settings { seed, techniques, ..Settings::default() };
             let mut renderer = renderer(scene, Settings { deterministic: true, ..settings });
             (0..16).for_each(|_| assert!(renderer.iterate()));
             renderer.film().image().mean()
@@ -41,7 +41,7 @@ fn shadow(scene: &ReadyScene, techniques: &Techniques) -> [Estimate; 3] {
 #[test]
 fn the_caustic_of_small_glass_does_not_depend_on_the_size_of_the_ground() {
     for techniques in [Techniques::Set(TechniqueSet::BPT), Techniques::Auto] {
-        let [small, large] = [3.0, 300.0].map(|size| shadow(&ball(size), &techniques));
+        let [small, large] = [3.0, 300.0].map(|size| shadow(&ball(size), techniques));
         println!("{techniques:?}: {small:?}, {large:?}");
         for (small, large) in small.iter().zip(&large) {
             assert!(large.error < 10.0 * small.error, "{small:?}, {large:?}");
