@@ -25,7 +25,8 @@ impl EmitterChoice {
     }
 }
 
-/// Light that each emitter was seen to bring, as [`choose_emitters_by`](crate::PreparedScene::choose_emitters_by) takes it.
+/// Light that each emitter was seen to bring, as
+/// [`choose_emitters_by`](crate::PreparedScene::choose_emitters_by) takes it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EmitterShares {
     /// Light by emitter, in any unit; emitters that are left out bring nothing.

@@ -72,13 +72,17 @@ pub(super) fn can_guide<S: Scene>(scene: &PreparedScene<'_, S>, techniques: Tech
     !techniques.without(TechniqueSet::PT).is_empty() && scene.scene.emitters().iter().enumerate().any(tells)
 }
 
-/// Starts, by emitter, that lead to where camera sub-paths have been.
+/// Starts, by emitter, that lead to where camera sub-paths have been; none without specular surfaces, since
+/// next events find what is lit there.
 pub(super) fn first<S: Scene>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
     seen: &Evidence,
 ) -> Vec<Starts> {
     let mut starts = vec![Starts::default(); scene.scene.emitters().len()];
+    if seen.specular.is_empty() {
+        return starts;
+    }
     let mut add = |end: &LightEnd, on_ray: Vec3, light: f64| {
         let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, on_ray);
         if let (Some((at, axes)), Some(starts)) = (at, starts.get_mut(end.emitter.0 as usize)) {
