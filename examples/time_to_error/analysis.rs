@@ -45,6 +45,16 @@ impl Curve {
         Self { name, series, floor, mean }
     }
 
+    /// The same with relMSE over scales for that of pixels. A reference with independent pixels has the same
+    /// floor.
+    pub(crate) fn over_scales(&self) -> Self {
+        let series = self.series.iter().map(|(seed, points)| {
+            let over_scales = |p: &ErrorPoint| ErrorPoint { relative_mse: p.over_scales, ..*p };
+            (*seed, points.iter().map(over_scales).collect())
+        });
+        Self::new(self.name.clone(), series.collect(), self.floor)
+    }
+
     /// Seconds and RMSE, the geometric mean over the seeds.
     pub(crate) fn rmse(&self) -> Vec<[f64; 2]> {
         self.mean.iter().map(|point| [point.seconds, point.rmse]).collect()
@@ -144,6 +154,7 @@ fn geometric_mean(series: &[(u64, Vec<ErrorPoint>)]) -> Vec<ErrorPoint> {
             seconds: mean(|p| p.seconds),
             iterations: point.iterations,
             relative_mse: mean(|p| p.relative_mse),
+            over_scales: mean(|p| p.over_scales),
             rmse: mean(|p| p.rmse),
         })
     };
@@ -169,6 +180,7 @@ pub(crate) mod tests {
             seconds,
             iterations: i as u64 + 1,
             relative_mse: error,
+            over_scales: error,
             rmse: error.sqrt(),
         };
         let points = points.into_iter().enumerate().map(point).collect();

@@ -91,6 +91,7 @@ impl<'a> Line<'a> {
             seconds,
             iterations: film.iterations(),
             relative_mse: image.relative_mse(reference),
+            over_scales: image.relative_mse_over_scales(reference),
             rmse: image.rmse(reference),
         });
     }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::analysis::{Curve, Reached};
 
 /// First line of the CSV file.
-pub(crate) const CSV_HEADER: &str = "scene,set,seed,seconds,iterations,relmse,rmse\n";
+pub(crate) const CSV_HEADER: &str = "scene,set,seed,seconds,iterations,relmse,over_scales,rmse\n";
 
 /// The measured points of a curve as they are, noise of the reference included.
 pub(crate) fn csv(scene: &str, curve: &Curve) -> String {
@@ -15,8 +15,8 @@ pub(crate) fn csv(scene: &str, curve: &Curve) -> String {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "{scene},{},{seed},{:.6},{},{:.6e},{:.6e}",
-                curve.name, p.seconds, p.iterations, p.relative_mse, p.rmse
+                "{scene},{},{seed},{:.6},{},{:.6e},{:.6e},{:.6e}",
+                curve.name, p.seconds, p.iterations, p.relative_mse, p.over_scales, p.rmse
             );
         }
     }

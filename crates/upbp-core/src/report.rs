@@ -8,7 +8,7 @@ use upbp_estimators::{Counters, Technique};
 use crate::auto::technique_support::TechniqueSupport;
 use crate::film::{ErrorEstimate, IterationSet};
 use crate::plan::Plan;
-use crate::state::{ErrorSeries, PassSeconds, State};
+use crate::state::{ErrorPoint, ErrorSeries, PassSeconds, State};
 
 /// Report of a render.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,6 +46,9 @@ pub struct Report {
     /// Estimated relMSE of the image, without the bias of kernels and light that no technique finds; `None`
     /// before there are two halves.
     pub estimated_error: Option<ErrorEstimate>,
+    /// The same over scales ([`crate::Image::relative_mse_over_scales`]): larger where neighbouring pixels
+    /// share errors, as blotches and streaks do.
+    pub estimated_over_scales: Option<f64>,
     /// Error against a reference over time, if there is one.
     pub series: ErrorSeries,
 }
@@ -87,6 +90,9 @@ impl Report {
             map_bytes: record.map_bytes,
             expected_bytes: record.expected_bytes,
             estimated_error: error,
+            estimated_over_scales: error
+                .zip(film.shared_error())
+                .map(|(error, ratio)| error.relative_mse * ratio),
             series: record.series.clone(),
         }
     }
@@ -130,7 +136,13 @@ impl fmt::Display for Report {
         }
         writeln!(f)?;
         match self.estimated_error {
-            Some(error) => writeln!(f, "estimated relMSE: {error}")?,
+            Some(error) => {
+                write!(f, "estimated relMSE: {error}")?;
+                if let Some(over_scales) = self.estimated_over_scales {
+                    write!(f, "; over scales {over_scales:.2e}")?;
+                }
+                writeln!(f)?;
+            }
             None => writeln!(f, "estimated relMSE: unknown before the second iteration")?,
         }
         if c.cut_walks > 0 {
@@ -148,7 +160,11 @@ impl fmt::Display for Report {
             )?;
         }
         if let Some(last) = self.series.points().last() {
-            writeln!(f, "against the reference: relMSE {:.3e}, RMSE {:.3e}", last.relative_mse, last.rmse)?;
+            let ErrorPoint { relative_mse, over_scales, rmse, .. } = last;
+            writeln!(
+                f,
+                "against the reference: relMSE {relative_mse:.3e} ({over_scales:.3e} over scales), RMSE {rmse:.3e}"
+            )?;
         }
         Ok(())
     }

@@ -57,6 +57,7 @@ fn nothing_grows_with_the_number_of_iterations() {
             seconds: i as f64,
             iterations: i + 1,
             relative_mse: rmse * rmse,
+            over_scales: rmse * rmse,
             rmse,
         });
         if i + 1 == (wanted / 4).min(1000) {

@@ -33,6 +33,7 @@ fn good() -> &'static [u8] {
             seconds: 0.1,
             iterations: 3,
             relative_mse: 1e-300,
+            over_scales: 1e-300,
             rmse: 1.0 / 3.0,
         });
         let mut bytes = Vec::new();

@@ -30,6 +30,7 @@ pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: Beside<'_
                 seconds: now.seconds,
                 iterations: now.iterations,
                 relative_mse: image.relative_mse(reference),
+                over_scales: image.relative_mse_over_scales(reference),
                 rmse: image.rmse(reference),
             });
         }

@@ -16,7 +16,7 @@ pub(super) struct Found {
     pub(super) plan: Plan,
     /// Whether no other candidate is likely to be better by more than [`GAIN`].
     pub(super) is_clear: bool,
-    /// Relative variance of an iteration.
+    /// Relative variance of a pixel in an iteration.
     pub(super) variance: f64,
     /// Processor nanoseconds of an iteration.
     pub(super) cost: f64,
@@ -51,7 +51,7 @@ pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     Found {
         plan,
         is_clear: !judge.known.iter().any(|other| other.may_beat(&best)),
-        variance: best.variance.iter().sum(),
+        variance: variance.relative(&best.plan).iter().sum(),
         cost: cost.iteration(&plan),
     }
 }
@@ -73,7 +73,7 @@ fn descend(judge: &mut Judge<'_>, start: Plan, candidates: &Candidates) -> Judge
 #[derive(Clone, Copy, Debug)]
 struct Judged {
     plan: Plan,
-    /// Relative variance of one iteration, in parts due to groups of pixels.
+    /// Relative variance of one iteration over sizes of blocks, in parts due to groups of pixels.
     variance: [f64; GROUPS],
     /// Processor nanoseconds of one iteration.
     cost: f64,
@@ -139,7 +139,7 @@ impl Judge<'_> {
             .filter(|plan| find(&self.known, **plan).is_none())
             .map(|&plan| Judged {
                 plan,
-                variance: self.variance.relative(&plan),
+                variance: self.variance.over_scales(&plan),
                 cost: self.cost.iteration(&plan),
             })
             .collect();

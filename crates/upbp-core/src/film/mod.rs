@@ -368,6 +368,18 @@ impl Film {
         self.error_map().map_or(ErrorEstimate::UNKNOWN, |map| map.estimate())
     }
 
+    /// How much larger the [error over scales](Image::relative_mse_over_scales) is than that of pixels, by
+    /// the difference of the two halves: 1 where errors of neighbours are independent. `None` without two
+    /// halves that differ.
+    #[must_use]
+    pub fn shared_error(&self) -> Option<f64> {
+        let [even, odd] = self.halves()?;
+        let image = self.image();
+        let of = |sides: &[u32]| even.difference_over(sides, &odd, &image);
+        let ratio = of(&BLOCK_SIDES) / of(&[1]);
+        ratio.is_finite().then_some(ratio)
+    }
+
     /// Mean over the image of each kept layer, relative to the whole, by luminance.
     #[must_use]
     pub fn shares(&self) -> Vec<(Layer, f64)> {
@@ -435,12 +447,53 @@ fn usable(radiance: Spectrum) -> ([f64; 3], u64) {
     (values, dropped)
 }
 
+/// Sides in pixels of the square blocks whose errors count alike, where neighbours may share errors.
+pub(crate) const BLOCK_SIDES: [u32; 4] = [1, 4, 8, 16];
+
 impl Image {
     /// relMSE against a reference of the same size: mean over pixels and channels of `(x − r)² / (r² +
     /// 0.01)`.
     #[must_use]
     pub fn relative_mse(&self, reference: &Self) -> f64 {
         self.mean_of(reference, |x, r| (x - r).powi(2) / (r * r + 0.01))
+    }
+
+    /// relMSE of the means of square blocks of pixels times their pixels, mean over blocks of 1, 4, 8 and 16
+    /// pixels a side: the relMSE where errors of pixels are independent, more where neighbours share them,
+    /// as blotches and streaks do. Blocks that the picture cuts count by their pixels.
+    #[must_use]
+    pub fn relative_mse_over_scales(&self, reference: &Self) -> f64 {
+        self.difference_over(&BLOCK_SIDES, reference, reference)
+    }
+
+    /// Squared differences of the means of blocks times their pixels, relative to another image, mean over
+    /// sides of blocks.
+    fn difference_over(&self, sides: &[u32], other: &Self, reference: &Self) -> f64 {
+        let of_side = |side: &u32| {
+            let [x, y, r] = [self, other, reference].map(|image| image.block_sums(*side as usize));
+            let term = |((x, y), r): ((&[f64; 4], &[f64; 4]), &[f64; 4])| {
+                let n = x[3];
+                let squares = (0..3).map(|c| ((x[c] - y[c]) / n).powi(2) / ((r[c] / n).powi(2) + 0.01));
+                n * n * squares.sum::<f64>()
+            };
+            let sum: f64 = x.iter().zip(&y).zip(&r).map(term).sum();
+            sum / (3 * self.pixels.len().max(1)) as f64
+        };
+        sides.iter().map(of_side).sum::<f64>() / sides.len() as f64
+    }
+
+    /// Sums over square blocks of pixels, with the number of pixels behind.
+    fn block_sums(&self, side: usize) -> Vec<[f64; 4]> {
+        let width = self.width as usize;
+        let columns = width.div_ceil(side);
+        let mut sums = vec![[0.0; 4]; columns * (self.height as usize).div_ceil(side)];
+        for (i, pixel) in self.pixels.iter().enumerate() {
+            let sum = &mut sums[i / width / side * columns + i % width / side];
+            for (sum, value) in sum.iter_mut().zip(pixel.iter().chain(&[1.0])) {
+                *sum += f64::from(*value);
+            }
+        }
+        sums
     }
 
     /// Root of the mean squared difference to a reference of the same size.
@@ -474,6 +527,45 @@ mod tests {
         pixel.layers[Layer::Bpt as usize] = Spectrum::splat(bpt);
         pixel.layers[Layer::Bb1d as usize] = Spectrum::splat(bb1d);
         pixel
+    }
+
+    /// Errors that all pixels have in common grow with the pixels of blocks, independent ones do not.
+    #[test]
+    fn shared_errors_count_by_the_pixels_that_share_them() {
+        let (width, height) = (320, 203);
+        let image = |value: &dyn Fn(u32) -> f32| {
+            let pixels = (0..width * height).map(|i| [value(i); 3]).collect();
+            Image { width, height, pixels }
+        };
+        let flat = image(&|_| 1.0);
+        let of = |image: &Image| image.relative_mse_over_scales(&flat) / image.relative_mse(&flat);
+        let mixed = |i: u32| {
+            let x = (i ^ (i >> 16)).wrapping_mul(0x7feb_352d);
+            (x ^ (x >> 15)).wrapping_mul(0x846c_a68b)
+        };
+        let independent = of(&image(&|i| if mixed(i) >> 31 == 0 { 1.1 } else { 0.9 }));
+        assert!((independent - 1.0).abs() < 0.1, "{independent}");
+        let shared = of(&image(&|_| 1.1));
+        let expected = [1.0, 4.0, 8.0, 16.0_f64].map(|side| {
+            let (full, rest) = ((203.0 / side).floor() * side, 203.0 % side);
+            side * (full * side + rest * rest) / 203.0
+        });
+        let expected = expected.iter().sum::<f64>() / 4.0;
+        assert!((shared / expected - 1.0).abs() < 1e-6, "{shared}, expected {expected}");
+        assert_eq!(flat.relative_mse_over_scales(&flat), 0.0);
+        // The halves of a film differ in the same ways.
+        let rect = PixelRect { x: 0, y: 0, width: 32, height: 32 };
+        let ratio = |value: &dyn Fn(u32) -> f32| {
+            let mut film = Film::new(rect, TechniqueSet::BPT);
+            let flat: Vec<Pixel> = (0..32 * 32).map(|_| pixel(1.0, 0.0)).collect();
+            film.add(0, &flat);
+            let noisy: Vec<Pixel> = (0..32 * 32).map(|i| pixel(value(i), 0.0)).collect();
+            film.add(1, &noisy);
+            film.shared_error()
+        };
+        assert!((ratio(&|_| 1.1).unwrap() - (1.0 + 16.0 + 64.0 + 256.0) / 4.0).abs() < 1e-3);
+        assert!(ratio(&|i| if mixed(i) >> 31 == 0 { 1.1 } else { 0.9 }).unwrap() < 2.0);
+        assert_eq!(ratio(&|_| 1.0), None);
     }
 
     #[test]

@@ -68,6 +68,8 @@ pub struct ErrorPoint {
     pub iterations: u64,
     /// Mean of `(x − r)² / (r² + 0.01)`.
     pub relative_mse: f64,
+    /// [relMSE over scales](crate::Image::relative_mse_over_scales).
+    pub over_scales: f64,
     /// Root mean squared difference.
     pub rmse: f64,
 }

@@ -2,6 +2,8 @@
 
 use upbp_estimators::scene::PixelRect;
 
+use super::blocks;
+
 /// Cells of the picture, one pixel of each of which a pilot render looks at.
 pub(crate) struct Grid {
     rect: PixelRect,
@@ -38,6 +40,23 @@ impl Grid {
             |index: u32, size: u32| ((f64::from(index) + 0.5) * self.side).min(f64::from(size - 1)) as u32;
         let (column, row) = (cell % self.columns, cell / self.columns);
         [self.rect.x + place(column, self.rect.width), self.rect.y + place(row, self.rect.height)]
+    }
+
+    /// A pixel near the one that stands for a cell, and the weight of what both have in common in the errors
+    /// of blocks. `None` where the picture ends.
+    ///
+    /// Its distance is drawn such that all cells together estimate sums over the pixels of blocks.
+    pub(crate) fn partner(&self, cell: u32) -> Option<([u32; 2], f64)> {
+        let (offset, weight) = blocks::offset(cell);
+        let [x, y] = self.pixel(cell);
+        let moved = |place: u32, start: u32, size: u32, offset: i32| {
+            // What blocks have in common is the same on the other side.
+            let places = [offset, -offset].map(|offset| place.checked_add_signed(offset));
+            places.into_iter().flatten().find(|place| (start..start + size).contains(place))
+        };
+        let x = moved(x, self.rect.x, self.rect.width, offset[0])?;
+        let y = moved(y, self.rect.y, self.rect.height, offset[1])?;
+        Some(([x, y], weight))
     }
 
     /// The cell of a pixel.

@@ -4,8 +4,11 @@
 //! The walks carry the densities of every technique for itself, so that a sample comes with the part of each
 //! in its weight.
 
+mod blocks;
 pub(super) mod grid;
 pub(super) mod recorder;
+
+use std::ops::Range;
 
 use upbp_estimators::path::{Context, LightChunk};
 use upbp_estimators::scene::{Camera, Scene};
@@ -72,11 +75,22 @@ pub(super) struct PilotRender {
     pub(super) samples: Vec<Sample>,
     /// Ends of samples: `ends[cell * passes + pass]` is behind the last one of each.
     pub(super) ends: Vec<u32>,
+    /// Merges with light sub-paths that are seen at two pixels of a block.
+    pub(super) shared: Vec<Shared>,
     /// Splats by cell. Light sub-paths fill the whole picture.
     pub(super) splats: Vec<(u32, Sample)>,
     /// Light sub-paths per pass over those of the plan, and the same of those with beams.
     pub(super) thinning: [f64; 2],
     pub(super) work: Work,
+}
+
+/// What the pixel of a cell and another one near it have merged of one light sub-path.
+pub(super) struct Shared {
+    pub(super) cell: u32,
+    /// Part of their product in the mean error of blocks.
+    pub(super) weight: f64,
+    /// Samples of the one pixel and of the other.
+    pub(super) samples: [Vec<Sample>; 2],
 }
 
 /// Average numbers of steps and samples of a sub-path.
@@ -119,6 +133,7 @@ impl PilotRender {
             passes: PASSES as usize,
             samples: Vec::new(),
             ends: Vec::new(),
+            shared: Vec::new(),
             splats: Vec::new(),
             thinning: [part(paths, plan.light_paths), part(beam_paths, plan.beam_paths)],
             work: Work::default(),
@@ -129,7 +144,7 @@ impl PilotRender {
             .map(|pass| {
                 // Not the iterations of other runs before the first iteration.
                 thinned.iteration = u64::from(pass) + 1;
-                Pass::trace(&Context { prepared: scene, plan: &thinned }, &grid, &room, halt)
+                Pass::trace(&Context { prepared: scene, plan: &thinned }, &grid, &room, pass == 0, halt)
             })
             .collect::<Option<Vec<_>>>()?;
         for pass in &mut passes {
@@ -137,7 +152,9 @@ impl PilotRender {
         }
         let camera_paths = f64::from(grid.cells() * PASSES);
         pilot.work = pilot.work(&passes, camera_paths, [paths, beam_paths].map(|n| f64::from(n * PASSES)));
+        let partners = std::mem::take(&mut passes[0].partners);
         pilot.sort(passes);
+        pilot.share(&partners, &grid);
         Some(pilot)
     }
 
@@ -223,6 +240,38 @@ impl PilotRender {
             }
         }
     }
+
+    /// Keeps what pixels have in common with their partners, which had the light sub-paths of the first pass.
+    fn share(&mut self, partners: &[Recorder], grid: &Grid) {
+        for cell in 0..self.cells {
+            let Some((_, weight)) = grid.partner(cell as u32) else { continue };
+            let Some(recorder) = partners.get(cell / PIECE) else { continue };
+            let mut near = recorder.of_path(cell % PIECE).to_vec();
+            near.sort_by_key(|sample| sample.merged);
+            let by_path = |a: &Sample, b: &Sample| a.merged == b.merged;
+            let own = &self.samples[self.range(cell, 0)];
+            for group in near.chunk_by(by_path).filter(|group| group[0].merged.is_some()) {
+                let start = own.partition_point(|sample| sample.merged < group[0].merged);
+                let length = own[start..].partition_point(|sample| sample.merged == group[0].merged);
+                if length > 0 {
+                    let samples = [own[start..start + length].to_vec(), group.to_vec()];
+                    self.shared.push(Shared { cell: cell as u32, weight, samples });
+                }
+            }
+        }
+    }
+
+    /// The samples of a look.
+    pub(super) fn look(&self, cell: usize, pass: usize) -> &[Sample] {
+        &self.samples[self.range(cell, pass)]
+    }
+
+    /// The places of the samples of a look.
+    pub(super) fn range(&self, cell: usize, pass: usize) -> Range<usize> {
+        let look = cell * self.passes + pass;
+        let start = if look == 0 { 0 } else { self.ends[look - 1] };
+        start as usize..self.ends[look] as usize
+    }
 }
 
 /// A pass: light sub-paths with their splats, and one camera sub-path for each cell.
@@ -231,13 +280,22 @@ struct Pass {
     light: Vec<Recorder>,
     /// Recorders of camera sub-paths, by piece.
     camera: Vec<Recorder>,
+    /// The same of the partners of cells' pixels.
+    partners: Vec<Recorder>,
     splats: Vec<(u32, Sample)>,
     counters: Counters,
 }
 
 impl Pass {
-    /// Traces the sub-paths of a pass; `None` if there is not enough room.
-    fn trace<S: Scene>(context: &Context<'_, S>, grid: &Grid, room: &Room, halt: &Halt<'_>) -> Option<Self> {
+    /// Traces the sub-paths of a pass, also at the partners of pixels if asked to; `None` if there is not
+    /// enough room.
+    fn trace<S: Scene>(
+        context: &Context<'_, S>,
+        grid: &Grid,
+        room: &Room,
+        with_partners: bool,
+        halt: &Halt<'_>,
+    ) -> Option<Self> {
         let plan: &IterationPlan = context.plan;
         let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
         let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut (Recorder, LightChunk<_, _>)| {
@@ -245,8 +303,13 @@ impl Pass {
             let kind = StreamKind::PilotLight;
             recorder.record(room, |recorder| trace_light_path(context, kind, index, scratch, out, recorder))
         })?;
-        let mut pass =
-            Self { light: Vec::new(), camera: Vec::new(), splats: Vec::new(), counters: Counters::default() };
+        let mut pass = Self {
+            light: Vec::new(),
+            camera: Vec::new(),
+            partners: Vec::new(),
+            splats: Vec::new(),
+            counters: Counters::default(),
+        };
         let (mut vertices, mut beams) = (Vec::new(), Vec::new());
         for (recorder, out) in pieces {
             vertices.extend(out.vertices);
@@ -262,10 +325,11 @@ impl Pass {
         } else {
             LightMap::empty()
         };
+        let kind = StreamKind::PilotCamera;
         let pieces = in_pieces(grid.cells(), halt, |cell, scratch, piece: &mut (Recorder, Counters)| {
             let (recorder, counters) = piece;
             // Passes begin alike: what they differ in is what stratification leaves.
-            let (kind, pixel, index) = (StreamKind::PilotCamera, grid.pixel(cell), u64::from(cell));
+            let (pixel, index) = (grid.pixel(cell), u64::from(cell));
             recorder.record(room, |recorder| {
                 trace_camera_path(context, &map, kind, pixel, index, scratch, counters, recorder);
             })
@@ -273,6 +337,26 @@ impl Pass {
         for (recorder, counters) in pieces {
             pass.counters.add(&counters);
             pass.camera.push(recorder);
+        }
+        if with_partners && Technique::ALL.iter().any(|technique| plan.merges_by(*technique)) {
+            pass.partners = in_pieces(grid.cells(), halt, |cell, scratch, recorder: &mut Recorder| {
+                let index = u64::from(grid.cells()) + u64::from(cell);
+                let mut counters = Counters::default();
+                recorder.record(room, |recorder| {
+                    if let Some((pixel, _)) = grid.partner(cell) {
+                        trace_camera_path(
+                            context,
+                            &map,
+                            kind,
+                            pixel,
+                            index,
+                            scratch,
+                            &mut counters,
+                            recorder,
+                        );
+                    }
+                })
+            })?;
         }
         Some(pass)
     }

@@ -8,6 +8,7 @@
 
 mod limits;
 mod pairs;
+mod shared;
 #[cfg(test)]
 mod tests;
 
@@ -16,8 +17,8 @@ use glam::DVec3;
 use upbp_estimators::{Technique, TechniqueSet};
 
 use super::full_plan::BEAMS;
-use super::pilot_render::PilotRender;
 use super::pilot_render::recorder::{ByTechnique, Sample, TECHNIQUES};
+use super::pilot_render::{PilotRender, Shared};
 use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
 use pairs::{Looks, View};
@@ -102,6 +103,12 @@ impl Variance {
         }
         let looks = Looks::new(&pilot);
         pilot.samples = Vec::new();
+        let view = View::new(&pilot, &looks, &Counts::of(&pilot.plan, &pilot));
+        let parts: Vec<f64> = pilot.shared.iter().map(|shared| view.in_common(shared)).collect();
+        for (shared, reduction) in pilot.shared.iter_mut().zip(reductions(&parts)) {
+            // A square, as the parts are.
+            shared.weight *= f64::from(reduction * reduction);
+        }
         Self { pilot, looks }
     }
 
@@ -114,6 +121,18 @@ impl Variance {
     /// of cells. Infinite if a path that the pilot render found is one that the plan cannot find.
     pub(super) fn relative(&self, plan: &Plan) -> [f64; GROUPS] {
         self.with(&Counts::of(plan, &self.pilot))
+    }
+
+    /// The same of blocks of pixels, times their pixels, mean over [sides](crate::film::BLOCK_SIDES) of
+    /// blocks: what pixels have in common counts once for each of them.
+    pub(super) fn over_scales(&self, plan: &Plan) -> [f64; GROUPS] {
+        let counts = Counts::of(plan, &self.pilot);
+        let mut variance = self.with(&counts);
+        let view = View::new(&self.pilot, &self.looks, &counts);
+        for shared in &self.pilot.shared {
+            variance[group(shared.cell as usize)] += view.in_common(shared) / self.pilot.cells as f64;
+        }
+        variance.map(finite_or_infinite)
     }
 
     fn with(&self, counts: &Counts) -> [f64; GROUPS] {
@@ -129,8 +148,7 @@ impl Variance {
             let second_moment = f64::from(view.share(&splat.shares).single(square));
             variance[group(*cell as usize)] += pilot.per_splat() * second_moment;
         }
-        // Not a number where no technique of the plan finds a path.
-        variance.map(|part: f64| if part.is_finite() { part } else { f64::INFINITY })
+        variance.map(finite_or_infinite)
     }
 
     /// Moments of the samples of a cell.
@@ -150,6 +168,11 @@ impl Variance {
         moments.mean_square = (sum.length_squared() - squares) / (passes * (passes - 1.0));
         moments
     }
+}
+
+/// Not a number where no technique of a plan finds a path.
+fn finite_or_infinite(variance: f64) -> f64 {
+    if variance.is_finite() { variance } else { f64::INFINITY }
 }
 
 /// Moments of the samples of camera sub-paths.
@@ -188,12 +211,6 @@ const fn group(cell: usize) -> usize {
 }
 
 impl PilotRender {
-    fn range(&self, cell: usize, pass: usize) -> std::ops::Range<usize> {
-        let group = cell * self.passes + pass;
-        let start = if group == 0 { 0 } else { self.ends[group - 1] };
-        start as usize..self.ends[group] as usize
-    }
-
     /// The mean radiance of each cell.
     fn means(&self) -> Vec<DVec3> {
         let passes = self.passes as f64;
@@ -220,11 +237,9 @@ impl PilotRender {
         for (cell, splat) in &mut self.splats {
             times(splat, factors[*cell as usize]);
         }
-    }
-
-    /// The samples of a look.
-    fn look(&self, cell: usize, pass: usize) -> &[Sample] {
-        &self.samples[self.range(cell, pass)]
+        for Shared { cell, samples, .. } in &mut self.shared {
+            samples.iter_mut().flatten().for_each(|sample| times(sample, factors[*cell as usize]));
+        }
     }
 
     /// The square of a sample, as large as that of all samples of the plan together.

@@ -169,6 +169,18 @@ impl<'a> View<'a> {
         result
     }
 
+    /// The factor of a sample under the plan.
+    pub(super) fn weight(&self, technique: Technique, shares: &[f32; TECHNIQUES]) -> f32 {
+        self.relative[technique as usize] * self.share(shares).inverse
+    }
+
+    /// Pairs of merges with one light sub-path, by two camera sub-paths, over those of the pilot render.
+    pub(super) fn pairs_relative(&self, first: Technique, second: Technique) -> f32 {
+        let paths = 1.0 + self.more[class(first).min(class(second))];
+        // One iteration makes the queries of all pixels or of none.
+        if first == second { paths * (1.0 + self.common[first as usize]) } else { paths }
+    }
+
     /// The densities of the plan at a sample's path.
     #[inline]
     pub(super) fn share(&self, shares: &[f32; TECHNIQUES]) -> Share {

@@ -2,10 +2,12 @@
 
 use glam::Vec3;
 use proptest::prelude::*;
+use upbp_estimators::scene::PixelRect;
 use upbp_estimators::{MergePeriods, Technique};
 
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
+use crate::auto::pilot_render::grid::Grid;
 use crate::auto::pilot_render::{PASSES, Work};
 use crate::auto::roulette::{self, COUNT, OF_PILOT, PILOT, relative_pass_probability};
 use crate::radius::RadiusSchedule;
@@ -48,6 +50,7 @@ fn pilot_of(other: Technique) -> PilotRender {
         passes,
         samples,
         ends,
+        shared: Vec::new(),
         splats: Vec::new(),
         thinning: [1.0; 2],
         work: Work::default(),
@@ -265,13 +268,21 @@ fn no_part_is_more_than_the_largest() {
     assert!(largest(vec![1.0; 1000]) >= 1.0);
 }
 
+/// A sample under a plan.
+fn weighted(sample: &Sample, counts: &Counts) -> DVec3 {
+    let share: f64 = sample.shares.iter().zip(counts.relative).map(|(s, n)| f64::from(*s) * n).sum();
+    sample.value.as_dvec3() * counts.relative[sample.technique as usize] / share
+}
+
+/// Pairs of merges with one light sub-path under a plan, over those of the pilot render.
+fn of_one_light_path(a: &Sample, b: &Sample, thinning: [f64; 2], counts: &Counts) -> f64 {
+    let beams = |sample: &Sample| matches!(sample.technique, Technique::Bp2d | Technique::Bb1d);
+    let class = usize::from(beams(a) && beams(b));
+    thinning[class] / counts.paths[class]
+}
+
 /// Products of all pairs, one by one.
 fn products(samples: &[Sample], thinning: [f64; 2], counts: &Counts) -> f64 {
-    let beams = |sample: &Sample| matches!(sample.technique, Technique::Bp2d | Technique::Bb1d);
-    let y = |sample: &Sample| {
-        let share: f64 = sample.shares.iter().zip(counts.relative).map(|(s, n)| f64::from(*s) * n).sum();
-        sample.value.as_dvec3() * counts.relative[sample.technique as usize] / share
-    };
     let mut sum = 0.0;
     for (i, a) in samples.iter().enumerate() {
         for b in samples[..i].iter().chain(&samples[i + 1..]) {
@@ -284,10 +295,9 @@ fn products(samples: &[Sample], thinning: [f64; 2], counts: &Counts) -> f64 {
                 factor /= counts.active[a.technique as usize];
             }
             if a.merged.is_some() && a.merged == b.merged {
-                let class = usize::from(beams(a) && beams(b));
-                factor *= thinning[class] / counts.paths[class];
+                factor *= of_one_light_path(a, b, thinning, counts);
             }
-            sum += factor * y(a).dot(y(b));
+            sum += factor * weighted(a, counts).dot(weighted(b, counts));
         }
     }
     sum
@@ -309,7 +319,79 @@ fn sample() -> impl Strategy<Value = Sample> {
         })
 }
 
+/// Where each light sub-path that comes by is seen by all pixels of a block, its mean varies as they do.
+#[test]
+fn variances_of_blocks_contain_what_pixels_share() {
+    const PLANNED: f64 = 16_000.0;
+    const TRACED: f64 = 8000.0;
+    /// Light sub-paths for each one that comes by.
+    const RARE: f64 = 400.0;
+    let cells = SIDE * SIDE;
+    let mut shares = [0.0; TECHNIQUES];
+    shares[Technique::Bb1d as usize] = 1.0;
+    let value = Vec3::splat((RARE / TRACED) as f32);
+    let mut pilot = PilotRender { thinning: [TRACED / PLANNED; 2], plan: planned(PLANNED as u32), ..pilot() };
+    (pilot.samples, pilot.ends) = (Vec::new(), Vec::new());
+    let grid = Grid::new(PixelRect { x: 0, y: 0, width: 4 * SIDE, height: 4 * SIDE }, cells);
+    for look in 0..cells * PASSES {
+        // As many as come by on average.
+        let found = (TRACED / RARE) as u32;
+        let seen = (0..found).map(|path| {
+            let merged = Some(look * found + path);
+            Sample { technique: Technique::Bb1d, merged, albedos: 1.0, value, shares }
+        });
+        pilot.samples.extend(seen.clone());
+        pilot.ends.push(pilot.samples.len() as u32);
+        if look.is_multiple_of(PASSES)
+            && let Some((_, weight)) = grid.partner(look / PASSES)
+        {
+            let shared =
+                |sample| Shared { cell: look / PASSES, weight, samples: [vec![sample], vec![sample]] };
+            pilot.shared.extend(seen.map(shared));
+        }
+    }
+    let prediction = Variance::of(pilot);
+    for paths in [1, 4] {
+        let plan = Plan { techniques: TechniqueSet::VOLUME_MERGES, ..planned(paths * PLANNED as u32) };
+        let [pixels, all] = [prediction.relative(&plan), prediction.over_scales(&plan)];
+        let found = all.iter().sum::<f64>() - pixels.iter().sum::<f64>();
+        // Other pixels of a block than the own one, mean over blocks of 1, 4, 8 and 16 pixels a side.
+        let expected =
+            (0.0 + 15.0 + 63.0 + 255.0) / 4.0 * RARE / (f64::from(paths) * PLANNED) / (1.0 + DARKNESS);
+        assert!((found / expected - 1.0).abs() < 0.02, "{paths}: {found}, expected {expected}");
+    }
+}
+
 proptest! {
+    #[test]
+    fn what_pixels_share_is_what_it_is_one_by_one(
+        own in prop::collection::vec(sample(), 0..8),
+        other in prop::collection::vec(sample(), 0..8),
+        paths in prop::array::uniform2(0.25_f64..4.0),
+        periodic in prop::array::uniform(proptest::bool::ANY),
+        thinning in prop::array::uniform2(0.1_f64..1.0),
+        weight in 0.1_f64..100.0,
+    ) {
+        let periodic: [bool; TECHNIQUES] = periodic;
+        let active: [f64; TECHNIQUES] = std::array::from_fn(|i| if periodic[i] { 0.25 } else { 1.0 });
+        let counts =
+            Counts { relative: active.map(|p| 0.5 + p), paths, active, roulette: PILOT, light_paths: 1.0 };
+        let mut expected = 0.0;
+        for a in &own {
+            for b in &other {
+                let queries =
+                    if a.technique == b.technique { 1.0 / counts.active[a.technique as usize] } else { 1.0 };
+                let factor = queries * of_one_light_path(a, b, thinning, &counts);
+                expected += weight * factor * weighted(a, &counts).dot(weighted(b, &counts));
+            }
+        }
+        let pilot = PilotRender { thinning, samples: Vec::new(), ends: Vec::new(), cells: 0, ..pilot() };
+        let looks = pairs::Looks::new(&pilot);
+        let shared = Shared { cell: 0, weight, samples: [own, other] };
+        let found = View::new(&pilot, &looks, &counts).in_common(&shared);
+        prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
+    }
+
     #[test]
     fn pairs_are_what_they_are_one_by_one(
         mut samples in prop::collection::vec(sample(), 0..24),
