@@ -47,7 +47,8 @@ impl<'a> Cost<'a> {
 
     /// Processor nanoseconds of the pilot render and of the search in it.
     pub(super) fn of_pilot(self) -> f64 {
-        let part = (self.0.cells * self.0.passes) as f64 / self.0.pixels;
+        // All passes of each cell's pixel, and its partner.
+        let part = (self.0.cells * (self.0.passes + 1)) as f64 / self.0.pixels;
         RECORDING * part * self.iteration(&self.0.plan)
     }
 

@@ -51,9 +51,13 @@ impl Starts {
         self.samples.iter().map(|sample| sample.light).sum()
     }
 
-    /// Adds other starts as a part of all light.
+    /// Adds other starts, if there are any, as a part of all light.
     fn add(&mut self, other: &Self, part: f64) {
-        let scale = part / (1.0 - part) * self.light() / other.light();
+        let others = other.light();
+        if others == 0.0 {
+            return;
+        }
+        let scale = part / (1.0 - part) * self.light() / others;
         let scaled = |sample: &EmissionSample| EmissionSample { light: scale * sample.light, ..*sample };
         self.samples.extend(other.samples.iter().map(scaled));
     }
