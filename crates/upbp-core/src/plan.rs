@@ -95,7 +95,7 @@ impl Plan {
 pub struct FrozenPlan {
     /// Techniques, sample counts and radii.
     pub plan: Plan,
-    /// How often sub-paths begin at each emitter of the scene.
+    /// Probabilities of the emitters that sub-paths begin at, and their guides.
     pub emitters: Arc<EmitterChoice>,
 }
 

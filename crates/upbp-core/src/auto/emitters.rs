@@ -100,7 +100,7 @@ pub(crate) fn choose<S: Scene>(
     Ok(())
 }
 
-/// What small runs of light and camera sub-paths have seen.
+/// Light that small runs of light and camera sub-paths have seen, by emitter.
 struct Measured {
     /// The contribution of every emitter by light sub-paths.
     emission: EmitterShares,

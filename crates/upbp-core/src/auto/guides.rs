@@ -23,7 +23,7 @@ const MOST_POINTS: usize = 4096;
 /// are, so that other light loses up to a factor of two, of which a small run may see nothing.
 const WORTH: f64 = 0.25;
 
-/// What a run knows of useful starts.
+/// Starts of light sub-paths that a run has found useful, and points that others may lead to.
 #[derive(Default)]
 pub(super) struct Evidence {
     /// Starts of light sub-paths, with the weighted light that they brought to the picture.

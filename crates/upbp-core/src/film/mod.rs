@@ -368,9 +368,9 @@ impl Film {
         self.error_map().map_or(ErrorEstimate::UNKNOWN, |map| map.estimate())
     }
 
-    /// How much larger the [error over scales](Image::relative_mse_over_scales) is than that of pixels, by
-    /// the difference of the two halves: 1 where errors of neighbours are independent. `None` without two
-    /// halves that differ.
+    /// Ratio of the [error over scales](Image::relative_mse_over_scales) to that of pixels, by the difference
+    /// of the two halves: 1 where errors of neighbours are independent. `None` without two halves that
+    /// differ.
     #[must_use]
     pub fn shared_error(&self) -> Option<f64> {
         let [even, odd] = self.halves()?;

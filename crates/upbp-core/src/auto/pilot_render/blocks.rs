@@ -1,4 +1,4 @@
-//! What neighbouring pixels have in common, as far as it counts: errors of blocks of pixels.
+//! Offsets of pixels that share the errors of a block, and the weights of what they share.
 //!
 //! Photons and beams are seen by many pixels of an iteration, so that the error of a block's mean falls less
 //! than with its number n of pixels. The mean over some sizes of blocks of n times the variance of a block's

@@ -84,7 +84,7 @@ pub(super) struct PilotRender {
     pub(super) work: Work,
 }
 
-/// What the pixel of a cell and another one near it have merged of one light sub-path.
+/// Merges with one light sub-path at the pixel of a cell and at another one near it.
 pub(super) struct Shared {
     pub(super) cell: u32,
     /// Part of their product in the mean error of blocks.

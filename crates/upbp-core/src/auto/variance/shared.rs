@@ -8,11 +8,11 @@ use crate::auto::pilot_render::Shared;
 use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
 
 impl View<'_> {
-    /// What two pixels have in common by a light sub-path under the plan, times its weight in the errors of
-    /// blocks.
+    /// Product of two pixels' merges with one light sub-path under the plan, times its weight in the errors
+    /// of blocks.
     ///
-    /// This is the product of both, without that of their means over the number of light sub-paths: an upper
-    /// bound, close to what is sought where a light sub-path meets a small part of the picture.
+    /// A covariance is less by the product of the means over the number of light sub-paths: little where
+    /// each of them meets a small part of the picture.
     pub(super) fn in_common(&self, shared: &Shared) -> f64 {
         let [own, other] = &shared.samples;
         let [own, other] = [self.by_technique(own), self.by_technique(other)];
