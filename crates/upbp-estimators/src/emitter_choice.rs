@@ -1,12 +1,13 @@
 //! The emitters that sub-paths begin at, and how often.
 
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::emission_guide::EmissionGuide;
-use crate::scene::EmitterId;
+use crate::scene::{BoundingSphere, EmitterId};
 
 /// The probabilities of emitters: part of a plan, so that iterations on all machines choose alike.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EmitterChoice {
     /// Where light sub-paths start.
@@ -17,11 +18,23 @@ pub struct EmitterChoice {
     /// guide.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) guides: Vec<Option<EmissionGuide>>,
+    /// Where the rays of most guided starts pass: light from infinity starts on discs around it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) focus: Option<Vec3>,
 }
 
 impl EmitterChoice {
     pub(crate) fn guide(&self, emitter: EmitterId) -> Option<&EmissionGuide> {
         self.guides.get(emitter.0 as usize)?.as_ref()
+    }
+
+    /// The sphere that light from infinity has to start in front of: around the focus, and about all of
+    /// `bounds`. So starts that lead to the focus have one place on the disc, whatever their direction.
+    pub(crate) fn emission_bounds(&self, bounds: &BoundingSphere) -> BoundingSphere {
+        self.focus.map_or(*bounds, |centre| BoundingSphere {
+            centre,
+            radius: bounds.radius + centre.distance(bounds.centre),
+        })
     }
 }
 

@@ -17,6 +17,8 @@ pub struct PreparedScene<'a, S: Scene> {
     /// By power.
     power: Selection,
     choice: Arc<EmitterChoice>,
+    /// Of [`EmitterChoice::emission_bounds`].
+    emission_bounds: BoundingSphere,
     environments: Vec<EmitterId>,
     passes_from_infinity: f64,
     camera_stack: Option<MediumStack>,
@@ -90,12 +92,14 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             emission: power.clone(),
             next_event: power.clone(),
             guides: Vec::new(),
+            focus: None,
         });
         Ok(Self {
             scene,
             bounds,
             power,
             choice,
+            emission_bounds: bounds,
             environments,
             passes_from_infinity: from_infinity.pass_probability,
             camera_stack,
@@ -111,19 +115,37 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// Power keeps a share, so that no emitter is lost that was not seen.
     pub fn choose_emitters_by(&mut self, emission: &EmitterShares, next_event: &EmitterShares) {
         let [emission, next_event] = [emission, next_event].map(|shares| self.power.blend(shares));
-        let guides = self.choice.guides.clone();
-        self.choice = Arc::new(EmitterChoice { emission, next_event, guides });
+        self.choice = Arc::new(EmitterChoice { emission, next_event, ..EmitterChoice::clone(&self.choice) });
+    }
+
+    /// Starts light from infinity on discs around a point, which guides lead to: finite, and the same for all
+    /// that guides learn from and are used with.
+    pub fn focus_emission(&mut self, focus: glam::Vec3) {
+        self.choose(EmitterChoice { focus: Some(focus), ..EmitterChoice::clone(&self.choice) });
     }
 
     /// Starts the light sub-paths of some emitters by guides; those that are left out go by themselves. The
-    /// guides must not depend on samples that they serve.
+    /// guides must not depend on samples that they serve. Without guides there is no
+    /// [focus](Self::focus_emission) either.
     ///
     /// # Panics
     /// If there are more guides than emitters.
     pub fn guide_emission(&mut self, guides: Vec<Option<EmissionGuide>>) {
         assert!(guides.len() <= self.scene.emitters().len(), "a guide per emitter");
         let guides = if guides.iter().all(Option::is_none) { Vec::new() } else { guides };
-        self.choice = Arc::new(EmitterChoice { guides, ..EmitterChoice::clone(&self.choice) });
+        let focus = self.choice.focus.filter(|_| !guides.is_empty());
+        self.choose(EmitterChoice { guides, focus, ..EmitterChoice::clone(&self.choice) });
+    }
+
+    fn choose(&mut self, choice: EmitterChoice) {
+        self.emission_bounds = choice.emission_bounds(&self.bounds);
+        self.choice = Arc::new(choice);
+    }
+
+    /// The sphere that emitters are asked with: they start light from infinity in front of it.
+    #[must_use]
+    pub const fn emission_bounds(&self) -> &BoundingSphere {
+        &self.emission_bounds
     }
 
     /// The choice of emitters, for a plan.
@@ -141,10 +163,12 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             [&choice.emission, &choice.next_event].iter().all(|selection| selection.fits(&self.power));
         let guides = &choice.guides;
         let can_be_followed = guides.len() <= self.scene.emitters().len()
-            && guides.iter().flatten().all(EmissionGuide::is_valid);
+            && guides.iter().flatten().all(EmissionGuide::is_valid)
+            && choice.focus.is_none_or(glam::Vec3::is_finite);
         if !(is_of_these && can_be_followed) {
             return Err(PrepareError::EmitterChoice { emitters: self.scene.emitters().len() });
         }
+        self.emission_bounds = choice.emission_bounds(&self.bounds);
         self.choice = choice.clone();
         Ok(())
     }
@@ -170,11 +194,11 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     ) -> Option<Emission> {
         let light = &self.scene.emitters()[emitter.0 as usize];
         let Some(guide) = self.choice.guide(emitter) else {
-            return light.sample_emission(&self.bounds, u_position, u_direction);
+            return light.sample_emission(&self.emission_bounds, u_position, u_direction);
         };
         let ([a, b, c, d], factor) =
             guide.warp([u_position[0], u_position[1], u_direction[0], u_direction[1]]);
-        let emission = light.sample_emission(&self.bounds, [a, b], [c, d])?;
+        let emission = light.sample_emission(&self.emission_bounds, [a, b], [c, d])?;
         Some(Emission { pdf_direction: emission.pdf_direction * factor, ..emission })
     }
 
@@ -203,7 +227,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         on_ray: glam::Vec3,
     ) -> Option<([f32; 4], [bool; 4])> {
         let light = self.scene.emitters().get(emitter.0 as usize)?;
-        let found = light.emission_coordinates(&self.bounds, point, direction, on_ray)?;
+        let found = light.emission_coordinates(&self.emission_bounds, point, direction, on_ray)?;
         let [a, b] = found.position.unwrap_or([0.5; 2]);
         let [c, d] = found.direction.unwrap_or([0.5; 2]);
         let [position, direction] = [found.position.is_some(), found.direction.is_some()];

@@ -5,7 +5,6 @@ use std::f64::consts::FRAC_1_PI;
 use glam::{DVec3, Vec3};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
 use upbp_estimators::observer::LightEnd;
-use upbp_estimators::scene::Scene;
 use upbp_estimators::{Interior, MediumId, Roulette};
 
 use upbp_testing::closed_form::fog::Fog;
@@ -248,7 +247,8 @@ impl Trace {
     fn guided(&self, scene: &ClosedForm, start: DVec3, outwards: DVec3, receiver: DVec3) -> f64 {
         let light = self.light.emitter.0 as usize;
         let Some(Some(guide)) = scene.guides.get(light) else { return 1.0 };
-        let pairs = scene.lights[light].source.coordinates(&scene.bounds(), start, outwards, receiver);
+        let pairs =
+            scene.lights[light].source.coordinates(&scene.emission_bounds(), start, outwards, receiver);
         pairs.map_or(1.0, |pairs| {
             let [[a, b], [c, d]] = pairs.map(|pair| pair.unwrap_or([0.5; 2]));
             f64::from(guide.density([a, b, c, d].map(|u| (u as f32).clamp(0.0, 1.0 - f32::EPSILON / 2.0))))
@@ -280,7 +280,7 @@ impl Trace {
             Source::Area(shape) => direction(0).dot(shape.normal(start)),
             _ => 1.0,
         };
-        let [pdf_position, pdf_direction] = light.source.pdf_emission(&scene.bounds(), cos);
+        let [pdf_position, pdf_direction] = light.source.pdf_emission(&scene.emission_bounds(), cos);
         let pdf_direction = pdf_direction * self.guided(scene, start, outwards, receiver);
         let end = PathVertex {
             kind: VertexKind::End,

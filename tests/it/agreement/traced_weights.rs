@@ -241,6 +241,9 @@ fn audit(name: &str, camera: Vec3, size: u32, choices: &IterationChoices, at_lea
 fn audit_scene(name: &str, scene: &ClosedForm, choices: &IterationChoices, at_least: usize) {
     let size = scene.camera.size;
     let mut world = PreparedScene::new(scene).expect("the scene is in order");
+    if let Some(focus) = scene.focus {
+        world.focus_emission(focus);
+    }
     world.guide_emission(scene.guides.clone());
     let plan = IterationPlan::new(scene, choices);
     let context = Context { prepared: &world, plan: &plan };
@@ -338,9 +341,10 @@ fn guides(scene: &ClosedForm) -> Vec<Option<EmissionGuide>> {
 
 #[test]
 fn guided_light_sub_paths() {
-    for camera in CAMERAS {
+    for (camera, focus) in CAMERAS.into_iter().zip([None, Some(Vec3::new(0.4, -0.2, 0.3))]) {
         let mut scene = ClosedForm::new(camera, 64);
         scene.guides = guides(&scene);
+        scene.focus = focus;
         assert!(scene.guides.iter().all(Option::is_some), "every light is guided");
         let choices = IterationChoices { light_paths: 12_000, beam_paths: 1000, ..choices() };
         audit_scene("guided light sub-paths", &scene, &choices, 1000);

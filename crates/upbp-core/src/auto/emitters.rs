@@ -85,6 +85,9 @@ pub(crate) fn choose<S: Scene>(
         }
         if is_guided {
             let guides: Vec<_> = if round == 0 {
+                if let Some(focus) = guides::focus(scene, &seen.guides) {
+                    scene.focus_emission(focus);
+                }
                 first = guides::first(scene, &plan, &seen.guides);
                 first.iter().map(Starts::fit).collect()
             } else {

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 use upbp_estimators::observer::LightEnd;
-use upbp_estimators::scene::{Emitter, EmitterId, Scene};
+use upbp_estimators::scene::{Emitter, EmitterId, EmitterKind, Scene};
 use upbp_estimators::{
     EmissionGuide, EmissionSample, IterationPlan, PreparedScene, Stream, StreamKind, TechniqueSet,
 };
@@ -67,13 +67,28 @@ impl Starts {
 pub(super) fn can_guide<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> bool {
     let tells = |(index, emitter): (usize, &S::Emitter)| {
         let [u_position, u_direction] = [[0.3, 0.6]; 2];
-        let start = emitter.sample_emission(&scene.bounds, u_position, u_direction);
+        let start = emitter.sample_emission(scene.emission_bounds(), u_position, u_direction);
         start.is_some_and(|start| {
             let (id, position) = (EmitterId(index as u32), start.point.position);
             scene.emission_coordinates(id, &start.point, start.direction, position).is_some()
         })
     };
     !techniques.without(TechniqueSet::PT).is_empty() && scene.scene.emitters().iter().enumerate().any(tells)
+}
+
+/// Where starts should pass: in the midst of the specular surfaces that camera sub-paths have met. `None`
+/// without light from infinity that comes from many directions: for any other the place on a disc does not
+/// depend on the direction.
+pub(super) fn focus<S: Scene>(scene: &PreparedScene<'_, S>, seen: &Evidence) -> Option<Vec3> {
+    let from_all_sides = scene.scene.emitters().iter().any(|light| light.kind() == EmitterKind::Environment);
+    let median = |axis: usize| {
+        let mut places: Vec<f32> = seen.specular.iter().map(|point| point[axis]).collect();
+        let middle = places.len() / 2;
+        *places.select_nth_unstable_by(middle, f32::total_cmp).1
+    };
+    (from_all_sides && !seen.specular.is_empty())
+        .then(|| Vec3::from_array([0, 1, 2].map(median)))
+        .filter(|focus| focus.is_finite())
 }
 
 /// Starts, by emitter, that lead to where camera sub-paths have been; none without specular surfaces, since
@@ -103,7 +118,7 @@ pub(super) fn first<S: Scene>(
         let mut stream = Stream::new(plan.seed, plan.iteration, StreamKind::PilotLight, index as u64);
         let Some((emitter, _)) = scene.choose_next_event(stream.uniform()) else { continue };
         let light = &scene.scene.emitters()[emitter.0 as usize];
-        if let Some(incident) = light.sample_incident(&scene.bounds, point, stream.pair()) {
+        if let Some(incident) = light.sample_incident(scene.emission_bounds(), point, stream.pair()) {
             let end = LightEnd { emitter, point: incident.point, direction: -incident.towards_light };
             add(&end, point, SPECULAR / points as f64);
         }

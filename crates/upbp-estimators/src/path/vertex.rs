@@ -76,7 +76,7 @@ impl EdgeSource {
             Self::Emitter { emitter, point, pdf_position } => {
                 let prepared = context.prepared;
                 let pdf = prepared.scene.emitters()[emitter.0 as usize].pdf_incident(
-                    &prepared.bounds,
+                    prepared.emission_bounds(),
                     point,
                     direction,
                     position,

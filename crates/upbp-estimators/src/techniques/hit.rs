@@ -113,7 +113,7 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let Some(light) = prepared.scene.emitters().get(emitter.0 as usize) else { return };
-    let Some(densities) = light.hit(&prepared.bounds, point, direction, receiver) else { return };
+    let Some(densities) = light.hit(prepared.emission_bounds(), point, direction, receiver) else { return };
     let weight = if edge.depth == 1 {
         // Nothing else makes a path of one edge.
         Weight::alone(Technique::Hit)

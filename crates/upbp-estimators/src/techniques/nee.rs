@@ -39,7 +39,8 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let (scene, mis) = (prepared.scene, &plan.mis);
     let Some((emitter, probability)) = prepared.choose_next_event(stream.uniform()) else { return };
     let light = &scene.emitters()[emitter.0 as usize];
-    let Some(incident) = light.sample_incident(&prepared.bounds, vertex.position, stream.pair()) else {
+    let Some(incident) = light.sample_incident(prepared.emission_bounds(), vertex.position, stream.pair())
+    else {
         return;
     };
     let kind = light.kind();

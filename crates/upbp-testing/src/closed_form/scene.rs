@@ -60,6 +60,8 @@ pub struct ClosedForm {
     pub camera: Pinhole,
     /// Guides of light sub-paths, at the positions of their [`EmitterId`], for oracles; none at first.
     pub guides: Vec<Option<EmissionGuide>>,
+    /// Point that light from infinity starts on discs around, for oracles of guided starts; none at first.
+    pub focus: Option<Vec3>,
 }
 
 impl ClosedForm {
@@ -116,7 +118,16 @@ impl ClosedForm {
             light(Source::Environment, 2.0),
         ];
         let camera = Pinhole { centre, size, film_distance: size as f32 };
-        Self { objects, lights, media, camera, guides: Vec::new() }
+        Self { objects, lights, media, camera, guides: Vec::new(), focus: None }
+    }
+
+    /// The sphere that light from infinity starts in front of.
+    pub fn emission_bounds(&self) -> BoundingSphere {
+        let BoundingSphere { centre, radius } = self.bounds();
+        self.focus.map_or(BoundingSphere { centre, radius }, |focus| BoundingSphere {
+            centre: focus,
+            radius: radius + (focus - centre).length(),
+        })
     }
 
     /// The body that counts at a point, by asking every body.
