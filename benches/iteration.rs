@@ -69,6 +69,7 @@ fn path(length: usize) -> Path {
             cos_light: cosine(0.5),
             cos_camera: cosine(1.7),
             sin_theta: if in_medium { 0.6 * vary(i, 2.3) } else { 0.0 },
+            scale: 1.0,
         }
     });
     let vertices: Vec<PathVertex> = vertices.collect();
@@ -97,6 +98,7 @@ fn plan() -> MisPlan {
             bp2d: 0.0,
             bb1d: 200.0 * 1e-2,
         }],
+        width: Vec::new(),
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
     }
@@ -108,8 +110,10 @@ fn in_medium(vertex: &PathVertex) -> bool {
 
 fn kind(vertex: &PathVertex) -> MergeKind {
     match vertex.kind {
-        VertexKind::Surface => MergeKind::Surface,
-        VertexKind::Medium(medium) => MergeKind::Medium { medium, sin_theta: vertex.sin_theta },
+        VertexKind::Surface => MergeKind::Surface { scale: vertex.scale },
+        VertexKind::Medium(medium) => {
+            MergeKind::Medium { medium, sin_theta: vertex.sin_theta, scale: vertex.scale }
+        }
         VertexKind::End | VertexKind::Delta => MergeKind::None,
     }
 }

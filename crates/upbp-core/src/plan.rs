@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use upbp_estimators::{EmitterChoice, MergePeriods, Roulette, Technique, TechniqueSet};
+use upbp_estimators::{EmitterChoice, FootprintField, MergePeriods, Roulette, Technique, TechniqueSet};
 
 use crate::radius::RadiusSchedule;
 
@@ -83,6 +83,13 @@ impl Plan {
             Err(format!("vertices_per_light_path: expected a number, found {}", self.vertices_per_light_path))
         } else if !(lengths.iter().all(finite) && finite(&radii.floor) && radii.floor > 0.0) {
             Err(format!("radii: expected lengths and a positive floor, found {radii:?}"))
+        } else if !radii.field.is_valid(lengths.into_iter().fold(0.0, f32::max)) {
+            Err(format!(
+                "radii.field: expected positive factors, of which the greatest is at most {} times the least, \
+                 and radii that differ by at most a tenth of the distance, found {:?}",
+                FootprintField::RANGE,
+                radii.field
+            ))
         } else {
             Ok(())
         }
@@ -180,6 +187,7 @@ mod tests {
                 pb2d: 0.0,
                 bp2d: 0.0,
                 bb1d: 0.0,
+                field: RadiusField::Uniform,
                 progressive: true,
                 floor: 1e-6,
             },

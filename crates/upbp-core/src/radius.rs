@@ -1,12 +1,14 @@
 //! Kernel radii: where they start and how they shrink (`docs/theory.md`, section 5).
 
 use serde::{Deserialize, Serialize};
-use upbp_estimators::{Kernel, Kernels};
+use upbp_estimators::{Kernel, Kernels, RadiusField, Technique, TechniqueSet};
 
 /// The first radius of a kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Radius {
-    /// From a pilot: as many photons in a kernel as smooth well, within bounds relative to the scene.
+    /// From a pilot: as many photons in a kernel as smooth well, within bounds relative to what the picture
+    /// shows, and over the scene as the width of a pixel. All techniques have the same radius everywhere if
+    /// one of them has another setting.
     #[default]
     Auto,
     /// A fraction of the radius of the scene's bounding sphere.
@@ -31,13 +33,28 @@ pub struct Radii {
     pub bb1d: Radius,
 }
 
-/// Radii over iterations: `r_i = r_0 (1 + i)^−γ`.
+impl Radii {
+    /// Whether all that `techniques` use are [automatic](Radius::Auto).
+    pub(crate) fn are_auto(&self, techniques: TechniqueSet) -> bool {
+        [
+            (Technique::Surf, self.surf),
+            (Technique::Pp3d, self.pp3d),
+            (Technique::Pb2d, self.pb2d),
+            (Technique::Bp2d, self.bp2d),
+            (Technique::Bb1d, self.bb1d),
+        ]
+        .iter()
+        .all(|(technique, radius)| *radius == Radius::Auto || !techniques.has(*technique))
+    }
+}
+
+/// Radii over iterations and over the scene: `r_i(x) = r_0 (1 + i)^−γ φ(x)`.
 ///
 /// `γ = 1/(d + 4)` for a kernel of `d` dimensions balances variance and squared bias of what merges alone can
 /// find, and is consistent, since `0 < γ < 1/d` (section 5.1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RadiusSchedule {
-    /// Radius of each technique in iteration 0, scene units; 0 where it is off.
+    /// Radius of each technique in iteration 0 where `φ` is one, scene units; 0 where it is off.
     pub surf: f32,
     /// PP3D.
     pub pp3d: f32,
@@ -47,6 +64,8 @@ pub struct RadiusSchedule {
     pub bp2d: f32,
     /// BB1D.
     pub bb1d: f32,
+    /// `φ`, the same for all techniques.
+    pub field: RadiusField,
     /// Whether radii shrink at all.
     pub progressive: bool,
     /// Radii do not fall below this, scene units: coordinates have no more digits.
@@ -64,10 +83,10 @@ impl RadiusSchedule {
         } else {
             1.0
         };
-        ((f64::from(first) * shrink) as f32).max(self.floor)
+        ((f64::from(first) * shrink) as f32).max(self.floor / self.field.least())
     }
 
-    /// The kernels of an iteration.
+    /// The kernels of an iteration where `φ` is one.
     pub(crate) fn kernels(&self, iteration: u64) -> Kernels {
         let kernel = |first: f32, dimension: i32, make: fn(f32) -> Kernel| {
             let radius = self.at(first, dimension, iteration);
@@ -95,6 +114,7 @@ mod tests {
             pb2d: 1.0,
             bp2d: 0.0,
             bb1d: 1.0,
+            field: RadiusField::Uniform,
             progressive: true,
             floor: 1e-6,
         };

@@ -5,6 +5,7 @@ use upbp_media::{Medium, MediumId};
 use crate::kernel::Kernel;
 use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
 use crate::periods::MergePeriods;
+use crate::radius_field::RadiusField;
 use crate::roulette::Roulette;
 use crate::scene::Scene;
 use crate::technique::{PerMerge, Technique, TechniqueSet};
@@ -59,8 +60,10 @@ pub struct IterationPlan {
     pub lengths: PathLengths,
     /// Russian roulette.
     pub roulette: Roulette,
-    /// Kernels with the radii of this iteration.
+    /// Kernels with the radii of this iteration, where their scale is one.
     pub kernels: Kernels,
+    /// Scale of radii over the scene.
+    pub radius_field: RadiusField,
     /// Periods of photon queries, in iterations.
     pub periods: MergePeriods,
     /// The techniques that run in this iteration: all but those whose photon queries other iterations make.
@@ -95,8 +98,10 @@ pub struct IterationChoices {
     pub lengths: PathLengths,
     /// Russian roulette.
     pub roulette: Roulette,
-    /// Kernels.
+    /// Kernels, where the scale of radii is one.
     pub kernels: Kernels,
+    /// Scale of radii over the scene.
+    pub radius_field: RadiusField,
     /// Periods of photon queries, in iterations.
     pub periods: MergePeriods,
     /// Heuristic of the weights.
@@ -107,13 +112,13 @@ pub struct IterationChoices {
     pub query_beams: BeamExtent,
 }
 
-/// Factor of the merges of a kernel in a medium, in `[0, 1]` (`docs/theory.md`, section 6.5): the light
-/// changes within a mean free path of a boundary, and a wider kernel averages over that. Where no other
-/// technique finds a path, the factor cancels out of the weights.
-fn trust(kernel: &Kernel, mean_free_path: f32) -> f64 {
+/// `(r/ℓ)⁴` of a kernel in a medium, `w` of the factor `1 / (1 + w)` of its merges (`docs/theory.md`, section
+/// 6.5): the light changes within a mean free path of a boundary, and a wider kernel averages over that.
+/// Where no other technique finds a path, the factor cancels out of the weights.
+fn width(kernel: &Kernel, mean_free_path: f32) -> f64 {
     let ratio = f64::from(kernel.radius()) / f64::from(mean_free_path);
     // A host may not know the mean free path.
-    if ratio.is_nan() { 1.0 } else { 1.0 / (1.0 + ratio.powi(4)) }
+    if ratio.is_nan() { 0.0 } else { ratio.powi(4) }
 }
 
 impl IterationPlan {
@@ -139,7 +144,7 @@ impl IterationPlan {
                 return VolumeMerges::default();
             }
             let trusted = |technique, kernel: &Kernel| {
-                merge(technique, kernel) * trust(kernel, medium.mean_free_path())
+                merge(technique, kernel) / (1.0 + width(kernel, medium.mean_free_path()))
             };
             VolumeMerges {
                 pp3d: trusted(Technique::Pp3d, &kernels.pp3d),
@@ -148,12 +153,18 @@ impl IterationPlan {
                 bb1d: trusted(Technique::Bb1d, &kernels.bb1d),
             }
         };
+        let widths = |medium: &S::Medium| {
+            let width = |kernel| width(kernel, medium.mean_free_path());
+            let Kernels { pp3d, pb2d, bp2d, bb1d, .. } = &kernels;
+            VolumeMerges { pp3d: width(pp3d), pb2d: width(pb2d), bp2d: width(bp2d), bb1d: width(bb1d) }
+        };
         // Expected samples of one connection: draws per vertex over stored vertices per light path.
         let connect = if choices.vertices_per_light_path > 0.0 && light_paths > 0 {
             on(Technique::Connect, f64::from(choices.connections) / choices.vertices_per_light_path)
         } else {
             0.0
         };
+        let merges = techniques.iter().any(Technique::merges);
         let mis = MisPlan {
             heuristic: choices.heuristic,
             hit: on(Technique::Hit, 1.0),
@@ -162,6 +173,7 @@ impl IterationPlan {
             light_tracing: on(Technique::LightTracing, paths),
             surf: merge(Technique::Surf, &kernels.surf),
             volume: scene.media().iter().map(in_medium).collect(),
+            width: scene.media().iter().map(widths).collect(),
             photon_beams: choices.photon_beams,
             query_beams: choices.query_beams,
         };
@@ -176,6 +188,8 @@ impl IterationPlan {
             lengths: choices.lengths,
             roulette: choices.roulette,
             kernels,
+            // Weights without merges know no radius.
+            radius_field: if merges { choices.radius_field } else { RadiusField::Uniform },
             periods,
             active: techniques.intersection(periods.active(choices.seed, choices.iteration)),
             mis,

@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 /// ones where a beam takes part: there the kernel is evaluated along a line and its edge would show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kernel {
+    shape: Shape,
     radius: f32,
     /// Value at the centre.
     peak: f32,
@@ -18,45 +19,59 @@ pub struct Kernel {
     effective_volume: f64,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shape {
+    Disc,
+    Ball,
+    ParabolicDisc,
+    ParabolicLine,
+}
+
 impl Kernel {
     /// Nothing is within reach: radius 0, of no effect in weights.
-    pub const NONE: Self = Self { radius: 0.0, peak: 0.0, falloff: 0.0, effective_volume: 0.0 };
+    pub const NONE: Self =
+        Self { shape: Shape::Disc, radius: 0.0, peak: 0.0, falloff: 0.0, effective_volume: 0.0 };
 
-    fn constant(radius: f32, volume: f64) -> Self {
-        Self { radius, peak: (1.0 / volume) as f32, falloff: 0.0, effective_volume: volume }
+    fn new(shape: Shape, radius: f32) -> Self {
+        let r = f64::from(radius);
+        let (peak, falloff, effective_volume) = match shape {
+            Shape::Disc => (1.0 / (PI * r * r), 0.0, PI * r * r),
+            Shape::Ball => (0.75 / (PI * r.powi(3)), 0.0, 4.0 / 3.0 * PI * r.powi(3)),
+            Shape::ParabolicDisc => (2.0 / (PI * r * r), 1.0 / (r * r), 0.75 * PI * r * r),
+            Shape::ParabolicLine => (0.75 / r, 1.0 / (r * r), 5.0 / 3.0 * r),
+        };
+        Self { shape, radius, peak: peak as f32, falloff: falloff as f32, effective_volume }
     }
 
     /// Constant on a disc: surface merging.
     #[must_use]
     pub fn disc(radius: f32) -> Self {
-        Self::constant(radius, PI * f64::from(radius).powi(2))
+        Self::new(Shape::Disc, radius)
     }
 
     /// Constant in a ball: PP3D.
     #[must_use]
     pub fn ball(radius: f32) -> Self {
-        Self::constant(radius, 4.0 / 3.0 * PI * f64::from(radius).powi(3))
+        Self::new(Shape::Ball, radius)
     }
 
     /// `2/(πr²) (1 − u²/r²)`: PB2D and BP2D.
     #[must_use]
     pub fn parabolic_disc(radius: f32) -> Self {
-        let r = f64::from(radius);
-        let peak = 2.0 / (PI * r * r);
-        Self {
-            radius,
-            peak: peak as f32,
-            falloff: (1.0 / (r * r)) as f32,
-            effective_volume: 0.75 * PI * r * r,
-        }
+        Self::new(Shape::ParabolicDisc, radius)
     }
 
     /// `3/(4r) (1 − u²/r²)`: BB1D.
     #[must_use]
     pub fn parabolic_line(radius: f32) -> Self {
-        let r = f64::from(radius);
-        let peak = 0.75 / r;
-        Self { radius, peak: peak as f32, falloff: (1.0 / (r * r)) as f32, effective_volume: 5.0 / 3.0 * r }
+        Self::new(Shape::ParabolicLine, radius)
+    }
+
+    /// The kernel with `factor` times the radius.
+    #[inline]
+    #[must_use]
+    pub fn scaled(&self, factor: f32) -> Self {
+        if factor == 1.0 || self.radius == 0.0 { *self } else { Self::new(self.shape, factor * self.radius) }
     }
 
     /// The kernel's radius, scene units.

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::{DVec3, Vec3};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
 use upbp_estimators::observer::LightEnd;
-use upbp_estimators::{Interior, MediumId, Roulette};
+use upbp_estimators::{Interior, IterationPlan, MediumId, Roulette};
 
 use upbp_testing::closed_form::fog::Fog;
 use upbp_testing::closed_form::light::Source;
@@ -209,7 +209,7 @@ impl Trace {
     pub(crate) fn sensitivity(
         &self,
         scene: &ClosedForm,
-        roulette: Roulette,
+        plan: &IterationPlan,
         weight: impl Fn(&Path) -> f64,
         expected: f64,
     ) -> f64 {
@@ -222,7 +222,7 @@ impl Trace {
                 let mut moved = self.clone();
                 moved.interior[i].light += STEP * axis;
                 moved.interior[i].camera += STEP * axis;
-                if let Ok(path) = moved.rebuild(scene, roulette) {
+                if let Ok(path) = moved.rebuild(scene, plan) {
                     sum += (weight(&path) / expected - 1.0).abs();
                 }
             }
@@ -256,7 +256,8 @@ impl Trace {
     }
 
     /// All densities of the path.
-    pub(crate) fn rebuild(&self, scene: &ClosedForm, roulette: Roulette) -> Result<Path, Doubt> {
+    pub(crate) fn rebuild(&self, scene: &ClosedForm, plan: &IterationPlan) -> Result<Path, Doubt> {
+        let roulette = plan.roulette;
         let k = self.length();
         let lens = self.lens.as_dvec3();
         if self.interior.iter().any(|vertex| vertex.is_at_boundary(scene)) {
@@ -289,6 +290,7 @@ impl Trace {
             cos_light: 1.0,
             cos_camera: cos,
             sin_theta: 0.0,
+            scale: 1.0,
         };
         let mut vertices = vec![end];
         for (i, vertex) in self.interior.iter().enumerate() {
@@ -301,7 +303,17 @@ impl Trace {
                 at_surface(scene, roulette, vertex, to_light, to_camera)
             };
             let Scattering { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta } = scattering;
-            vertices.push(PathVertex { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta });
+            // A merge takes place where the camera sub-path is.
+            let scale = f64::from(plan.radius_field.at(vertex.camera.as_vec3()));
+            vertices.push(PathVertex {
+                kind,
+                rho_light,
+                rho_camera,
+                cos_light,
+                cos_camera,
+                sin_theta,
+                scale,
+            });
         }
         let cos = -direction(k - 1).dot(DVec3::NEG_Z);
         let film = f64::from(scene.camera.film_distance);

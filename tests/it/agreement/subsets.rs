@@ -14,7 +14,7 @@ use upbp_estimators::scene::Bsdf;
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
-    PreparedScene, Roulette, Spectrum, StreamKind, Technique,
+    PreparedScene, RadiusField, Roulette, Spectrum, StreamKind, Technique,
 };
 
 use upbp_testing::closed_form::scene::ClosedForm;
@@ -44,6 +44,7 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoice
             bp2d: Kernel::parabolic_disc(radius),
             bb1d: Kernel::parabolic_line(radius),
         },
+        radius_field: RadiusField::Uniform,
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,

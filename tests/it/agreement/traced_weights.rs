@@ -13,7 +13,7 @@ use upbp_estimators::scene::{EmitterId, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, EmissionGuide, EmissionSample, IterationChoices, IterationPlan, Kernel, Kernels, LightMap,
-    MergePeriods, PathLengths, PreparedScene, Roulette, Stream, StreamKind, Technique, TechniqueSet,
+    FootprintField, MergePeriods, PathLengths, PreparedScene, RadiusField, Roulette, Stream, StreamKind, Technique, TechniqueSet,
 };
 
 use super::rebuild::{Trace, Vertex};
@@ -142,7 +142,7 @@ impl<'a> Auditor<'a> {
         assert!((0.0..=1.0 + 1e-6).contains(&found), "{sample:?}");
         let (trace, strategy) = self.trace(sample);
         assert!(self.plan.lengths.contain(trace.length() as u32), "{sample:?}");
-        let Ok(path) = trace.rebuild(self.scene, self.plan.roulette) else {
+        let Ok(path) = trace.rebuild(self.scene, self.plan) else {
             self.comparisons[technique].doubtful += 1;
             return;
         };
@@ -159,7 +159,7 @@ impl<'a> Auditor<'a> {
         let difference = (found / expected - 1.0).abs();
         let mut excess = difference / TOLERANCE;
         if excess > 1.0 {
-            let rounding = trace.sensitivity(self.scene, self.plan.roulette, weight, expected);
+            let rounding = trace.sensitivity(self.scene, self.plan, weight, expected);
             excess = difference / (TOLERANCE + rounding);
         }
         let comparison = &mut self.comparisons[technique];
@@ -224,6 +224,7 @@ fn choices() -> IterationChoices {
         lengths: PathLengths { min: 1, max: 8 },
         roulette: Roulette::Below(0.6),
         kernels: kernels(1.0),
+        radius_field: RadiusField::Uniform,
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
@@ -348,6 +349,23 @@ fn guided_light_sub_paths() {
         assert!(scene.guides.iter().all(Option::is_some), "every light is guided");
         let choices = IterationChoices { light_paths: 12_000, beam_paths: 1000, ..choices() };
         audit_scene("guided light sub-paths", &scene, &choices, 1000);
+    }
+}
+
+/// Radii by the distance from a point beside the camera: some vertices have bounds, most are in between.
+fn footprint() -> RadiusField {
+    let eye = [0.3, 0.1, 2.0];
+    RadiusField::Footprint(FootprintField { eye, offset: 0.05, slope: 0.4, least: 0.3, most: 1.4 })
+}
+
+#[test]
+fn radii_that_are_a_function_of_place() {
+    for (camera, query_beams) in CAMERAS.into_iter().zip([BeamExtent::Long, BeamExtent::Short]) {
+        for heuristic in [Heuristic::Balance, Heuristic::Power] {
+            let radius_field = footprint();
+            let choices = IterationChoices { radius_field, query_beams, heuristic, ..choices() };
+            audit("radii by place", camera, 64, &choices, 500);
+        }
     }
 }
 

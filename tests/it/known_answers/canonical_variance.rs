@@ -34,7 +34,7 @@ use upbp_estimators::scene::{
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MediumId, MergePeriods,
-    PathLengths, PreparedScene, Ray, Roulette, Spectrum, StreamKind, TechniqueSet,
+    PathLengths, PreparedScene, RadiusField, Ray, Roulette, Spectrum, StreamKind, TechniqueSet,
 };
 
 /// There are no surfaces.
@@ -260,6 +260,7 @@ impl Setup {
                     bp2d: kernel,
                     bb1d: kernel,
                 },
+                radius_field: RadiusField::Uniform,
                 heuristic: Heuristic::Balance,
                 photon_beams: self.photon_beams,
                 query_beams: self.query_beams,

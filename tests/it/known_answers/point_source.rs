@@ -9,7 +9,7 @@ use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
-    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, Roulette,
+    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, RadiusField, Roulette,
     StreamKind,
 };
 
@@ -42,6 +42,7 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             lengths: PathLengths { min: 1, max: 1_000_000 },
             roulette: Roulette::Below(1.0),
             kernels: Kernels { pp3d: Kernel::ball(0.1), ..Kernels::NONE },
+            radius_field: RadiusField::Uniform,
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,

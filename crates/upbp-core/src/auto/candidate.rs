@@ -56,7 +56,7 @@ impl Candidates {
         };
         let usual = full.radii.surf;
         let widest =
-            if settings.radii.surf == Radius::Auto { widest(usual, statistics.footprint) } else { usual };
+            if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };
         let mut candidates = Self {
             full: Plan { roulette: settings.roulette.unwrap_or(roulette::OF_PILOT), ..full },
             always: if support.needs_merges { finds_all(full.techniques) } else { TechniqueSet::EMPTY },
@@ -176,10 +176,11 @@ fn with_surf_radius(mut plan: Plan, radius: f32) -> Plan {
 /// The widest radius of surface merging: the width of a pixel, if that is more than the usual radius, up to
 /// four times as much. It blurs what a pixel blurs anyway, so that the prediction, which knows nothing of
 /// blur, may be asked.
-fn widest(usual: f32, footprint: f32) -> f32 {
+fn widest(usual: f32, statistics: &Statistics) -> f32 {
     /// A narrower one is not worth a candidate.
     const LEAST: f32 = 1.25;
     const MOST: f32 = 4.0;
+    let footprint = statistics.footprint.min(statistics.radius_field.largest_radius());
     if footprint >= LEAST * usual { footprint.min(MOST * usual) } else { usual }
 }
 
@@ -197,6 +198,7 @@ mod tests {
 
     use super::*;
     use crate::radius::RadiusSchedule;
+    use upbp_estimators::RadiusField;
 
     #[test]
     fn beams_come_from_light_sub_paths() {
@@ -206,6 +208,7 @@ mod tests {
             pb2d: 1e-3,
             bp2d: 1e-3,
             bb1d: 1e-3,
+            field: RadiusField::Uniform,
             progressive: true,
             floor: 1e-6,
         };

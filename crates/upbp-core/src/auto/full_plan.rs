@@ -157,7 +157,8 @@ fn first_radii<S: Scene>(
             Radius::Scene(fraction) => fraction * scene_radius,
             Radius::Auto => found
                 .map_or(most * size, |n| n.radius(count, f64::from(paths)))
-                .clamp(SMALLEST * most * size, most * size),
+                .clamp(SMALLEST * most * size, most * size)
+                .min(statistics.radius_field.largest_radius()),
         }
     };
     let radii = &settings.radii;
@@ -167,6 +168,7 @@ fn first_radii<S: Scene>(
         pb2d: radius(Technique::Pb2d, radii.pb2d, statistics.pb2d, 8.0, light_paths, LARGEST_PB2D_RADIUS),
         bp2d: radius(Technique::Bp2d, radii.bp2d, statistics.bp2d, 8.0, beam_paths, LARGEST_BEAM_RADIUS),
         bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
+        field: statistics.radius_field,
         progressive: settings.progressive,
         // Positions have a relative precision of 6e-8.
         floor: 1e-6 * scene_radius,
@@ -194,6 +196,7 @@ pub(crate) fn iteration_plan<S: Scene>(
             lengths: PathLengths { min: settings.min_length, max: settings.max_length },
             roulette: plan.roulette,
             kernels: plan.radii.kernels(iteration),
+            radius_field: plan.radii.field,
             periods: plan.periods,
             heuristic: settings.heuristic,
             photon_beams: settings.photon_beams,

@@ -21,6 +21,7 @@
 mod candidate;
 mod cost;
 mod emitters;
+mod footprint;
 mod full_plan;
 mod guides;
 pub(crate) mod memory;

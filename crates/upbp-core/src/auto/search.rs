@@ -152,7 +152,7 @@ impl Judge<'_> {
 mod tests {
     use std::num::NonZeroU32;
 
-    use upbp_estimators::{MergePeriods, Roulette, TechniqueSet};
+    use upbp_estimators::{MergePeriods, RadiusField, Roulette, TechniqueSet};
 
     use super::*;
     use crate::radius::RadiusSchedule;
@@ -164,6 +164,7 @@ mod tests {
             pb2d: 0.0,
             bp2d: 0.0,
             bb1d: 0.0,
+            field: RadiusField::Uniform,
             progressive: true,
             floor: 1e-6,
         };

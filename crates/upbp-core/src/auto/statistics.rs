@@ -9,9 +9,10 @@ use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
-    PreparedScene, StreamKind, Technique, TechniqueSet,
+    PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
 };
 
+use super::footprint;
 use super::photon_distances::{Nearest, Neighbours, median};
 use super::pieces::{in_pieces, pixel};
 use super::roulette::usual_roulette;
@@ -53,6 +54,8 @@ pub(crate) struct Statistics {
     /// Width of a pixel where camera sub-paths first meet what scatters in more than one direction, median in
     /// scene units; 0 where nothing does.
     pub(crate) footprint: f32,
+    /// The field that kernel radii follow.
+    pub(crate) radius_field: RadiusField,
     /// Photons on surfaces around points of camera sub-paths there; `None` where there is nothing.
     pub(crate) surf: Option<Neighbours>,
     /// Photons in media around points.
@@ -89,7 +92,12 @@ pub(crate) fn measure<S: Scene>(
         let light = LightPaths::trace(scene, plan, light_paths, halt)?;
         let plan = plan(light.paths);
         let queries = Queries::trace(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?;
-        Some(light.statistics(&plan, queries, scene.bounds.radius))
+        let field = if settings.radii.are_auto(techniques) {
+            footprint::field(scene.scene.camera(), &queries.first)
+        } else {
+            RadiusField::Uniform
+        };
+        Some(light.statistics(&plan, field, queries, scene.bounds.radius))
     };
     allowance.largest(run).ok_or(RenderError::Cancelled)
 }
@@ -122,6 +130,7 @@ fn nominal_plan<S: Scene>(
             bp2d: Kernel::parabolic_disc(nominal),
             bb1d: Kernel::parabolic_line(nominal),
         },
+        radius_field: RadiusField::Uniform,
         heuristic: Heuristic::Balance,
         photon_beams: settings.photon_beams,
         query_beams: BeamExtent::Short,
@@ -168,7 +177,13 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
         if more > few { trace(more) } else { Some(first) }
     }
 
-    fn statistics(&self, plan: &IterationPlan, mut queries: Queries, scale: f32) -> Statistics {
+    fn statistics(
+        &self,
+        plan: &IterationPlan,
+        field: RadiusField,
+        mut queries: Queries,
+        scale: f32,
+    ) -> Statistics {
         let (paths, beam_paths) = (f64::from(self.paths), f64::from(plan.beam_paths));
         let on_surfaces = |interaction: &Interaction<B>| matches!(interaction, Interaction::Surface(_));
         let in_media = |interaction: &Interaction<B>| matches!(interaction, Interaction::Medium(_));
@@ -183,6 +198,7 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
         let beams = SegmentTree::build(segments, SplitParams::default());
         let near = Nearest { paths: near_paths, scale };
         let near_beams = Nearest { paths: beam_paths, scale };
+        // Distances in terms of radii: divided by what those are multiplied by.
         let of = |technique, found: &dyn Fn() -> Option<Neighbours>| {
             plan.techniques.has(technique).then(found).flatten()
         };
@@ -190,33 +206,47 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
             light_path_seconds: self.seconds,
             vertices_per_path: self.vertices.len() as f64 / paths,
             footprint: median(&mut queries.footprints).unwrap_or(0.0),
+            radius_field: field,
             surface_per_path: per_path(plan.merges_by(Technique::Surf), &on_surfaces),
             medium_per_path: per_path(plan.stores_medium_photons(), &in_media),
             pieces_per_path: beams.pieces() as f64 / beam_paths,
             beams_per_path: self.beams.len() as f64 / beam_paths,
             surf: of(Technique::Surf, &|| {
                 near.of(&queries.surfaces, surface.len(), 2.0, |point, radius, found| {
-                    surface.in_ball(*point, radius, |(), distance2| found(distance2.sqrt()));
+                    let scale = field.at(*point);
+                    surface.in_ball(*point, scale * radius, |(), distance2| found(distance2.sqrt() / scale));
                 })
             }),
             pp3d: of(Technique::Pp3d, &|| {
                 near.of(&queries.media, medium.len(), 3.0, |point, radius, found| {
-                    medium.in_ball(*point, radius, |(), distance2| found(distance2.sqrt()));
+                    let scale = field.at(*point);
+                    medium.in_ball(*point, scale * radius, |(), distance2| found(distance2.sqrt() / scale));
                 })
             }),
             pb2d: of(Technique::Pb2d, &|| {
                 near.of(&queries.edges, medium.len(), 2.0, |edge, radius, found| {
-                    medium.around_ray(edge, radius, |(), _, distance2| found(distance2.sqrt()));
+                    for (ray, largest) in field.pieces(edge) {
+                        medium.around_ray(&ray, largest * radius, |(), t, distance2| {
+                            found(distance2.sqrt() / field.at(ray.at(t)));
+                        });
+                    }
                 })
             }),
             bp2d: of(Technique::Bp2d, &|| {
                 near_beams.of(&queries.media, self.beams.len(), 2.0, |point, radius, found| {
-                    beams.around_point(*point, radius, |(), _, distance2| found(distance2.sqrt()));
+                    let scale = field.at(*point);
+                    beams.around_point(*point, scale * radius, |(), _, distance2| {
+                        found(distance2.sqrt() / scale);
+                    });
                 })
             }),
             // Tells how many beams are enough, too.
             bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, |edge, radius, found| {
-                beams.around_ray(edge, radius, |(), approach| found(approach.distance));
+                for (ray, largest) in field.pieces(edge) {
+                    beams.around_ray(&ray, largest * radius, |(), approach| {
+                        found(approach.distance / field.at(ray.at(approach.t_ray)));
+                    });
+                }
             }),
         }
     }
@@ -240,7 +270,9 @@ struct Queries {
     surfaces: Vec<Vec3>,
     media: Vec<Vec3>,
     edges: Vec<Ray>,
-    /// Widths of pixels where sub-paths first scatter in more than one direction.
+    /// Places where sub-paths first scatter in more than one direction.
+    first: Vec<Vec3>,
+    /// Widths of pixels there.
     footprints: Vec<f32>,
     last: Vec3,
     /// Length of the sub-path so far.
@@ -281,6 +313,7 @@ impl<B> Observer<B> for Queries {
             && width.is_finite()
         {
             self.footprints.push(width);
+            self.first.push(vertex.position);
         }
     }
 }
@@ -302,6 +335,7 @@ impl Queries {
             queries.surfaces.extend(piece.surfaces);
             queries.media.extend(piece.media);
             queries.edges.extend(piece.edges);
+            queries.first.extend(piece.first);
             queries.footprints.extend(piece.footprints);
         }
         thin(&mut queries.surfaces);

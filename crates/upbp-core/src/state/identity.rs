@@ -88,7 +88,7 @@ impl Identity {
     }
 }
 
-fn plan_fields(plan: &Plan) -> [(&'static str, String); 15] {
+fn plan_fields(plan: &Plan) -> [(&'static str, String); 16] {
     let r = &plan.radii;
     [
         ("techniques", plan.techniques.to_string()),
@@ -104,6 +104,7 @@ fn plan_fields(plan: &Plan) -> [(&'static str, String); 15] {
         ("radii.pb2d", r.pb2d.to_string()),
         ("radii.bp2d", r.bp2d.to_string()),
         ("radii.bb1d", r.bb1d.to_string()),
+        ("radii.field", format!("{:?}", r.field)),
         ("least radius", r.floor.to_string()),
         ("progressive", r.progressive.to_string()),
     ]

@@ -48,13 +48,18 @@ pub enum MergeKind {
     /// None: an end of the path, or a Dirac lobe.
     None,
     /// Surface merging.
-    Surface,
+    Surface {
+        /// Kernel radii at the vertex, relative to those of the plan.
+        scale: f64,
+    },
     /// The merges of a medium.
     Medium {
         /// The medium.
         medium: MediumId,
         /// Sine of the angle between the incoming and the outgoing line.
         sin_theta: f64,
+        /// Kernel radii at the vertex, relative to those of the plan.
+        scale: f64,
     },
 }
 
@@ -74,10 +79,13 @@ pub struct MisPlan {
     pub connect: f64,
     /// Light sub-paths that are connected to the camera.
     pub light_tracing: f64,
-    /// `n V_2` of surface merging.
+    /// `n V_2` of surface merging, where the scale of radii is one.
     pub surf: f64,
-    /// Merges in each medium, by [`MediumId`].
+    /// Merges in each medium, by [`MediumId`], where the scale of radii is one.
     pub volume: Vec<VolumeMerges>,
+    /// `(r/ℓ)⁴` of the merges in each medium (section 6.5), where the scale of radii is one; zero for media
+    /// that are left out.
+    pub width: Vec<VolumeMerges>,
     /// Extent of photon beams.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
@@ -95,7 +103,7 @@ impl MisPlan {
         }
     }
 
-    /// The merges in a medium; none in one that the plan does not know.
+    /// The merges in a medium, where the scale of radii is one; none in one that the plan does not know.
     #[inline]
     #[must_use]
     pub fn merges_in(&self, medium: MediumId) -> VolumeMerges {
@@ -132,15 +140,33 @@ impl MisPlan {
         }
     }
 
-    /// `f` of surface merging, as the heuristic takes it (section 2.1).
+    /// `f` of surface merging, as the heuristic takes it (section 2.1), at a vertex with some scale of radii.
     #[inline]
     #[must_use]
-    pub fn surface_factor(&self) -> f64 {
-        self.pow(self.surf)
+    pub fn surface_factor(&self, scale: f64) -> f64 {
+        self.pow(self.surf * scale * scale)
+    }
+
+    /// The merges in a medium at a vertex with some scale of radii (section 5.4).
+    #[inline]
+    fn merges_at(&self, medium: MediumId, scale: f64) -> VolumeMerges {
+        let merges = self.merges_in(medium);
+        if scale == 1.0 {
+            return merges;
+        }
+        let width = self.width.get(medium.0 as usize).copied().unwrap_or_default();
+        let (s2, s4) = (scale * scale, (scale * scale).powi(2));
+        let trust = |width: f64| (1.0 + width) / (1.0 + width * s4);
+        VolumeMerges {
+            pp3d: merges.pp3d * s2 * scale * trust(width.pp3d),
+            pb2d: merges.pb2d * s2 * trust(width.pb2d),
+            bp2d: merges.bp2d * s2 * trust(width.bp2d),
+            bb1d: merges.bb1d * scale * trust(width.bb1d),
+        }
     }
 
     /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1), from the distance
-    /// factors of the light and the camera sub-path.
+    /// factors of the light and the camera sub-path, at a vertex with some scale of radii.
     #[inline]
     #[must_use]
     pub fn volume_factors(
@@ -149,8 +175,9 @@ impl MisPlan {
         c_light: f64,
         c_camera: f64,
         sin_theta: f64,
+        scale: f64,
     ) -> VolumeMerges {
-        let v = self.merges_in(medium);
+        let v = self.merges_at(medium, scale);
         let sin_theta = if sin_theta * sin_theta < PARALLEL_SIN2 { 0.0 } else { sin_theta };
         VolumeMerges {
             pp3d: self.pow(v.pp3d),
@@ -167,9 +194,9 @@ impl MisPlan {
     pub fn merge_sum<D: Densities>(&self, kind: MergeKind, c_light: f64, c_camera: f64) -> D {
         match kind {
             MergeKind::None => D::ZERO,
-            MergeKind::Surface => D::of(Technique::Surf, self.surface_factor()),
-            MergeKind::Medium { medium, sin_theta } => {
-                self.volume_factors(medium, c_light, c_camera, sin_theta).sum()
+            MergeKind::Surface { scale } => D::of(Technique::Surf, self.surface_factor(scale)),
+            MergeKind::Medium { medium, sin_theta, scale } => {
+                self.volume_factors(medium, c_light, c_camera, sin_theta, scale).sum()
             }
         }
     }

@@ -38,6 +38,8 @@ pub struct PathVertex {
     pub cos_camera: f64,
     /// Sine of the angle between the two lines at a medium vertex.
     pub sin_theta: f64,
+    /// Kernel radii there, relative to those of the plan.
+    pub scale: f64,
 }
 
 /// The edge between vertices `i` and `i + 1`.
@@ -156,7 +158,7 @@ impl Path {
             let both = light[i] + log(self.light_density(i)) + camera[i];
             match self.vertices[i].kind {
                 VertexKind::Surface => {
-                    push(Strategy::Surf(i), plan.surf, both);
+                    push(Strategy::Surf(i), plan.surf * self.vertices[i].scale.powi(2), both);
                 }
                 VertexKind::Medium(medium) => {
                     let v = plan.merges_in(medium);
@@ -173,10 +175,17 @@ impl Path {
                         factor(plan.query_beams, self.edges[i].pass_probability, self.edges[i].t_camera);
                     let sin = self.vertices[i].sin_theta;
                     let sin = if sin * sin < PARALLEL_SIN2 { 0.0 } else { sin };
-                    push(Strategy::Pp3d(i), v.pp3d, both);
-                    push(Strategy::Pb2d(i), v.pb2d, both + log(c_camera));
-                    push(Strategy::Bp2d(i), v.bp2d, both + log(c_light));
-                    push(Strategy::Bb1d(i), v.bb1d, both + log(c_light) + log(c_camera) + log(sin));
+                    let width = plan.width.get(medium.0 as usize).copied().unwrap_or_default();
+                    let scale = self.vertices[i].scale;
+                    // Effective volume by its dimension, and 6.5 with the radius here.
+                    let here = |value: f64, dimension, width: f64| {
+                        value * (1.0 + width) * scale.powi(dimension) / (1.0 + width * scale.powi(4))
+                    };
+                    push(Strategy::Pp3d(i), here(v.pp3d, 3, width.pp3d), both);
+                    push(Strategy::Pb2d(i), here(v.pb2d, 2, width.pb2d), both + log(c_camera));
+                    push(Strategy::Bp2d(i), here(v.bp2d, 2, width.bp2d), both + log(c_light));
+                    let bb1d = both + log(c_light) + log(c_camera) + log(sin);
+                    push(Strategy::Bb1d(i), here(v.bb1d, 1, width.bb1d), bb1d);
                 }
                 VertexKind::End | VertexKind::Delta => {}
             }

@@ -71,11 +71,13 @@ pub(crate) fn arrive<S: Scene>(scene: &S, edge_trace: &EdgeTrace<S::Bsdf>) -> Ar
     }
 }
 
-/// Densities for the weights of the next vertex, of a vertex that has scattered.
+/// Densities for the weights of the next vertex, of a vertex that has scattered; `scale` is that of kernel
+/// radii there.
 pub(crate) fn scatter<S: Scene, D: Densities>(
     context: &Context<'_, S>,
     mis: &VertexMis<D>,
     interaction: &Interaction<S::Bsdf>,
+    scale: f32,
     scattered: &Scattered,
 ) -> EdgeMis<D> {
     let smooth = if scattered.delta { VertexMis { connect: D::ZERO, ..*mis } } else { *mis };
@@ -83,7 +85,11 @@ pub(crate) fn scatter<S: Scene, D: Densities>(
         before: smooth.before(&context.plan.mis, scattered.rho_opposite),
         rho: scattered.rho_own,
         cos_out: scattered.cos,
-        kind: if scattered.delta { MergeKind::None } else { interaction.merge_kind(scattered.sin_theta) },
+        kind: if scattered.delta {
+            MergeKind::None
+        } else {
+            interaction.merge_kind(scattered.sin_theta, scale)
+        },
         distance_factor: mis.distance_factor,
         connectible: !scattered.delta,
         in_medium: interaction.in_medium(),

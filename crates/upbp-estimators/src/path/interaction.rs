@@ -172,12 +172,13 @@ impl<B: Bsdf> Interaction<B> {
         }
     }
 
-    /// The merges that a path with this pair of lines takes part in.
+    /// The merges that a path with this pair of lines takes part in, by kernels of some scale.
     #[inline]
-    pub const fn merge_kind(&self, sin_theta: f64) -> MergeKind {
+    pub(crate) fn merge_kind(&self, sin_theta: f64, scale: f32) -> MergeKind {
+        let scale = f64::from(scale);
         match self {
-            Self::Surface(_) => MergeKind::Surface,
-            Self::Medium(medium) => MergeKind::Medium { medium: *medium, sin_theta },
+            Self::Surface(_) => MergeKind::Surface { scale },
+            Self::Medium(medium) => MergeKind::Medium { medium: *medium, sin_theta, scale },
         }
     }
 

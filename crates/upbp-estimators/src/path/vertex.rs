@@ -24,6 +24,8 @@ pub struct LightVertex<B, D = f64> {
     pub throughput: Spectrum,
     /// Densities for the weights.
     pub mis: VertexMis<D>,
+    /// Kernel radii there, relative to those of the plan.
+    pub scale: f32,
     /// Edges from the light.
     pub depth: u32,
     /// Index of the sub-path.
@@ -137,6 +139,7 @@ impl<D: Densities> PhotonBeam<D> {
             towards_light: -direction,
             throughput: self.throughput * transmitted(&density, plan.mis.photon_beams),
             mis: self.mis.arrive(&plan.mis, Walk::Light, &edge, connections),
+            scale: plan.radius_field.at(position),
             depth: self.depth,
             path: self.path,
             interaction: Interaction::Medium(self.medium),
@@ -157,6 +160,8 @@ pub(crate) struct CameraVertex<B, D> {
     /// Importance over density on arrival, before scattering.
     pub(crate) throughput: Spectrum,
     pub(crate) mis: VertexMis<D>,
+    /// Kernel radii there, relative to those of the plan.
+    pub(crate) scale: f32,
     /// Edges from the camera.
     pub(crate) depth: u32,
     pub(crate) interaction: Interaction<B>,
@@ -188,13 +193,14 @@ pub(crate) struct CameraEdge<D> {
 }
 
 impl<D: Densities> CameraEdge<D> {
-    /// The vertex at distance `t` along the edge, in a medium; `None` where no walk can stop.
+    /// The vertex at distance `t` along the edge, in a medium, where kernel radii have some scale; `None` where
+    /// no walk can stop.
     pub(crate) fn vertex_at<S: Scene>(
         &self,
         context: &Context<'_, S>,
         edge_trace: &EdgeTrace<S::Bsdf>,
         (span, medium): (&MediumSpan, MediumId),
-        t: f32,
+        (t, scale): (f32, f32),
     ) -> Option<CameraVertex<S::Bsdf, D>> {
         let Context { prepared, plan } = *context;
         let density = edge_trace.density_to(prepared.scene, span, t);
@@ -204,6 +210,7 @@ impl<D: Densities> CameraEdge<D> {
             towards_camera: -edge_trace.direction,
             throughput: self.throughput * transmitted(&density, plan.mis.query_beams),
             mis: self.mis.arrive(&plan.mis, Walk::Camera, &edge, self.connections),
+            scale,
             depth: self.depth,
             interaction: Interaction::Medium(medium),
         })

@@ -18,19 +18,25 @@ pub(crate) fn bb1d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let plan = context.plan;
     let kernel = &plan.kernels.bb1d;
-    for (span, medium, ray) in edge_trace.query_beams(plan, edge.depth, Technique::Bb1d) {
+    for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Bb1d) {
         out.observer.enter_technique(Some(Technique::Bb1d));
-        map.beam_tree.around_ray(&ray, kernel.radius(), |index, approach| {
-            let beam = &map.beams[index as usize];
-            if beam.medium == medium
-                && plan.lengths.contain(edge.depth + beam.depth)
-                && let Some(light) = beam.vertex_at(context, approach.t_segment)
-                && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), approach.t_ray)
-            {
-                let kernel = kernel.value(approach.distance * approach.distance) / approach.sin_theta;
-                merge(context, Technique::Bb1d, &light, &vertex, kernel, out);
-            }
-        });
+        for (ray, largest) in plan.radius_field.pieces(&beam) {
+            map.beam_tree.around_ray(&ray, kernel.radius() * largest, |index, approach| {
+                let t = approach.t_ray;
+                let scale = plan.radius_field.at(ray.at(t)).min(largest);
+                let kernel = kernel.scaled(scale).value(approach.distance * approach.distance);
+                let photons = &map.beams[index as usize];
+                if kernel > 0.0
+                    && photons.medium == medium
+                    && plan.lengths.contain(edge.depth + photons.depth)
+                    && let Some(light) = photons.vertex_at(context, approach.t_segment)
+                    && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), (t, scale))
+                {
+                    let kernel = kernel / approach.sin_theta;
+                    merge(context, Technique::Bb1d, &light, &vertex, kernel, out);
+                }
+            });
+        }
         out.observer.enter_technique(None);
     }
 }

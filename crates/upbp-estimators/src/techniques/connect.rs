@@ -85,14 +85,14 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let camera_end = vertex.mis.end(
         mis,
         Walk::Camera,
-        vertex.interaction.merge_kind(camera_side.sin_theta),
+        vertex.interaction.merge_kind(camera_side.sin_theta, vertex.scale),
         factor_of(Walk::Light, near, density.backward(near)),
         camera_side.rho_opposite,
     );
     let light_end = light.mis.end(
         mis,
         Walk::Light,
-        light.interaction.merge_kind(light_side.sin_theta),
+        light.interaction.merge_kind(light_side.sin_theta, light.scale),
         factor_of(Walk::Camera, far, density.forward(far)),
         light_side.rho_opposite,
     );

@@ -50,7 +50,7 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let mis = &plan.mis;
     let opposite =
         mis.distance_factor(Walk::Camera, in_medium, density.pass_probability, density.backward(in_medium));
-    let interaction = vertex.interaction.merge_kind(scattering.sin_theta);
+    let interaction = vertex.interaction.merge_kind(scattering.sin_theta, vertex.scale);
     let end = vertex.mis.end(mis, Walk::Light, interaction, opposite, scattering.rho_opposite);
     let weight = mis.light_tracing_weight(end, light_density);
     let value = vertex.throughput

@@ -24,14 +24,16 @@ pub(super) fn merge<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let Some(scattering) = camera.evaluate(context, light.towards_light) else {
         return;
     };
+    // The merge takes place at the camera vertex: its radii are those of all techniques there.
+    let scale = f64::from(camera.scale);
     let (factor, merges) = match camera.interaction {
         Interaction::Surface(_) => {
-            let factor = mis.surface_factor();
+            let factor = mis.surface_factor(scale);
             (factor, O::Densities::of(technique, factor))
         }
         Interaction::Medium(medium) => {
             let (c_light, c_camera) = (light.mis.distance_factor, camera.mis.distance_factor);
-            let factors = mis.volume_factors(medium, c_light, c_camera, scattering.sin_theta);
+            let factors = mis.volume_factors(medium, c_light, c_camera, scattering.sin_theta, scale);
             (factors.of(technique), factors.sum())
         }
     };

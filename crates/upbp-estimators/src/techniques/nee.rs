@@ -82,7 +82,7 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         f64::from(incident.pdf_direction * factor) * scattering.cos / distance2 * density.backward(in_medium);
     let opposite =
         mis.distance_factor(Walk::Light, in_medium, density.pass_probability, density.backward(in_medium));
-    let interaction = vertex.interaction.merge_kind(scattering.sin_theta);
+    let interaction = vertex.interaction.merge_kind(scattering.sin_theta, vertex.scale);
     let end = vertex.mis.end(mis, Walk::Camera, interaction, opposite, scattering.rho_opposite);
     let weight = mis.nee_weight(pdf, pdf_position, hit_density, end, camera_density);
     let value = vertex.throughput

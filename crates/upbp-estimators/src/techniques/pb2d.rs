@@ -18,17 +18,22 @@ pub(crate) fn pb2d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let plan = context.plan;
     let kernel = &plan.kernels.pb2d;
-    for (span, medium, ray) in edge_trace.query_beams(plan, edge.depth, Technique::Pb2d) {
+    for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Pb2d) {
         out.observer.enter_technique(Some(Technique::Pb2d));
-        map.medium.around_ray(&ray, kernel.radius(), |index, t, distance2| {
-            let photon = &map.vertices[index as usize];
-            if matches!(photon.interaction, Interaction::Medium(other) if other == medium)
-                && plan.lengths.contain(edge.depth + photon.depth)
-                && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), t)
-            {
-                merge(context, Technique::Pb2d, photon, &vertex, kernel.value(distance2), out);
-            }
-        });
+        for (ray, largest) in plan.radius_field.pieces(&beam) {
+            map.medium.around_ray(&ray, kernel.radius() * largest, |index, t, distance2| {
+                let scale = plan.radius_field.at(ray.at(t)).min(largest);
+                let kernel = kernel.scaled(scale).value(distance2);
+                let photon = &map.vertices[index as usize];
+                if kernel > 0.0
+                    && matches!(photon.interaction, Interaction::Medium(other) if other == medium)
+                    && plan.lengths.contain(edge.depth + photon.depth)
+                    && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), (t, scale))
+                {
+                    merge(context, Technique::Pb2d, photon, &vertex, kernel, out);
+                }
+            });
+        }
         out.observer.enter_technique(None);
     }
 }

@@ -22,7 +22,7 @@ pub(crate) fn pp3d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     if !plan.merges_in(medium, Technique::Pp3d) {
         return;
     }
-    let kernel = &plan.kernels.pp3d;
+    let kernel = plan.kernels.pp3d.scaled(vertex.scale);
     out.observer.enter_technique(Some(Technique::Pp3d));
     map.medium.in_ball(vertex.position, kernel.radius(), |index, distance2| {
         let photon = &map.vertices[index as usize];

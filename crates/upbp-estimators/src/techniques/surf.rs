@@ -27,7 +27,7 @@ pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     if !plan.merges_by(Technique::Surf) {
         return;
     }
-    let kernel = &plan.kernels.surf;
+    let kernel = plan.kernels.surf.scaled(vertex.scale);
     out.observer.enter_technique(Some(Technique::Surf));
     map.surface.in_ball(vertex.position, kernel.radius(), |index, distance2| {
         let photon = &map.vertices[index as usize];

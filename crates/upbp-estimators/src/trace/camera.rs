@@ -112,6 +112,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             towards_camera: from,
             throughput,
             mis,
+            scale: plan.radius_field.at(arrived.position),
             depth,
             interaction: arrived.interaction,
         };
@@ -154,7 +155,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         stack = sides.towards(scattered.transmitted);
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
-            mis: scatter(context, &vertex.mis, &vertex.interaction, &scattered),
+            mis: scatter(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),
             connections: plan.mis.connections(),
             depth,
         };

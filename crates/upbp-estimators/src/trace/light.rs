@@ -89,8 +89,17 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             O::Densities::ZERO
         };
         let mis = flight.mis.arrive(&plan.mis, Walk::Light, &edge, connections);
-        let vertex =
-            LightVertex { position, towards_light: from, throughput, mis, depth, path: index, interaction };
+        let scale = plan.radius_field.at(position);
+        let vertex = LightVertex {
+            position,
+            towards_light: from,
+            throughput,
+            mis,
+            scale,
+            depth,
+            path: index,
+            interaction,
+        };
         if connectible {
             if plan.mis.light_tracing > 0.0 && plan.lengths.contain(depth + 1) {
                 observer.enter_technique(Some(Technique::LightTracing));
@@ -122,7 +131,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             origin: ray_origin(&interaction, position, scattered.direction),
             direction: scattered.direction,
             stack: sides.towards(scattered.transmitted),
-            mis: scatter(context, &mis, &interaction, &scattered),
+            mis: scatter(context, &mis, &interaction, scale, &scattered),
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,
             infinite: false,

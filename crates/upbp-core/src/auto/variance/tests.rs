@@ -3,7 +3,7 @@
 use glam::Vec3;
 use proptest::prelude::*;
 use upbp_estimators::scene::PixelRect;
-use upbp_estimators::{MergePeriods, Technique};
+use upbp_estimators::{MergePeriods, RadiusField, Technique};
 
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
@@ -65,6 +65,7 @@ fn planned(paths: u32) -> Plan {
         pb2d: 0.0,
         bp2d: 0.0,
         bb1d: 0.0,
+        field: RadiusField::Uniform,
         progressive: true,
         floor: 1e-6,
     };

@@ -37,8 +37,9 @@ fn vertex(spread: f64) -> impl Strategy<Value = PathVertex> {
         3 => (0..MEDIA).prop_map(|medium| VertexKind::Medium(MediumId(medium))),
         1 => Just(VertexKind::Delta),
     ];
-    (kind, density(spread), density(spread), cosine(), cosine(), sine()).prop_map(
-        |(kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta)| {
+    let scale = prop_oneof![1 => Just(1.0), 3 => around_one(3.0)];
+    (kind, density(spread), density(spread), cosine(), cosine(), sine(), scale).prop_map(
+        |(kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta, scale)| {
             let in_medium = matches!(kind, VertexKind::Medium(_));
             PathVertex {
                 kind,
@@ -47,6 +48,7 @@ fn vertex(spread: f64) -> impl Strategy<Value = PathVertex> {
                 cos_light: if in_medium { 1.0 } else { cos_light },
                 cos_camera: if in_medium { 1.0 } else { cos_camera },
                 sin_theta: if in_medium { sin_theta } else { 0.0 },
+                scale,
             }
         },
     )
@@ -88,6 +90,7 @@ pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
             cos_light: 1.0,
             cos_camera: 1.0,
             sin_theta: 0.0,
+            scale: 1.0,
         };
         let cos_camera = if matches!(light, Light::Area) { cos } else { 1.0 };
         let mut vertices = vec![PathVertex { cos_camera, ..end }];
@@ -124,11 +127,14 @@ pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
 
 /// A plan with all techniques and different merges in each medium.
 pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
-    let volume = vec((0.0..1e3, 0.0..1e3, 0.0..1e3, 0.0..1e3), MEDIA as usize).prop_map(|media| {
-        media.into_iter().map(|(pp3d, pb2d, bp2d, bb1d)| VolumeMerges { pp3d, pb2d, bp2d, bb1d }).collect()
-    });
-    (1.0..4.0, 1e-3..10.0, 1.0..1e5, 1e-3..1e3, volume).prop_map(
-        |(nee, connect, light_tracing, surf, volume): (_, _, _, _, Vec<VolumeMerges>)| MisPlan {
+    let merges = |most: f64| {
+        vec((0.0..most, 0.0..most, 0.0..most, 0.0..most), MEDIA as usize).prop_map(|media| {
+            let merges = |(pp3d, pb2d, bp2d, bb1d)| VolumeMerges { pp3d, pb2d, bp2d, bb1d };
+            media.into_iter().map(merges).collect::<Vec<_>>()
+        })
+    };
+    (1.0..4.0, 1e-3..10.0, 1.0..1e5, 1e-3..1e3, merges(1e3), merges(3.0)).prop_map(
+        |(nee, connect, light_tracing, surf, volume, width)| MisPlan {
             heuristic: Heuristic::Balance,
             hit: 1.0,
             nee,
@@ -136,6 +142,7 @@ pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
             light_tracing,
             surf,
             volume,
+            width,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
         },

@@ -17,6 +17,7 @@ fn golden_path() -> Path {
         cos_light: 1.0,
         cos_camera: 1.0,
         sin_theta: 0.0,
+        scale: 1.0,
     };
     let edge = |distance, t_light, t_camera, pass_probability| PathEdge {
         distance,
@@ -79,6 +80,7 @@ fn golden_plan(query_beams: BeamExtent) -> MisPlan {
             bp2d: 0.0,
             bb1d: 200.0 * 0.05 / 3.0,
         }],
+        width: Vec::new(),
         photon_beams: BeamExtent::Short,
         query_beams,
     }

@@ -191,6 +191,7 @@ fn reversed(path: &Path) -> Path {
         cos_light: v.cos_camera,
         cos_camera: v.cos_light,
         sin_theta: v.sin_theta,
+        scale: v.scale,
     });
     let edges = path.edges.iter().rev().map(|e| PathEdge {
         distance: e.distance,
@@ -250,6 +251,7 @@ proptest! {
                 nee: plan.light_tracing,
                 light_tracing: plan.nee,
                 volume: plan.volume.iter().map(swap).collect(),
+                width: plan.width.iter().map(swap).collect(),
                 photon_beams: query_beams,
                 query_beams: photon_beams,
                 ..plan.clone()

@@ -28,8 +28,10 @@ fn in_medium(vertex: &PathVertex) -> bool {
 
 fn kind(vertex: &PathVertex) -> MergeKind {
     match vertex.kind {
-        VertexKind::Surface => MergeKind::Surface,
-        VertexKind::Medium(medium) => MergeKind::Medium { medium, sin_theta: vertex.sin_theta },
+        VertexKind::Surface => MergeKind::Surface { scale: vertex.scale },
+        VertexKind::Medium(medium) => {
+            MergeKind::Medium { medium, sin_theta: vertex.sin_theta, scale: vertex.scale }
+        }
         VertexKind::End | VertexKind::Delta => MergeKind::None,
     }
 }
@@ -150,10 +152,11 @@ impl<'a, D: Densities> Recursion<'a, D> {
         let (light, camera) = (&self.light[i], &self.camera[i]);
         let (factor, merges) = if let VertexKind::Medium(medium) = vertex.kind {
             let (c_light, c_camera) = (light.distance_factor, camera.distance_factor);
-            let factors = self.plan.volume_factors(medium, c_light, c_camera, vertex.sin_theta);
+            let factors =
+                self.plan.volume_factors(medium, c_light, c_camera, vertex.sin_theta, vertex.scale);
             (factor(&factors), factors.sum())
         } else {
-            let factor = self.plan.surface_factor();
+            let factor = self.plan.surface_factor(vertex.scale);
             (factor, D::of(Technique::Surf, factor))
         };
         let before_light = light.before(self.plan, vertex.rho_camera);
