@@ -3,3 +3,4 @@
 mod adaptation;
 mod census;
 mod guides;
+mod radii;

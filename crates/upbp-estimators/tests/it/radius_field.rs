@@ -1,0 +1,128 @@
+//! Radii that are a function of place: searches along rays equal a test of every item with its own radius
+//! (`docs/theory.md`, section 5.4).
+
+use glam::Vec3;
+use proptest::collection::vec;
+use proptest::prelude::*;
+use upbp_accel::{PointTree, Ray, Segment, SegmentTree, SplitParams, closest_approach};
+use upbp_estimators::{FootprintField, Kernel, RadiusField};
+
+fn place() -> impl Strategy<Value = Vec3> {
+    [-1.0_f32..1.0, -1.0..1.0, -1.0..1.0].prop_map(Vec3::from)
+}
+
+fn direction() -> impl Strategy<Value = Vec3> {
+    prop_oneof![3 => place(), 1 => Just(Vec3::X), 1 => Just(Vec3::NEG_Z)].prop_map(|v| v.normalize_or(Vec3::Y))
+}
+
+fn field() -> impl Strategy<Value = RadiusField> {
+    let eye = prop_oneof![2 => place(), 1 => Just(Vec3::ZERO)];
+    let offset = prop_oneof![Just(0.0_f32), 0.0..1.0_f32];
+    let field = (eye, offset, 0.05..3.0_f32, 0.01..1.0_f32, 1.0..100.0_f32);
+    let footprint = field.prop_map(|(eye, offset, slope, least, ratio)| {
+        let eye = eye.to_array();
+        RadiusField::Footprint(FootprintField { eye, offset, slope, least, most: ratio * least })
+    });
+    prop_oneof![9 => footprint, 1 => Just(RadiusField::Uniform)]
+}
+
+/// A ray among the items, or through the eye.
+fn ray() -> impl Strategy<Value = Ray> {
+    let range = prop_oneof![Just((0.0, f32::INFINITY)), (0.0..1.0_f32, 1.0..3.0_f32)];
+    let origin = prop_oneof![3 => place(), 1 => Just(Vec3::ZERO)];
+    (origin, direction(), range).prop_map(|(origin, direction, (t_min, t_max))| {
+        Ray::new(origin, direction).with_range(t_min, t_max)
+    })
+}
+
+fn sorted(mut hits: Vec<(u32, u32)>) -> Vec<(u32, u32)> {
+    hits.sort_unstable();
+    hits
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(400) })]
+
+    #[test]
+    fn pieces_make_up_the_ray_and_bound_the_field(field in field(), ray in ray(), parts in vec(0.0..1.0_f32, 16)) {
+        let mut start = ray.t_min;
+        for (piece, largest) in field.pieces(&ray) {
+            prop_assert_eq!(piece.t_min, start);
+            prop_assert!(piece.t_max > start);
+            start = piece.t_max;
+            let end = piece.t_max.min(piece.t_min + 100.0);
+            for part in &parts {
+                let scale = field.at(ray.at(piece.t_min + part * (end - piece.t_min)));
+                prop_assert!(scale <= 1.0001 * largest, "{scale}, at most {largest}");
+                prop_assert!(1.501 * scale >= largest || end == piece.t_max, "{scale}, but {largest}");
+            }
+        }
+        prop_assert_eq!(start, ray.t_max);
+    }
+
+    #[test]
+    fn radii_change_by_at_most_a_tenth_of_the_distance(field in field(), a in place(), b in place()) {
+        let radius = field.largest_radius().min(1e3);
+        prop_assert!(field.is_valid(radius) && (field == RadiusField::Uniform || !field.is_valid(1.001 * radius)));
+        let difference = radius * (field.at(a) - field.at(b)).abs();
+        prop_assert!(difference <= 0.1 * (a - b).length() + 1e-5 * radius * field.at(a), "{difference}");
+    }
+
+    #[test]
+    fn points_around_a_ray_equal_brute_force(
+        field in field(), ray in ray(), radius in 0.01..0.3_f32, points in vec(place(), 1..200),
+    ) {
+        let tree = PointTree::build(points.iter().copied().zip(0_u32..).collect());
+        let mut found = Vec::new();
+        for (piece, largest) in field.pieces(&ray) {
+            tree.around_ray(&piece, radius * largest, |index, t, distance2| {
+                if distance2.sqrt() < radius * field.at(ray.at(t)).min(largest) {
+                    found.push((index, t.to_bits()));
+                }
+            });
+        }
+        let brute = points.iter().zip(0..).filter_map(|(point, index)| {
+            let offset = *point - ray.origin;
+            let t = offset.dot(ray.direction);
+            let distance = (offset - t * ray.direction).length();
+            let inside = t >= ray.t_min && t < ray.t_max && distance < radius * field.at(ray.at(t));
+            inside.then(|| (index, t.to_bits()))
+        });
+        prop_assert_eq!(sorted(found), sorted(brute.collect()));
+    }
+
+    #[test]
+    fn segments_around_a_ray_equal_brute_force(
+        field in field(),
+        ray in ray(),
+        radius in 0.01..0.3_f32,
+        segments in vec((place(), direction(), 0.1..2.0_f32), 1..200),
+    ) {
+        let segment = |&(origin, direction, end): &(Vec3, Vec3, f32)| Segment { origin, direction, start: 0.0, end };
+        let segments: Vec<_> = segments.iter().map(segment).collect();
+        let tree = SegmentTree::build(segments.iter().copied().zip(0_u32..).collect(), SplitParams::default());
+        let mut found = Vec::new();
+        for (piece, largest) in field.pieces(&ray) {
+            tree.around_ray(&piece, radius * largest, |index, approach| {
+                if approach.distance < radius * field.at(ray.at(approach.t_ray)).min(largest) {
+                    found.push((index, approach.t_ray.to_bits()));
+                }
+            });
+        }
+        let brute = segments.iter().zip(0..).filter_map(|(segment, index)| {
+            let approach = closest_approach(&ray, segment, f32::INFINITY)?;
+            let inside = approach.distance < radius * field.at(ray.at(approach.t_ray));
+            inside.then(|| (index, approach.t_ray.to_bits()))
+        });
+        prop_assert_eq!(sorted(found), sorted(brute.collect()));
+    }
+
+    #[test]
+    fn a_scaled_kernel_is_the_one_of_the_scaled_radius(radius in 1e-6..1e6_f32, factor in 0.01..100.0_f32) {
+        for make in [Kernel::disc, Kernel::ball, Kernel::parabolic_disc, Kernel::parabolic_line] {
+            prop_assert_eq!(make(radius).scaled(factor), make(factor * radius));
+            prop_assert_eq!(make(radius).scaled(1.0), make(radius));
+        }
+        prop_assert_eq!(Kernel::NONE.scaled(factor), Kernel::NONE);
+    }
+}

@@ -1,0 +1,101 @@
+//! Kernel radii that are a function of place: what the plan gives to a picture of near and far things.
+
+use upbp_core::glam::Vec3;
+use upbp_core::{FrozenPlan, Plan, Radii, RadiusField, Radius, Settings, State, StateError};
+use upbp_scene::ReadyScene;
+use upbp_testing::renderer;
+
+/// Balls of glass on a plain, one next to the camera, and the sun.
+fn landscape() -> ReadyScene {
+    let text = r#"(
+  version: 1,
+  camera: Perspective(origin: (0, 0.5, 0.6), target: (0, 0.25, -1), fov_degrees: 50),
+  film: (width: 40, height: 30),
+  materials: { "stone": Lambert(0.5), "glass": Dielectric(1.5) },
+  shapes: [
+    (material: "stone", geometry: Quad(origin: (-200, 0, -300), edge_u: (0, 0, 400), edge_v: (400, 0, 0))),
+    (material: "glass", geometry: Sphere(centre: (-0.12, 0.11, 0.1), radius: 0.1)),
+    (material: "glass", geometry: Sphere(centre: (3, 2, -12), radius: 2)),
+  ],
+  lights: [ Directional(direction: (0.4, -1, 0.3), irradiance: 5), Constant(0.3) ],
+)"#;
+    ReadyScene::from_ron_str(text, ".").expect("a valid scene")
+}
+
+/// A drop on a leaf, seen from 2 cm away, in surroundings of 40 m.
+fn microscope() -> ReadyScene {
+    let text = r#"(
+  version: 1,
+  camera: Perspective(origin: (0, 0.02, 0.012), target: (0, 0.0, -0.001), fov_degrees: 35),
+  film: (width: 40, height: 40),
+  materials: { "leaf": Lambert(0.3), "water": Dielectric(1.33) },
+  shapes: [
+    (material: "leaf", geometry: Quad(origin: (-20, -1, -20), edge_u: (0, 0, 40), edge_v: (40, 0, 0))),
+    (material: "leaf", geometry: Box(min: (-0.05, -0.001, -0.05), max: (0.05, 0, 0.05))),
+    (material: "water", geometry: Sphere(centre: (0, 0.0012, 0), radius: 0.0011)),
+  ],
+  lights: [ Directional(direction: (0.3, -1, -0.4), irradiance: 5), Constant(0.3) ],
+)"#;
+    ReadyScene::from_ron_str(text, ".").expect("a valid scene")
+}
+
+fn settings() -> Settings {
+    Settings { techniques: "all".parse().expect("techniques"), deterministic: true, ..Settings::default() }
+}
+
+fn plan(scene: &ReadyScene, settings: Settings) -> Plan {
+    renderer(scene, settings).state().identity().frozen_plan().plan
+}
+
+/// Width of a pixel at a distance, for a horizontal angle of the picture in degrees.
+fn pixel(distance: f32, degrees: f32, pixels: f32) -> f32 {
+    2.0 * distance * (0.5 * degrees.to_radians()).tan() / pixels
+}
+
+#[test]
+fn a_landscape_and_a_microscope_get_the_kernels_that_pixels_ask_for() {
+    let scene = landscape();
+    let radii = plan(&scene, settings()).radii;
+    let eye = Vec3::new(0.0, 0.5, 0.6);
+    for (place, distance) in [(Vec3::new(-0.1, 0.0, 0.1), 0.72), (Vec3::new(0.0, 0.0, -4.0), 4.63)] {
+        assert!(((place - eye).length() - distance).abs() < 0.01);
+        let pixels = radii.surf * radii.field.at(place) / pixel(distance, 50.0, 40.0);
+        assert!((0.01..=0.14).contains(&pixels), "{pixels} pixels at {place}: {radii:?}");
+    }
+    let scene = microscope();
+    let radii = plan(&scene, settings()).radii;
+    assert_eq!(radii.field, RadiusField::Uniform, "all is as far away");
+    let pixels = radii.surf / pixel(0.0236, 35.0, 40.0);
+    assert!((0.01..=0.14).contains(&pixels), "{pixels} pixels: {radii:?}");
+}
+
+#[test]
+fn radii_that_are_given_are_the_same_everywhere() {
+    let scene = landscape();
+    let radii = Radii { surf: Radius::Absolute(0.01), ..Radii::default() };
+    let plan = plan(&scene, Settings { radii, ..settings() });
+    assert_eq!((plan.radii.surf, plan.radii.field), (0.01, RadiusField::Uniform));
+}
+
+#[test]
+fn a_field_is_part_of_plans_and_states() {
+    let scene = landscape();
+    let mut first = renderer(&scene, settings());
+    let frozen = first.state().identity().frozen_plan();
+    assert_ne!(frozen.plan.radii.field, RadiusField::Uniform);
+    assert_eq!(FrozenPlan::from_ron(&frozen.to_ron()), Ok(frozen.clone()));
+    assert!(first.iterate());
+    let mut bytes = Vec::new();
+    first.state().write(&mut bytes).expect("a vector takes all");
+    let state = State::read(bytes.as_slice()).expect("what was written");
+    assert_eq!(state.identity().plan, frozen.plan);
+
+    let mut other = state.identity().clone();
+    other.plan.radii.field = RadiusField::Uniform;
+    let different = other.check_same(state.identity());
+    assert!(matches!(&different, Err(StateError::Different { differences }) if differences[0].contains("radii.field")));
+
+    let mut steep = frozen;
+    steep.plan.radii.surf = 1.001 * steep.plan.radii.field.largest_radius();
+    assert!(FrozenPlan::from_ron(&steep.to_ron()).unwrap_err().to_string().contains("radii.field"));
+}
