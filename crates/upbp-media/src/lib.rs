@@ -20,6 +20,8 @@ pub use self::error::MediaError;
 pub use self::homogeneous::Homogeneous;
 pub use self::medium::Medium;
 pub use self::nested_bodies::{BodyId, Crossing, Interior, MediumId, MediumStack};
-pub use self::phase::{Asymmetry, Blend, PhaseFunction, PhaseSample};
+pub use self::phase::{
+    Asymmetry, Blend, Draine, PerChannel, PhaseFunction, PhaseSample, PhaseValue, Tabulated,
+};
 pub use self::segment::{EdgeDensity, RaySegment, SegmentDensity};
 pub use self::spectrum::Spectrum;

@@ -198,9 +198,9 @@ impl<B: Bsdf> Interaction<B> {
             Self::Medium(medium) => {
                 let medium = &scene.media()[medium.0 as usize];
                 let phase = medium.phase().eval(-from, to);
-                let rho = f64::from(phase) * f64::from(continuation(medium, position, roulette));
+                let rho = f64::from(phase.pdf) * f64::from(continuation(medium, position, roulette));
                 Some(Evaluation {
-                    value: medium.sigma_s(position) * phase,
+                    value: medium.sigma_s(position) * phase.value,
                     rho_own: rho,
                     rho_opposite: rho,
                     cos: 1.0,
@@ -234,11 +234,13 @@ impl<B: Bsdf> Interaction<B> {
                     return None;
                 }
                 let sample = PhaseFunction::sample(medium.phase(), -from, u);
+                if sample.pdf == 0.0 {
+                    return None;
+                }
                 let rho = f64::from(sample.pdf) * f64::from(albedo);
                 Some(Scattered {
                     direction: sample.after,
-                    // The phase function is sampled perfectly: its value over its density is one.
-                    weight: medium.sigma_s(position) / probability,
+                    weight: medium.sigma_s(position) * sample.weight / probability,
                     albedo,
                     rho_own: rho,
                     rho_opposite: rho,

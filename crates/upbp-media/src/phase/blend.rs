@@ -1,11 +1,8 @@
 //! Weighted sums of phase functions.
 
-use super::PhaseFunction;
 use super::deflection::Deflection;
-use crate::MediaError;
-
-/// The largest single-precision number below one.
-const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
+use super::{ONE_MINUS_EPSILON, PhaseFunction, PhaseValue};
+use crate::{MediaError, Spectrum};
 
 /// A weighted sum of phase functions, made by [`PhaseFunction::blend`]. The weights add up to one; no
 /// part is itself a blend.
@@ -49,12 +46,23 @@ impl Blend {
         &self.parts
     }
 
-    pub(super) fn value(&self, deflection: Deflection<f32>) -> f32 {
-        self.parts.iter().map(|(weight, part)| weight * part.value(deflection)).sum()
+    pub(super) fn value(&self, deflection: Deflection<f32>) -> PhaseValue {
+        let mut sum = PhaseValue::grey(0.0);
+        for (weight, part) in &self.parts {
+            let PhaseValue { value, pdf } = part.value(deflection);
+            sum.value += *weight * value;
+            sum.pdf += weight * pdf;
+        }
+        sum
     }
 
-    pub(super) fn mean_cosine(&self) -> f32 {
-        self.parts.iter().map(|(weight, part)| weight * part.mean_cosine()).sum()
+    pub(super) fn mean_cosine(&self) -> Spectrum {
+        self.parts.iter().map(|(weight, part)| *weight * part.mean_cosine()).sum()
+    }
+
+    /// The blend that one channel sees.
+    pub(super) fn channel(&self, channel: usize) -> Self {
+        Self { parts: self.parts.iter().map(|(weight, part)| (*weight, part.channel(channel))).collect() }
     }
 
     /// Chooses a part by its weight; also returns the rest of the random number, again in `[0, 1)`.

@@ -63,10 +63,10 @@ pub(super) fn value(g: Asymmetry, deflection: Deflection<f32>) -> f32 {
 
 /// The angle at the fraction `u` of the distribution, counted from straight back.
 #[inline]
-pub(super) fn sample(g: Asymmetry, u: f32) -> Deflection<f64> {
+pub(super) fn sample(g: Asymmetry, u: f64) -> Deflection<f64> {
     // The usual cosine, 1 + g² − s² over 2g, cancels for |g| → 1 and divides by g → 0; these two do
     // neither. Their sum is 2.
-    let (g, u) = (f64::from(g.0), f64::from(u));
+    let g = f64::from(g.0);
     let root = (1.0 - g + 2.0 * g * u).recip();
     let backward = (1.0 - g) * root;
     let forward = (1.0 + g) * root;

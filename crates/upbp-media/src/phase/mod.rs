@@ -1,15 +1,18 @@
 //! Phase functions: the distribution of directions after a collision.
 //!
 //! All directions are directions of *propagation*, before and after the collision: equal vectors mean
-//! straight on. The value is normalised over the sphere, and it is also the density that
-//! [`PhaseFunction::sample`] draws with, so that the estimate of a bounce never needs the two apart.
+//! straight on. Values are normalised over the sphere in every channel. A grey value is also the density that
+//! [`PhaseFunction::sample`] draws with; where the channels differ, the density is the mean of the three.
 //!
 //! Source: `docs/theory.md`, sections 1.1 and 7. Oracles: quadrature over the sphere and histograms.
 
 mod blend;
 mod deflection;
+mod draine;
 mod henyey_greenstein;
+mod per_channel;
 mod rayleigh;
+mod tabulated;
 #[cfg(test)]
 mod tests;
 
@@ -17,8 +20,14 @@ use glam::Vec3;
 
 pub use self::blend::Blend;
 use self::deflection::{Deflection, UNIFORM, isotropic};
+pub use self::draine::Draine;
 pub use self::henyey_greenstein::Asymmetry;
-use crate::MediaError;
+pub use self::per_channel::PerChannel;
+pub use self::tabulated::Tabulated;
+use crate::{MediaError, Spectrum};
+
+/// The largest single-precision number below one.
+const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// A phase function, symmetric about the direction of propagation.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,8 +38,31 @@ pub enum PhaseFunction {
     HenyeyGreenstein(Asymmetry),
     /// Scattering by particles much smaller than the wavelength, unpolarised.
     Rayleigh,
+    /// The lobe of Henyey and Greenstein times `1 + α cos² θ`.
+    Draine(Draine),
+    /// Linear in the cosine between the angles of a table.
+    Tabulated(Tabulated),
     /// A weighted sum of others.
     Blend(Blend),
+    /// One for each channel.
+    PerChannel(PerChannel),
+}
+
+/// The value of a phase function between two directions, and the density of its sampling.
+#[derive(Copy, Clone, Debug, PartialEq)]
+pub struct PhaseValue {
+    /// Value per steradian, at most three times the density in each channel.
+    pub value: Spectrum,
+    /// Density per steradian with which [`PhaseFunction::sample`] draws the direction.
+    pub pdf: f32,
+}
+
+impl PhaseValue {
+    /// A value that is equal in all channels, and is the density.
+    #[inline]
+    const fn grey(value: f32) -> Self {
+        Self { value: Spectrum::splat(value), pdf: value }
+    }
 }
 
 /// A direction drawn from a phase function.
@@ -38,7 +70,10 @@ pub enum PhaseFunction {
 pub struct PhaseSample {
     /// Unit direction of propagation after the collision.
     pub after: Vec3,
-    /// Density of the draw per steradian; also the value of the phase function.
+    /// Value over density, in `[0, 3]`; one if the channels do not differ.
+    pub weight: Spectrum,
+    /// Density of the draw per steradian. Zero, and the weight with it, if the direction was rounded out of
+    /// what a table allows.
     pub pdf: f32,
 }
 
@@ -50,6 +85,65 @@ impl PhaseFunction {
     /// Unless `-1 < g < 1`.
     pub fn henyey_greenstein(g: f32) -> Result<Self, MediaError> {
         Ok(Self::HenyeyGreenstein(Asymmetry::new(g)?))
+    }
+
+    /// Two lobes of Henyey and Greenstein; the first has the `share` of all scattering.
+    ///
+    /// # Errors
+    ///
+    /// Unless both asymmetries are above -1 and below 1, and the share above 0 and below 1.
+    pub fn two_lobes(g: [f32; 2], share: f32) -> Result<Self, MediaError> {
+        if !(share > 0.0 && share < 1.0) {
+            let (what, expected) = ("the share of the first lobe", "a number above 0 and below 1");
+            return Err(MediaError::OutOfRange { what, value: share, expected });
+        }
+        let [first, second] = g.map(Self::henyey_greenstein);
+        Self::blend(vec![(share, first?), (1.0 - share, second?)])
+    }
+
+    /// The phase function of Draine: that of Henyey and Greenstein with asymmetry `g` times `1 + α cos² θ`.
+    ///
+    /// # Errors
+    ///
+    /// Unless `-1 < g < 1` and `α` is finite and not negative.
+    pub fn draine(g: f32, alpha: f32) -> Result<Self, MediaError> {
+        Ok(Self::Draine(Draine::new(g, alpha)?))
+    }
+
+    /// Mie scattering of visible light by the water droplets of fog and clouds, by their diameter in
+    /// micrometres: the blend that Jendersie and d'Eon fitted (2023). It has the forward peak and the rise
+    /// backwards, and neither fogbow nor glory, which take a [table](Self::tabulated).
+    ///
+    /// # Errors
+    ///
+    /// Unless the diameter is above 0 and at most 50; the best fit is from 5.
+    pub fn droplets(diameter_um: f32) -> Result<Self, MediaError> {
+        let ([g, g_draine, alpha], share) = draine::droplets(diameter_um)?;
+        Self::blend(vec![(1.0 - share, Self::henyey_greenstein(g)?), (share, Self::draine(g_draine, alpha)?)])
+    }
+
+    /// A table of angles in degrees and values in any unit, linear in the cosine between the angles. Each
+    /// channel is scaled to an integral of one.
+    ///
+    /// # Errors
+    ///
+    /// Unless the angles rise from 0 to 180 by at least 0.001, and the values are finite and not negative, in
+    /// every channel not all zero.
+    pub fn tabulated(rows: &[(f32, Spectrum)]) -> Result<Self, MediaError> {
+        let channel = |channel: usize| {
+            Tabulated::new(rows.iter().map(|(degrees, value)| (*degrees, value[channel])))
+                .map(Self::Tabulated)
+        };
+        Ok(Self::per_channel([channel(0)?, channel(1)?, channel(2)?]))
+    }
+
+    /// A phase function for each of red, green and blue. Of one that itself has three, its own channel
+    /// counts; three that are equal become one.
+    #[must_use]
+    pub fn per_channel(channels: [Self; 3]) -> Self {
+        let per_channel = PerChannel::new(channels);
+        let [r, g, b] = per_channel.channels();
+        if r == g && g == b { r.clone() } else { Self::PerChannel(per_channel) }
     }
 
     /// A sum of phase functions, with weights that are scaled to add up to one. Blends among the parts
@@ -68,7 +162,7 @@ impl PhaseFunction {
     /// Symmetric in its arguments.
     #[inline]
     #[must_use]
-    pub fn eval(&self, before: Vec3, after: Vec3) -> f32 {
+    pub fn eval(&self, before: Vec3, after: Vec3) -> PhaseValue {
         self.value(Deflection::between(before, after))
     }
 
@@ -77,7 +171,7 @@ impl PhaseFunction {
     /// Only as exact as the cosine: prefer [`eval`](Self::eval) for narrow peaks.
     #[inline]
     #[must_use]
-    pub fn eval_cosine(&self, cos_theta: f32) -> f32 {
+    pub fn eval_cosine(&self, cos_theta: f32) -> PhaseValue {
         self.value(Deflection::from_cosine(cos_theta))
     }
 
@@ -89,37 +183,60 @@ impl PhaseFunction {
         let after = self.sample_direction(before, u);
         // From the direction as it was rounded, not from `u`: in a narrow peak the two differ by percents,
         // and whoever evaluates the density later only has the direction.
-        PhaseSample { after, pdf: self.eval(before, after) }
+        let PhaseValue { value, pdf } = self.eval(before, after);
+        let weight = if pdf > 0.0 { value / pdf } else { Spectrum::ZERO };
+        PhaseSample { after, weight, pdf }
     }
 
     /// Mean cosine of the angle between the directions of propagation, in `(-1, 1)`.
     #[must_use]
-    pub fn mean_cosine(&self) -> f32 {
+    pub fn mean_cosine(&self) -> Spectrum {
         match self {
-            Self::Isotropic | Self::Rayleigh => 0.0,
-            Self::HenyeyGreenstein(g) => g.get(),
+            Self::Isotropic | Self::Rayleigh => Spectrum::ZERO,
+            Self::HenyeyGreenstein(g) => Spectrum::splat(g.get()),
+            Self::Draine(draine) => Spectrum::splat(draine.mean_cosine()),
+            Self::Tabulated(table) => Spectrum::splat(table.mean_cosine()),
             Self::Blend(blend) => blend.mean_cosine(),
+            Self::PerChannel(channels) => channels.mean_cosine(),
+        }
+    }
+
+    /// The phase function that one channel sees.
+    fn channel(&self, channel: usize) -> Self {
+        match self {
+            Self::Blend(blend) => Self::Blend(blend.channel(channel)),
+            Self::PerChannel(channels) => channels.channels()[channel].clone(),
+            grey => grey.clone(),
         }
     }
 
     #[inline]
-    fn value(&self, deflection: Deflection<f32>) -> f32 {
-        match self {
+    fn value(&self, deflection: Deflection<f32>) -> PhaseValue {
+        PhaseValue::grey(match self {
             Self::Isotropic => UNIFORM,
             Self::HenyeyGreenstein(g) => henyey_greenstein::value(*g, deflection),
             Self::Rayleigh => rayleigh::value(deflection),
-            Self::Blend(blend) => blend.value(deflection),
-        }
+            Self::Draine(draine) => draine.value(deflection),
+            Self::Tabulated(table) => table.value(deflection),
+            Self::Blend(blend) => return blend.value(deflection),
+            Self::PerChannel(channels) => return channels.value(deflection),
+        })
     }
 
     #[inline]
     fn sample_direction(&self, before: Vec3, [u_angle, u_azimuth]: [f32; 2]) -> Vec3 {
         let deflection = match self {
             Self::Isotropic => isotropic(u_angle),
-            Self::HenyeyGreenstein(g) => henyey_greenstein::sample(*g, u_angle),
+            Self::HenyeyGreenstein(g) => henyey_greenstein::sample(*g, f64::from(u_angle)),
             Self::Rayleigh => rayleigh::sample(u_angle),
+            Self::Draine(draine) => draine.sample(u_angle),
+            Self::Tabulated(table) => table.sample(u_angle),
             Self::Blend(blend) => {
                 let (part, u_azimuth) = blend.choose(u_azimuth);
+                return part.sample_direction(before, [u_angle, u_azimuth]);
+            }
+            Self::PerChannel(channels) => {
+                let (part, u_azimuth) = channels.choose(u_azimuth);
                 return part.sample_direction(before, [u_angle, u_azimuth]);
             }
         };

@@ -9,7 +9,7 @@ use super::deflection::Deflection;
 /// `3 (1 + cos² θ) / 16π` per steradian.
 #[inline]
 pub(super) fn value(deflection: Deflection<f32>) -> f32 {
-    let cos_theta = 0.5 * (deflection.one_plus_cos - deflection.one_minus_cos);
+    let cos_theta = deflection.cosine();
     3.0 / 16.0 * FRAC_1_PI * (1.0 + cos_theta * cos_theta)
 }
 

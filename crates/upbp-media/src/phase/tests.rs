@@ -1,3 +1,7 @@
+mod draine;
+mod per_channel;
+mod tabulated;
+
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
@@ -36,6 +40,9 @@ fn haze() -> PhaseFunction {
 fn all() -> Vec<PhaseFunction> {
     let mut all = vec![PhaseFunction::Isotropic, PhaseFunction::Rayleigh, haze()];
     all.extend(signed_asymmetries().map(henyey_greenstein));
+    all.extend(draine::all());
+    all.push(PhaseFunction::two_lobes([0.9, -0.3], 0.7).unwrap());
+    all.push(PhaseFunction::per_channel([henyey_greenstein(0.9), haze(), draine::all().remove(0)]));
     all
 }
 
@@ -59,6 +66,11 @@ fn reference(phase: &PhaseFunction, (one_minus_cos, one_plus_cos): (f64, f64)) -
             };
             (1.0 - g * g) / (4.0 * PI * distance2.powf(1.5))
         }
+        PhaseFunction::Draine(phase) => draine::reference(phase, (one_minus_cos, one_plus_cos)),
+        PhaseFunction::PerChannel(phases) => {
+            phases.channels().iter().map(|phase| reference(phase, (one_minus_cos, one_plus_cos)) / 3.0).sum()
+        }
+        PhaseFunction::Tabulated(_) => unreachable!("tables have their own oracle"),
         PhaseFunction::Blend(blend) => blend
             .parts()
             .iter()
@@ -86,6 +98,13 @@ fn distribution(phase: &PhaseFunction, (one_minus_cos, one_plus_cos): (f64, f64)
             };
             (1.0 - g * g) / (2.0 * g) * (1.0 / distance - 1.0 / (1.0 + g))
         }
+        PhaseFunction::Draine(phase) => draine::distribution(phase, (one_minus_cos, one_plus_cos)),
+        PhaseFunction::PerChannel(phases) => phases
+            .channels()
+            .iter()
+            .map(|phase| distribution(phase, (one_minus_cos, one_plus_cos)) / 3.0)
+            .sum(),
+        PhaseFunction::Tabulated(_) => unreachable!("tables have their own oracle"),
         PhaseFunction::Blend(blend) => blend
             .parts()
             .iter()
@@ -100,6 +119,7 @@ fn distribution(phase: &PhaseFunction, (one_minus_cos, one_plus_cos): (f64, f64)
 fn tolerance(phase: &PhaseFunction) -> f64 {
     let width = match phase {
         PhaseFunction::HenyeyGreenstein(g) => 1.0 - f64::from(g.get().abs()),
+        PhaseFunction::Draine(draine) => 1.0 - f64::from(draine.g().get().abs()),
         _ => 0.05,
     };
     3e-6 + 6e-14 / (width * width)
@@ -115,13 +135,10 @@ fn pair_at(random: &mut Random, theta: f32) -> (Vec3, Vec3) {
 #[test]
 fn integrates_to_one() {
     for phase in all() {
-        let value =
-            |one_minus_cos: f64, one_plus_cos: f64| {
-                f64::from(phase.value(Deflection {
-                    one_minus_cos: one_minus_cos as f32,
-                    one_plus_cos: one_plus_cos as f32,
-                }))
-            };
+        let value = |one_minus_cos: f64, one_plus_cos: f64| {
+            let at = Deflection { one_minus_cos: one_minus_cos as f32, one_plus_cos: one_plus_cos as f32 };
+            f64::from(phase.value(at).pdf)
+        };
         // A hemisphere each, with nodes that crowd towards its pole.
         let forward = integrate_towards_zero(|x| value(x, 2.0 - x), 1.0);
         let backward = integrate_towards_zero(|x| value(2.0 - x, x), 1.0);
@@ -136,7 +153,7 @@ fn mean_cosine_is_the_first_moment() {
         let forward = integrate_towards_zero(|x| (1.0 - x) * reference(&phase, (x, 2.0 - x)), 1.0);
         let backward = integrate_towards_zero(|x| (x - 1.0) * reference(&phase, (2.0 - x, x)), 1.0);
         let moment = TAU * (forward + backward);
-        assert!((moment - f64::from(phase.mean_cosine())).abs() < 1e-6, "{phase:?}: {moment}");
+        assert!((moment - f64::from(phase.mean_cosine().mean())).abs() < 1e-6, "{phase:?}: {moment}");
     }
 }
 
@@ -148,7 +165,7 @@ fn eval_is_the_formula_at_every_angle() {
             for about in [0.0, std::f32::consts::PI] {
                 let (before, after) = pair_at(&mut random, about + (exponent as f32).exp2());
                 let expected = reference(&phase, deflection(before, after));
-                let value = f64::from(phase.eval(before, after));
+                let value = f64::from(phase.eval(before, after).pdf);
                 let error = (value / expected - 1.0).abs();
                 assert!(error < tolerance(&phase), "{phase:?} at 2^{exponent}: {value}, expected {expected}");
             }
@@ -167,12 +184,12 @@ fn eval_is_symmetric_and_agrees_with_the_cosine() {
             assert_eq!(value, phase.eval(-before, -after));
             let one_minus = f64::from(1.0 - before.dot(after).abs());
             if one_minus > 1e-2 {
-                let from_cosine = phase.eval_cosine(before.dot(after));
+                let (from_cosine, value) = (phase.eval_cosine(before.dot(after)).pdf, value.pdf);
                 assert!((from_cosine / value - 1.0).abs() < 1e-3, "{phase:?}: {from_cosine}, {value}");
             }
         }
         for cos_theta in [1.0 + 1e-6, -1.0 - 1e-6] {
-            assert!(phase.eval_cosine(cos_theta) >= 0.0);
+            assert!(phase.eval_cosine(cos_theta).pdf >= 0.0);
             assert_eq!(phase.eval_cosine(cos_theta), phase.eval_cosine(cos_theta.round()));
         }
     }
@@ -186,7 +203,7 @@ fn sample_reports_the_density_of_its_direction() {
             let before = random.direction();
             let sample = phase.sample(before, [random.uniform(), random.uniform()]);
             assert!((sample.after.length() - 1.0).abs() < 2e-7);
-            assert_eq!(sample.pdf, phase.eval(before, sample.after));
+            assert_eq!(sample.pdf, phase.eval(before, sample.after).pdf);
             let expected = reference(&phase, deflection(before, sample.after));
             let error = (f64::from(sample.pdf) / expected - 1.0).abs();
             assert!(error < tolerance(&phase), "{phase:?}: {error}");
@@ -224,7 +241,7 @@ fn forward_peak_goes_forward() {
         assert!(backward.distance(-before) < 2e-3, "{before} became {backward} at {u:?}");
     }
     let peak = henyey_greenstein(0.9);
-    assert!(peak.eval(Vec3::X, Vec3::X) > 1000.0 * peak.eval(Vec3::X, Vec3::NEG_X));
+    assert!(peak.eval(Vec3::X, Vec3::X).pdf > 1000.0 * peak.eval(Vec3::X, Vec3::NEG_X).pdf);
 }
 
 #[test]
@@ -240,7 +257,7 @@ fn the_narrowest_peaks_stay_finite() {
                 assert!(sample.pdf.is_finite() && sample.pdf > 0.0, "{g}: {sample:?}");
             }
         }
-        assert!(phase.eval(Vec3::Z, g.signum() * Vec3::Z).is_finite());
+        assert!(phase.eval(Vec3::Z, g.signum() * Vec3::Z).pdf.is_finite());
     }
 }
 
@@ -322,7 +339,7 @@ fn sampled_directions_fit_the_density() {
                         let (sin, cos) = (TAU * along(cell % COLUMNS, i % fine, COLUMNS)).sin_cos();
                         let radius = (1.0 - z * z).sqrt();
                         let after = DVec3::new(radius * cos, radius * sin, z).as_vec3();
-                        f64::from(phase.eval(before, after))
+                        f64::from(phase.eval(before, after).pdf)
                     })
                     .sum::<f64>()
                     / (fine * fine) as f64;
@@ -340,10 +357,10 @@ fn a_blend_is_the_weighted_sum() {
     let blend = PhaseFunction::blend(vec![(6.0, peak.clone()), (2.0, smooth.clone())]).unwrap();
     for _ in 0..100 {
         let (before, after) = (random.direction(), random.direction());
-        let sum = 0.75 * peak.eval(before, after) + 0.25 * smooth.eval(before, after);
-        assert!((blend.eval(before, after) / sum - 1.0).abs() < 1e-6);
+        let sum = 0.75 * peak.eval(before, after).pdf + 0.25 * smooth.eval(before, after).pdf;
+        assert!((blend.eval(before, after).pdf / sum - 1.0).abs() < 1e-6);
     }
-    assert!((blend.mean_cosine() - 0.6).abs() < 1e-6);
+    assert!((blend.mean_cosine().mean() - 0.6).abs() < 1e-6);
 }
 
 #[test]
@@ -362,10 +379,10 @@ fn blend_weights_of_any_size_are_scaled() {
         let parts = weights.map(|weight| (weight, henyey_greenstein(0.5)));
         PhaseFunction::blend(parts.to_vec()).unwrap()
     };
-    let expected = henyey_greenstein(0.5).eval(Vec3::X, Vec3::Y);
+    let expected = henyey_greenstein(0.5).eval(Vec3::X, Vec3::Y).pdf;
     for weights in [[1.0; 3], [f32::MAX; 3], [1e-45; 3], [f32::MAX, 1e-45, 1.0], [1e-45, f32::MAX, 1e-45]] {
         let phase = blend(weights);
-        assert!((phase.eval(Vec3::X, Vec3::Y) / expected - 1.0).abs() < 1e-6, "{weights:?}");
+        assert!((phase.eval(Vec3::X, Vec3::Y).pdf / expected - 1.0).abs() < 1e-6, "{weights:?}");
         let PhaseFunction::Blend(parts) = &phase else { panic!("not a blend") };
         assert!(parts.parts().iter().all(|&(weight, _)| weight > 0.0), "{weights:?}");
         for u in [0.0, 0.3, 0.7, LARGEST_BELOW_ONE] {
