@@ -7,6 +7,7 @@ mod error;
 pub mod light;
 pub mod material;
 pub mod obj;
+pub mod phase_table;
 mod render;
 mod sampling;
 mod scene;

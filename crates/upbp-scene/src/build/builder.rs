@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use upbp_core::open_file;
 use upbp_media::MediumId;
 
 use crate::description::{Fnv1a, SceneDescription};
@@ -41,6 +43,12 @@ impl Builder<'_> {
         path
     }
 
+    /// A file of at most so many bytes, which go into the fingerprint as they are read.
+    pub(super) fn open(&mut self, path: &Path, max_bytes: u64) -> io::Result<impl io::BufRead> {
+        let bytes = open_file(path, max_bytes)?.take(max_bytes);
+        Ok(BufReader::new(Hashed { bytes, hash: &mut self.hash }))
+    }
+
     /// The medium of that name, or a problem of `item`.
     pub(super) fn medium(
         &mut self,
@@ -53,6 +61,20 @@ impl Builder<'_> {
             self.problem(item, unknown("medium", name, self.description.media.names()));
         }
         id
+    }
+}
+
+/// A reader whose bytes go into a fingerprint.
+struct Hashed<'h, R> {
+    bytes: R,
+    hash: &'h mut Fnv1a,
+}
+
+impl<R: Read> Read for Hashed<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.bytes.read(buffer)?;
+        self.hash.write(&buffer[..count]);
+        Ok(count)
     }
 }
 

@@ -1,36 +1,58 @@
 //! Media and their phase functions.
 
-use upbp_media::{Homogeneous, MediaError, PhaseFunction};
+use upbp_media::{Homogeneous, PhaseFunction};
 
 use super::builder::Builder;
-use crate::description::{Medium, Phase};
+use crate::description::{Medium, Phase, tabulated};
+use crate::phase_table;
 
 impl Builder<'_> {
     pub(super) fn media(&mut self) -> Vec<Homogeneous> {
         let mut media = Vec::new();
         for (name, medium) in self.description.media.iter() {
-            match homogeneous(medium) {
+            match self.homogeneous(medium) {
                 Ok(medium) => media.push(medium),
                 Err(error) => self.problem(format!("medium `{name}`"), error),
             }
         }
         media
     }
-}
 
-fn homogeneous(medium: &Medium) -> Result<Homogeneous, MediaError> {
-    let Medium::Homogeneous { sigma_a, sigma_s, phase, emission } = medium;
-    Homogeneous::new(sigma_a.get(), sigma_s.get(), phase_function(phase)?)?.with_emission(emission.get())
-}
+    fn homogeneous(&mut self, medium: &Medium) -> Result<Homogeneous, String> {
+        let Medium::Homogeneous { sigma_a, sigma_s, phase, emission } = medium;
+        let phase = self.phase_function(phase)?;
+        let medium = Homogeneous::new(sigma_a.get(), sigma_s.get(), phase);
+        medium.and_then(|medium| medium.with_emission(emission.get())).map_err(|error| error.to_string())
+    }
 
-fn phase_function(phase: &Phase) -> Result<PhaseFunction, MediaError> {
-    match phase {
-        Phase::Isotropic => Ok(PhaseFunction::Isotropic),
-        Phase::Rayleigh => Ok(PhaseFunction::Rayleigh),
-        Phase::HenyeyGreenstein(g) => PhaseFunction::henyey_greenstein(g.get()),
-        Phase::Blend(parts) => {
-            let parts = parts.iter().map(|(weight, part)| Ok((weight.get(), phase_function(part)?)));
-            PhaseFunction::blend(parts.collect::<Result<_, _>>()?)
-        }
+    fn phase_function(&mut self, phase: &Phase) -> Result<PhaseFunction, String> {
+        let made = match phase {
+            Phase::Isotropic => Ok(PhaseFunction::Isotropic),
+            Phase::Rayleigh => Ok(PhaseFunction::Rayleigh),
+            Phase::HenyeyGreenstein(g) => {
+                let [r, g, b] = g.get().to_array().map(PhaseFunction::henyey_greenstein);
+                r.and_then(|r| Ok(PhaseFunction::per_channel([r, g?, b?])))
+            }
+            Phase::TwoLobes { g, share } => PhaseFunction::two_lobes(g.map(Into::into), share.get()),
+            Phase::Draine { g, alpha } => PhaseFunction::draine(g.get(), alpha.get()),
+            Phase::Droplets(diameter) => PhaseFunction::droplets(diameter.get()),
+            Phase::Table(rows) => tabulated(rows),
+            Phase::TableFile { file } => return self.phase_table(file),
+            Phase::Blend(parts) => {
+                let parts = parts.iter().map(|(weight, part)| Ok((weight.get(), self.phase_function(part)?)));
+                PhaseFunction::blend(parts.collect::<Result<_, String>>()?)
+            }
+            Phase::PerChannel { r, g, b } => {
+                let [r, g, b] = [r, g, b].map(|phase| self.phase_function(phase));
+                Ok(PhaseFunction::per_channel([r?, g?, b?]))
+            }
+        };
+        made.map_err(|error| error.to_string())
+    }
+
+    fn phase_table(&mut self, file: &str) -> Result<PhaseFunction, String> {
+        let path = self.path(file);
+        let bytes = self.open(&path, phase_table::MAX_FILE).map_err(|error| error.to_string());
+        bytes.and_then(phase_table::read).map_err(|error| format!("table `{}`: {error}", path.display()))
     }
 }

@@ -1,15 +1,13 @@
 //! Shapes with their materials.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufReader, Read};
 
 use glam::Vec3;
 use upbp_accel::{AxisBox, Quad, Shape, Sphere, TriangleMesh};
-use upbp_core::open_file;
 use upbp_media::{MediumId, Spectrum};
 
 use super::builder::{Builder, unknown};
-use crate::description::{self, Fnv1a, Geometry, Vector};
+use crate::description::{self, Geometry, Vector};
 use crate::material::{
     Conductor, Dielectric, Lambert, Material, MetalFresnel, Mirror, Phong, RoughDielectric, TrowbridgeReitz,
 };
@@ -178,23 +176,8 @@ impl Builder<'_> {
     fn obj_mesh(&mut self, file: &str) -> Result<ObjMesh, String> {
         let path = self.path(file);
         let describe = |error: &dyn std::fmt::Display| format!("mesh `{}`: {error}", path.display());
-        let file = open_file(&path, MAX_FILE).map_err(|error| describe(&error))?;
-        let bytes = Hashed { bytes: file.take(MAX_FILE), hash: &mut self.hash };
-        ObjMesh::read(BufReader::new(bytes)).map_err(|error| describe(&error))
-    }
-}
-
-/// A reader whose bytes go into a fingerprint.
-struct Hashed<'h, R> {
-    bytes: R,
-    hash: &'h mut Fnv1a,
-}
-
-impl<R: Read> Read for Hashed<'_, R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.bytes.read(buffer)?;
-        self.hash.write(&buffer[..count]);
-        Ok(count)
+        let bytes = self.open(&path, MAX_FILE).map_err(|error| describe(&error))?;
+        ObjMesh::read(bytes).map_err(|error| describe(&error))
     }
 }
 

@@ -1,9 +1,11 @@
 //! Media.
 
+use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
+use upbp_media::{PhaseFunction, Spectrum};
 
 use super::single;
-use super::value::{Asymmetry, Colour, Positive, is_default};
+use super::value::{Asymmetries, Asymmetry, Colour, Diameter, NonNegative, Positive, Share, is_default};
 
 /// A participating medium, in a body or around everything.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,14 +36,61 @@ pub enum Phase {
     Isotropic,
     /// Rayleigh scattering, by particles much smaller than the wavelength.
     Rayleigh,
-    /// The function of Henyey and Greenstein, by its mean cosine: above 0 forward, below 0 backward.
-    #[serde(deserialize_with = "single::g")]
-    HenyeyGreenstein(Asymmetry),
+    /// The function of Henyey and Greenstein, by its mean cosine, which may differ between the channels: above
+    /// 0 forward, below 0 backward.
+    #[serde(deserialize_with = "single::asymmetries")]
+    HenyeyGreenstein(Asymmetries),
+    /// Two lobes of Henyey and Greenstein.
+    TwoLobes {
+        /// Mean cosine of each.
+        g: [Asymmetry; 2],
+        /// Share of the first.
+        share: Share,
+    },
+    /// The function of Draine: that of Henyey and Greenstein times `1 + alpha cos²`.
+    Draine {
+        /// The asymmetry of the factor that is Henyey and Greenstein's.
+        g: Asymmetry,
+        /// The factor of the squared cosine.
+        alpha: NonNegative,
+    },
+    /// Water droplets in air, by their diameter in micrometres.
+    #[serde(deserialize_with = "single::diameter")]
+    Droplets(Diameter),
+    /// A table of angles in degrees and values, linear in the cosine between them.
+    #[serde(deserialize_with = "rows")]
+    Table(Vec<(f32, Colour)>),
+    /// A table in a file.
+    TableFile {
+        /// Path, relative to the scene's file.
+        file: String,
+    },
     /// A weighted sum: pairs of a weight and a phase function. The weights need not add up to one.
     #[serde(deserialize_with = "parts")]
     Blend(Vec<(Positive, Phase)>),
+    /// One for each channel.
+    PerChannel {
+        /// Of the red channel.
+        r: Box<Phase>,
+        /// Of the green channel.
+        g: Box<Phase>,
+        /// Of the blue channel.
+        b: Box<Phase>,
+    },
 }
 
 fn parts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(Positive, Phase)>, D::Error> {
     single::read(deserializer, &["parts"])
+}
+
+fn rows<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(f32, Colour)>, D::Error> {
+    let rows: Vec<(f32, Colour)> = single::read(deserializer, &["rows"])?;
+    tabulated(&rows).map_err(D::Error::custom)?;
+    Ok(rows)
+}
+
+/// The phase function of a table.
+pub(crate) fn tabulated(rows: &[(f32, Colour)]) -> Result<PhaseFunction, upbp_media::MediaError> {
+    let rows: Vec<(f32, Spectrum)> = rows.iter().map(|(degrees, value)| (*degrees, value.get())).collect();
+    PhaseFunction::tabulated(&rows)
 }

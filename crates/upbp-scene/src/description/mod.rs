@@ -22,12 +22,13 @@ mod value;
 pub use self::camera::{Camera, Crop, Film};
 pub use self::light::Light;
 pub use self::material::Material;
+pub(crate) use self::medium::tabulated;
 pub use self::medium::{Medium, Phase};
 pub use self::named::Named;
 pub use self::scene::SceneDescription;
 pub use self::shape::{Geometry, Shape};
 pub(crate) use self::text::Fnv1a;
 pub use self::value::{
-    Asymmetry, BeamAngle, Colour, Count, CutoffAngle, Degrees, FieldOfView, Ior, NonNegative, Positive,
-    Reflectance, Roughness, ValueError, Vector, Version,
+    Asymmetries, Asymmetry, BeamAngle, Colour, Count, CutoffAngle, Degrees, Diameter, FieldOfView, Ior,
+    NonNegative, Positive, Reflectance, Roughness, Share, ValueError, Vector, Version,
 };

@@ -8,7 +8,7 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Error, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-use super::value::{Asymmetry, Colour, Ior, Reflectance};
+use super::value::{Asymmetries, Colour, Diameter, Ior, Reflectance};
 
 /// One function per name, for `deserialize_with`.
 macro_rules! single {
@@ -20,10 +20,15 @@ macro_rules! single {
 }
 
 single! {
-    g: Asymmetry,
+    diameter: Diameter,
     ior: Ior,
     radiance: Colour,
     reflectance: Reflectance,
+}
+
+/// Asymmetries, whose name is short.
+pub(super) fn asymmetries<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Asymmetries, D::Error> {
+    read(deserializer, &["g"])
 }
 
 /// Reads a value with or without its `name`.

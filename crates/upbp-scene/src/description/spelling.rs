@@ -12,7 +12,13 @@ const KINDS: [(&str, &[&str]); 6] = [
             "Isotropic",
             "Rayleigh",
             "HenyeyGreenstein(0.6)",
+            "TwoLobes(g: (0.9, -0.3), share: 0.8)",
+            "Draine(g: 0.6, alpha: 20)",
+            "Droplets(10)",
+            "Table([(0, 20), (30, 1), (180, 2)])",
+            "TableFile(file: \"fog.txt\")",
             "Blend([(3, Rayleigh), (1, HenyeyGreenstein(0.9))])",
+            "PerChannel(r: Rayleigh, g: Rayleigh, b: Isotropic)",
         ],
     ),
     (
@@ -211,6 +217,9 @@ mod tests {
     fn a_single_value_may_have_its_name() {
         for (field, plain, named) in [
             ("phase", "HenyeyGreenstein(0.6)", "HenyeyGreenstein(g: 0.6)"),
+            ("phase", "HenyeyGreenstein((0.6, 0.5, -0.1))", "HenyeyGreenstein(g: (0.6, 0.5, -0.1))"),
+            ("phase", "Droplets(8)", "Droplets(diameter: 8)"),
+            ("phase", "Table([(0, 1), (180, (2, 1, 0.5))])", "Table(rows: [(0, 1), (180, (2, 1, 0.5))])"),
             ("phase", "Blend([(3, Rayleigh)])", "Blend(parts: [(3, Rayleigh)])"),
             ("materials", "Lambert(0.5)", "Lambert(reflectance: 0.5)"),
             ("materials", "Lambert((0.7, 0.2, 0.1))", "Lambert(reflectance: (0.7, 0.2, 0.1))"),
@@ -232,16 +241,33 @@ mod tests {
             (
                 "phase",
                 "0.5",
-                "1: Expected a name, one of `Isotropic`, `Rayleigh`, `HenyeyGreenstein`, `Blend`",
+                "1: Expected a name, one of `Isotropic`, `Rayleigh`, `HenyeyGreenstein`, `TwoLobes`, `Draine`, `Droplets`, `Table`, `TableFile`, `Blend`, `PerChannel`",
             ),
             (
                 "phase",
                 r#""Rayleigh""#,
-                "1: Expected a name, one of `Isotropic`, `Rayleigh`, `HenyeyGreenstein`, `Blend`",
+                "1: Expected a name, one of `Isotropic`, `Rayleigh`, `HenyeyGreenstein`, `TwoLobes`, `Draine`, `Droplets`, `Table`, `TableFile`, `Blend`, `PerChannel`",
             ),
             ("phase", "Isotropic()", "10: Expected comma, as in `Isotropic`"),
             ("phase", "HenyeyGreenstein", "17: Expected opening `(`, as in `HenyeyGreenstein(0.6)`"),
-            ("phase", "HenyeyGreenstein(1, 2)", "20: Expected a number but found a sequence instead"),
+            (
+                "phase",
+                "HenyeyGreenstein(1, 2)",
+                "22: Expected a colour: a number, or three in parentheses (r, g, b) but found 2 elements instead",
+            ),
+            ("phase", "Draine(0.6, 20)", "8: Expected a name, as in `Draine(g: 0.6, alpha: 20)`"),
+            ("phase", "Droplets(60)", "10: expected a diameter above 0 and up to 50 micrometres, found 60"),
+            (
+                "phase",
+                "Table([(0, 1), (90, 1)])",
+                "23: angle 1 is 90, expected 180 degrees, where tables end",
+            ),
+            (
+                "phase",
+                "Table((0, 1))",
+                "8: Expected opening `(`, as in `Table([(0, 20), (30, 1), (180, 2)])`",
+            ),
+            ("phase", "TableFile(\"a.txt\")", "11: Expected a name, as in `TableFile(file: \"fog.txt\")`"),
             (
                 "phase",
                 "Blend(Rayleigh)",

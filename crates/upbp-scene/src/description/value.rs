@@ -93,6 +93,14 @@ number!(
     Asymmetry(f32), "a mean cosine above -1 and below 1", |x| x > -1.0 && x < 1.0
 );
 number!(
+    /// A share of a whole, in `(0, 1)`.
+    Share(f32), "a share above 0 and below 1", |x| x > 0.0 && x < 1.0
+);
+number!(
+    /// Diameter of water droplets in micrometres, in `(0, 50]`.
+    Diameter(f32), "a diameter above 0 and up to 50 micrometres", |x| x > 0.0 && x <= 50.0
+);
+number!(
     /// An index of refraction, in `[0.1, 10]`.
     Ior(f32), "an index of refraction from 0.1 to 10", |x| (0.1..=10.0).contains(&x)
 );
@@ -304,6 +312,11 @@ colour!(
 colour!(
     /// Three numbers in `[0, 1]`: the share of light that is reflected.
     Reflectance, "numbers from 0 to 1", |x| (0.0..=1.0).contains(&x)
+);
+
+colour!(
+    /// Three numbers in `(-1, 1)`: the mean cosine of each channel.
+    Asymmetries, "a mean cosine above -1 and below 1", |x| x > -1.0 && x < 1.0
 );
 
 impl Reflectance {
