@@ -24,7 +24,10 @@ pub use files::{
     Content, Output, check_outputs, check_writable, open_exr, open_file, read_text, remove_leftovers,
     write_text,
 };
-pub use film::{Doubt, ErrorEstimate, ErrorMap, Film, HalfImage, Image, IterationSet, MAX_ITERATIONS, Pixel};
+pub use film::{
+    Doubt, ErrorEstimate, ErrorMap, FeatureImages, Film, HalfImage, Image, IterationSet, MAX_ITERATIONS,
+    Pixel,
+};
 pub use output::{Metadata, ToneCurve, ToneMapping, read_exr, write_exr, write_image, write_png};
 pub use plan::{FrozenPlan, Plan};
 pub use radius::{Radii, Radius, RadiusSchedule};

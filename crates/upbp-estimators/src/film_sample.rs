@@ -3,6 +3,7 @@
 use upbp_media::Spectrum;
 
 use crate::counters::Counters;
+use crate::features::Features;
 use crate::observer::{ObservedSample, Observer};
 use crate::technique::Layer;
 
@@ -14,6 +15,8 @@ pub struct CameraWalk {
     /// The part in `layers` that was met before the first vertex that scatters: seen directly, by mirrors and
     /// through glass. How bright it is depends on the place on the film alone, not on luck further on.
     pub seen: Spectrum,
+    /// What is seen first, if the plan [asks for it](crate::IterationPlan::features).
+    pub features: Features,
 }
 
 /// Receiver of a camera sub-path's samples: layers, counters of the pass, and an observer.

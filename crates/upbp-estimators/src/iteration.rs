@@ -70,6 +70,8 @@ pub struct IterationPlan {
     pub active: TechniqueSet,
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
+    /// Whether camera sub-paths tell the [`Features`](crate::Features) of what they see first.
+    pub features: bool,
 }
 
 /// The free choices of an [`IterationPlan`].
@@ -193,6 +195,7 @@ impl IterationPlan {
             periods,
             active: techniques.intersection(periods.active(choices.seed, choices.iteration)),
             mis,
+            features: false,
         }
     }
 

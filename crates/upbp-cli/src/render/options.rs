@@ -99,6 +99,10 @@ pub(crate) struct Method {
     /// Keep the first radii of kernels instead of shrinking them
     #[arg(long)]
     fixed_radius: bool,
+    /// Record albedo, normal, depth and the number of samples too, as layers of OUT.exr: for denoisers and
+    /// compositing
+    #[arg(long)]
+    features: bool,
     /// Seed of all random numbers [default: 0]
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
@@ -222,14 +226,24 @@ impl Options {
                 Settings::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))?
             }
         };
-        let Method { techniques, deterministic, max_length, light_paths, beams, fixed_radius, seed, .. } =
-            self.method;
+        let Method {
+            techniques,
+            deterministic,
+            max_length,
+            light_paths,
+            beams,
+            fixed_radius,
+            features,
+            seed,
+            ..
+        } = self.method;
         settings.techniques = techniques.unwrap_or(settings.techniques);
         settings.deterministic |= deterministic || self.is_share();
         settings.max_length = max_length.unwrap_or(settings.max_length);
         settings.light_paths = light_paths.map_or(settings.light_paths, LightPaths::Count);
         settings.beams = beams.or(settings.beams);
         settings.progressive &= !fixed_radius;
+        settings.features |= features;
         settings.seed = seed.unwrap_or(settings.seed);
         settings.memory = self.resources.memory.or(settings.memory);
         Ok(settings)
@@ -259,6 +273,10 @@ pub(crate) fn names() -> String {
         ("variance", "variance of the mean, by the spread of the iterations"),
         ("half0, half1", "two independent halves of the render, for denoisers"),
         ("error", "estimated squared error of each pixel, relative to the converged value"),
+        ("albedo", "with --features: albedo of what the camera sees first, not counting mirrors and glass"),
+        ("normal", "with --features: its normal X, Y, Z in world space; zero in media and for the sky"),
+        ("Z", "with --features: its distance along the ray; infinite for the sky"),
+        ("samples", "with --features: number of samples"),
     ];
     [exit::list("Techniques", &techniques), exit::list("Layers of OUT.exr", &layers)].join("\n\n")
 }

@@ -182,7 +182,7 @@ pub(crate) fn iteration_plan<S: Scene>(
     plan: &Plan,
     iteration: u64,
 ) -> IterationPlan {
-    IterationPlan::new(
+    let iteration_plan = IterationPlan::new(
         scene.scene,
         &IterationChoices {
             seed: settings.seed,
@@ -202,5 +202,6 @@ pub(crate) fn iteration_plan<S: Scene>(
             photon_beams: settings.photon_beams,
             query_beams: settings.query_beams,
         },
-    )
+    );
+    IterationPlan { features: settings.features, ..iteration_plan }
 }

@@ -42,8 +42,8 @@ impl Room {
     ) -> Result<Self, RenderError> {
         let rect = scene.scene.camera().crop();
         let total = budget(settings.memory);
-        let film = Film::memory_bytes(rect, techniques);
-        let output = Film::output_bytes(rect, techniques);
+        let film = Film::memory_bytes(rect, techniques, settings.features);
+        let output = Film::output_bytes(rect, techniques, settings.features);
         if film + output > total {
             return Err(RenderError::Memory {
                 width: rect.width,

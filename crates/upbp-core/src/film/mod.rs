@@ -2,6 +2,7 @@
 
 mod error_estimate;
 pub(crate) mod exact_sum;
+mod features;
 pub(crate) mod interleave;
 mod iterations;
 
@@ -10,10 +11,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use upbp_estimators::scene::PixelRect;
-use upbp_estimators::{Layer, Spectrum, TechniqueSet, half};
+use upbp_estimators::{Features, Layer, Spectrum, TechniqueSet, half};
 
 pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap, HalfImage};
 use exact_sum::Sum3;
+pub use features::FeatureImages;
+use features::FeatureSums;
 use interleave::{SETS, set_of, stand_ins};
 pub use iterations::{IterationSet, MAX_ITERATIONS};
 
@@ -51,6 +54,8 @@ pub struct Film {
     seen: [Vec<Sum3>; 2],
     /// Sums of the squares of each iteration's whole radiance.
     squares: Vec<Sum3>,
+    /// Sums of what the camera sees first, if they are kept.
+    features: Option<FeatureSums>,
     iterations: IterationSet,
     /// Iterations that are there in part, with the number of [sets of pixels](interleave) that are.
     parts: BTreeMap<u64, u32>,
@@ -87,9 +92,16 @@ impl Film {
             even: black(rect),
             seen: [black(rect), black(rect)],
             squares: black(rect),
+            features: None,
             iterations: IterationSet::default(),
             parts: BTreeMap::new(),
         }
+    }
+
+    /// A film that keeps [features](FeatureImages) as well.
+    #[must_use]
+    pub fn with_features(self) -> Self {
+        Self { features: Some(FeatureSums::of(|| black(self.rect))), ..self }
     }
 
     /// The layers that `techniques` contribute to, in order.
@@ -101,15 +113,17 @@ impl Film {
 
     /// Bytes that a film takes, with the buffer of one iteration.
     #[must_use]
-    pub fn memory_bytes(rect: PixelRect, techniques: TechniqueSet) -> u64 {
+    pub fn memory_bytes(rect: PixelRect, techniques: TechniqueSet, features: bool) -> u64 {
         let pixel = (Self::layers_of(techniques).len() + 4) * size_of::<Sum3>() + size_of::<Pixel>();
-        pixels(rect) as u64 * pixel as u64
+        let features = if features { FeatureSums::BYTES + size_of::<Features>() } else { 0 };
+        pixels(rect) as u64 * (pixel + features) as u64
     }
 
     /// Bytes that writing a film as an image takes besides: the picture, the layers, two halves, variance and
     /// error in single precision, and one more while it is copied or compressed.
-    pub(crate) fn output_bytes(rect: PixelRect, techniques: TechniqueSet) -> u64 {
-        let pixel = (Self::layers_of(techniques).len() + 6) * size_of::<[f32; 3]>();
+    pub(crate) fn output_bytes(rect: PixelRect, techniques: TechniqueSet, features: bool) -> u64 {
+        let images = Self::layers_of(techniques).len() + 6 + if features { 3 } else { 0 };
+        let pixel = images * size_of::<[f32; 3]>();
         pixels(rect) as u64 * pixel as u64
     }
 
@@ -194,11 +208,18 @@ impl Film {
     /// If `pixels` has another size than the film, or the film holds some of the iteration already, or its
     /// index is not below [`MAX_ITERATIONS`].
     pub fn add(&mut self, iteration: u64, pixels: &[Pixel]) -> u64 {
-        self.add_part(iteration, interleave::ALL, pixels)
+        self.add_part(iteration, interleave::ALL, pixels, &[])
     }
 
-    /// Adds the pixels of some sets: those that follow on what is there of the iteration.
-    pub(crate) fn add_part(&mut self, iteration: u64, sets: Range<u32>, pixels: &[Pixel]) -> u64 {
+    /// Adds the pixels of some sets: those that follow on what is there of the iteration. Features count if
+    /// the film keeps them.
+    pub(crate) fn add_part(
+        &mut self,
+        iteration: u64,
+        sets: Range<u32>,
+        pixels: &[Pixel],
+        features: &[Features],
+    ) -> u64 {
         assert_eq!(pixels.len(), self.even.len(), "an iteration has the film's size");
         assert!(iteration < MAX_ITERATIONS, "iteration {iteration}");
         assert_eq!(self.missing(iteration).start, sets.start, "iteration {iteration} is added once");
@@ -231,6 +252,9 @@ impl Film {
         }
         add(&mut self.seen[half(iteration).0], &|pixel| (usable(pixel.seen).0, 0));
         add(&mut self.squares, &|pixel| (total(pixel).map(|value| value * value), 0));
+        if let Some(sums) = &mut self.features {
+            sums.add(width, &sets, features);
+        }
         if sets.end == SETS {
             self.parts.remove(&iteration);
             self.iterations.insert(iteration);
@@ -253,22 +277,28 @@ impl Film {
         merge(&mut self.even, &other.even);
         self.seen.iter_mut().zip(&other.seen).for_each(|(own, others)| merge(own, others));
         merge(&mut self.squares, &other.squares);
+        let features = self.features.iter_mut().flat_map(FeatureSums::all_mut);
+        features
+            .zip(other.features.iter().flat_map(FeatureSums::all))
+            .for_each(|(own, others)| merge(own, others));
         self.iterations.union(&other.iterations);
         self.parts.extend(&other.parts);
     }
 
     /// All lists of sums: those of each layer, of the even iterations, of what is seen directly in even and
-    /// in odd ones, of the squares.
+    /// in odd ones, of the squares, of features.
     fn all(&self) -> impl Iterator<Item = &Vec<Sum3>> {
         let [even, odd] = &self.seen;
-        self.layers.iter().map(|(_, sums)| sums).chain([&self.even, even, odd, &self.squares])
+        let features = self.features.iter().flat_map(FeatureSums::all);
+        self.layers.iter().map(|(_, sums)| sums).chain([&self.even, even, odd, &self.squares]).chain(features)
     }
 
     /// A film whose sums are going to be filled in row by row.
     pub(crate) fn all_mut(&mut self) -> impl Iterator<Item = &mut Vec<Sum3>> {
         let [even, odd] = &mut self.seen;
         let others = [&mut self.even, even, odd, &mut self.squares];
-        self.layers.iter_mut().map(|(_, sums)| sums).chain(others)
+        let features = self.features.iter_mut().flat_map(FeatureSums::all_mut);
+        self.layers.iter_mut().map(|(_, sums)| sums).chain(others).chain(features)
     }
 
     /// The sums of a row of pixels, list by list.
@@ -281,6 +311,7 @@ impl Film {
     pub(crate) fn without_sums(
         rect: PixelRect,
         techniques: TechniqueSet,
+        features: bool,
         iterations: IterationSet,
         parts: BTreeMap<u64, u32>,
     ) -> Self {
@@ -291,6 +322,7 @@ impl Film {
             even: Vec::new(),
             seen: Default::default(),
             squares: Vec::new(),
+            features: features.then(|| FeatureSums::of(Vec::new)),
             iterations,
             parts,
         }
@@ -307,6 +339,30 @@ impl Film {
     pub fn layer(&self, layer: Layer) -> Option<Image> {
         let (_, sums) = self.layers.iter().find(|(own, _)| *own == layer)?;
         Some(self.collect(|i, [even, odd]| exact_sum::values(&sums[i]).map(|v| v / (even + odd))))
+    }
+
+    /// Albedo, normal and depth of what the camera sees first, `None` if they are not kept.
+    #[must_use]
+    pub fn features(&self) -> Option<FeatureImages> {
+        let sums = self.features.as_ref()?;
+        Some(FeatureImages {
+            albedo: self.collect(|i, [even, odd]| sums.albedo(i, even + odd)),
+            normal: self.collect(|i, [even, odd]| sums.normal(i, even + odd)),
+            depth: self
+                .collect(|i, _| [sums.depth(i); 3])
+                .pixels
+                .into_iter()
+                .map(|[depth, ..]| depth)
+                .collect(),
+        })
+    }
+
+    /// Number of samples of each pixel.
+    #[must_use]
+    pub fn sample_counts(&self) -> Vec<f32> {
+        let (counts, width) = (self.counts(), self.rect.width as usize);
+        let count = |i: usize| counts[set_of(i % width, i / width) as usize];
+        (0..self.len()).map(|i| count(i).iter().sum::<f64>() as f32).collect()
     }
 
     /// The means of the even and of the odd iterations, which are independent of each other. `None` while
@@ -598,23 +654,23 @@ mod tests {
         for i in [4, 7] {
             whole.add(i.into(), &iteration(i));
         }
-        parted.add_part(4, 0..1, &iteration(4));
+        parted.add_part(4, 0..1, &iteration(4), &[]);
         // Everything is there, coarsely.
         let coarse = parted.image();
         assert_eq!(coarse.pixels[15], [0.5; 3]);
         assert_eq!(coarse.pixels[18], [4.0 * 16.0 + 0.5; 3]);
         assert_eq!((parted.is_empty(), parted.iterations(), parted.missing(4)), (false, 0, 1..SETS));
-        parted.add_part(7, 0..9, &iteration(7));
+        parted.add_part(7, 0..9, &iteration(7), &[]);
         let mut other = Film::new(rect, TechniqueSet::BPT);
-        other.add_part(7, 0..2, &iteration(7));
+        other.add_part(7, 0..2, &iteration(7), &[]);
         assert_eq!(parted.overlap(&other), Some(7..8));
-        parted.add_part(4, 1..200, &iteration(4));
+        parted.add_part(4, 1..200, &iteration(4), &[]);
         assert!(parted.halves().is_none());
-        parted.add_part(4, 200..SETS, &iteration(4));
+        parted.add_part(4, 200..SETS, &iteration(4), &[]);
         // Pixels with both iterations, and with one.
         assert_eq!(parted.image().pixels[16], [16.0 * 5.5 + 0.5; 3]);
         assert_eq!(parted.image().pixels[17], [17.0 * 4.0 + 0.5; 3]);
-        parted.add_part(7, 9..SETS, &iteration(7));
+        parted.add_part(7, 9..SETS, &iteration(7), &[]);
         assert_eq!(parted, whole);
         assert_eq!(parted.overlap(&whole), Some(4..5));
     }

@@ -1,5 +1,5 @@
 //! One OpenEXR file with everything: the picture as `R`, `G`, `B`, layers as `bpt.R` and so on, the variance,
-//! two independent halves, the estimated error.
+//! two independent halves, the estimated error, features of what the camera sees first.
 //!
 //! One part with dotted channel names is what every viewer reads; all metadata is in one text attribute,
 //! because the encoder writes several in random order.
@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::error::OutputError;
 use crate::files::{open_exr, write_whole};
-use crate::film::{Film, Image as Picture};
+use crate::film::{FeatureImages, Film, Image as Picture};
 use crate::report::Report;
 use crate::settings::Settings;
 
@@ -26,8 +26,8 @@ pub struct Metadata<'a> {
     pub report: &'a Report,
 }
 
-/// Writes the mean of a film, its layers, variance, halves and estimated error, as far as the film has them,
-/// in float32.
+/// Writes the mean of a film, its layers, variance, halves, estimated error and features, as far as the film
+/// has them, in float32.
 ///
 /// # Errors
 /// Those of the file system or of the encoder.
@@ -51,6 +51,13 @@ pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::resu
     if let Some(error) = film.error_map() {
         let (width, height) = (film.rect().width, film.rect().height);
         push(&mut channels, "error.", &Picture { width, height, pixels: error.relative });
+    }
+
+    if let Some(FeatureImages { albedo, normal, depth }) = film.features() {
+        push(&mut channels, "albedo.", &albedo);
+        push_as(&mut channels, ["normal.X", "normal.Y", "normal.Z"], &normal);
+        push_plane(&mut channels, "Z", depth);
+        push_plane(&mut channels, "samples.Y", film.sample_counts());
     }
 
     let mut attributes = LayerAttributes::default();
@@ -90,11 +97,18 @@ fn encode(
 }
 
 fn push(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, prefix: &str, image: &Picture) {
-    for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
-        let samples = image.pixels.iter().map(|pixel| pixel[c]).collect();
-        let name = format!("{prefix}{name}");
-        channels.push(AnyChannel::new(Text::from(name.as_str()), FlatSamples::F32(samples)));
+    let names = ["R", "G", "B"].map(|name| format!("{prefix}{name}"));
+    push_as(channels, names.each_ref().map(String::as_str), image);
+}
+
+fn push_as(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, names: [&str; 3], image: &Picture) {
+    for (c, name) in names.into_iter().enumerate() {
+        push_plane(channels, name, image.pixels.iter().map(|pixel| pixel[c]).collect());
     }
+}
+
+fn push_plane(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, name: &str, samples: Vec<f32>) {
+    channels.push(AnyChannel::new(Text::from(name), FlatSamples::F32(samples)));
 }
 
 /// Reads the channels `R`, `G`, `B` of an image.

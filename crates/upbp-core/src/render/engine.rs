@@ -10,7 +10,7 @@ use upbp_estimators::path::Context;
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, StreamKind};
 
-use super::passes::{Lists, add_splats, camera_pass, light_pass};
+use super::passes::{Buffers, Lists, add_splats, camera_pass, light_pass};
 use crate::auto;
 use crate::auto::memory::LightCounts;
 use crate::auto::statistics::Statistics;
@@ -35,14 +35,14 @@ pub(crate) trait Engine: Send + Sync {
         halt: &Halt<'_>,
     ) -> Option<LightDone>;
 
-    /// The camera sub-paths of the pixels of some sets, added to `pixels`. Light sub-paths come first. `None`
+    /// The camera sub-paths of the pixels of some sets, added to the buffers. Light sub-paths come first. `None`
     /// if it was halted: then the pixels of these sets mean nothing.
     fn trace_camera(
         &self,
         plan: &IterationPlan,
         rect: PixelRect,
         sets: &Range<u32>,
-        pixels: &mut [Pixel],
+        buffers: Buffers<'_>,
         halt: &Halt<'_>,
     ) -> Option<Counters>;
 
@@ -92,11 +92,11 @@ impl<S: Scene> Engine for SceneEngine<'_, S> {
         plan: &IterationPlan,
         rect: PixelRect,
         sets: &Range<u32>,
-        pixels: &mut [Pixel],
+        buffers: Buffers<'_>,
         halt: &Halt<'_>,
     ) -> Option<Counters> {
         let context = Context { prepared: &self.scene, plan };
-        camera_pass(&context, &self.map, rect, sets, pixels, halt)
+        camera_pass(&context, &self.map, rect, sets, buffers, halt)
     }
 
     fn shrink(&mut self) {

@@ -10,7 +10,7 @@ use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
-use upbp_estimators::{Counters, Layer, LightMap, StreamKind};
+use upbp_estimators::{Counters, Features, Layer, LightMap, StreamKind};
 
 use crate::auto::memory::LightCounts;
 use crate::budget::Halt;
@@ -93,18 +93,30 @@ pub(crate) fn light_pass<S: Scene>(
     Some(counters)
 }
 
+/// Room for one iteration.
+pub(crate) struct Buffers<'b> {
+    /// Radiance of each pixel.
+    pub(crate) pixels: &'b mut [Pixel],
+    /// Features of each pixel, or nothing if they are not wanted.
+    pub(crate) features: &'b mut [Features],
+}
+
 /// Traces one camera sub-path for each pixel of `rect` that belongs to one of `sets`, and adds it to
-/// `pixels`. `None` if it was halted: then the pixels of these sets mean nothing.
+/// the buffers. `None` if it was halted: then the pixels of these sets mean nothing.
 pub(crate) fn camera_pass<S: Scene>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf>,
     rect: PixelRect,
     sets: &Range<u32>,
-    pixels: &mut [Pixel],
+    Buffers { pixels, features }: Buffers<'_>,
     halt: &Halt<'_>,
 ) -> Option<Counters> {
     let width = rect.width as usize;
-    let trace = |scratch: &mut Scratch<S::Bsdf>, (chunk, pixels): (usize, &mut [Pixel])| {
+    // None of them if there is no room for any.
+    let mut chunks: Vec<_> = features.chunks_mut(CAMERA_CHUNK).collect();
+    chunks.resize_with(pixels.len().div_ceil(CAMERA_CHUNK), Default::default);
+    type Piece<'p> = (usize, (&'p mut [Pixel], &'p mut [Features]));
+    let trace = |scratch: &mut Scratch<S::Bsdf>, (chunk, (pixels, features)): Piece<'_>| {
         let mut counters = Counters::default();
         for (i, pixel) in pixels.iter_mut().enumerate() {
             let place = chunk * CAMERA_CHUNK + i;
@@ -125,10 +137,14 @@ pub(crate) fn camera_pass<S: Scene>(
                 *sum += value;
             }
             pixel.seen += walk.seen;
+            if let Some(own) = features.get_mut(i) {
+                *own = walk.features;
+            }
         }
         Some(counters)
     };
-    let chunks = pixels.par_chunks_mut(CAMERA_CHUNK).enumerate().map_init(Scratch::default, trace);
+    let chunks =
+        pixels.par_chunks_mut(CAMERA_CHUNK).zip(chunks).enumerate().map_init(Scratch::default, trace);
     // Integers: the same in whatever order they are added.
     chunks.try_reduce(Counters::default, |mut sum, counters| {
         sum.add(&counters);

@@ -69,6 +69,7 @@ pub(super) fn prepare<'a, S: Scene>(
         ..Record::default()
     };
     let film = Film::new(rect, choice.plan.techniques);
+    let film = if identity.settings.features { film.with_features() } else { film };
     let engine = SceneEngine { scene: prepared, statistics: choice.statistics, map: LightMap::empty() };
     Ok(Prepared { engine: Box::new(engine), canceller, state: State { identity, record, film } })
 }

@@ -4,9 +4,10 @@ use std::ops::{ControlFlow, Range};
 use std::time::{Duration, Instant};
 
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{Counters, IterationPlan};
+use upbp_estimators::{Counters, Features, IterationPlan};
 
 use super::engine::Engine;
+use super::passes::Buffers;
 use super::prepare::{Prepared, Start, prepare};
 use super::stop::{Outcome, Progress, StopReason};
 use crate::auto::technique_support::TechniqueSupport;
@@ -27,6 +28,8 @@ pub struct Renderer<'a> {
     /// The iterations that are rendered.
     range: Range<u64>,
     pixels: Vec<Pixel>,
+    /// One per pixel, or none if the film keeps none.
+    features: Vec<Features>,
     /// Time that the camera sub-paths of a set of pixels took, if known.
     set_time: Option<Duration>,
     /// Time that adding an iteration to the film takes.
@@ -77,6 +80,7 @@ impl<'a> Renderer<'a> {
             state,
             range: 0..MAX_ITERATIONS,
             pixels: Vec::new(),
+            features: Vec::new(),
             set_time: None,
             film_time: Duration::from_nanos(SUM.saturating_mul(sums)),
             estimated_error: ErrorEstimate::UNKNOWN,
@@ -142,6 +146,9 @@ impl<'a> Renderer<'a> {
         }
         // Before the deadline is set: memory for a large picture is not had in no time.
         self.pixels.resize(self.state.film.len(), Pixel::BLACK);
+        if self.state.identity.settings.features {
+            self.features.resize(self.state.film.len(), Features::NONE);
+        }
         let plan = self.iteration_plan(iteration);
         let halt = Halt { canceller: &self.canceller, deadline: self.deadline(stop) };
         let State { record, film, .. } = &mut self.state;
@@ -160,7 +167,8 @@ impl<'a> Renderer<'a> {
             let sets = done..done.saturating_add((fit as u32).max(1)).min(missing.end);
             // There is always a picture, however late.
             let halt = if film.is_empty() && done == 0 { Halt { deadline: None, ..halt } } else { halt };
-            let traced = self.engine.trace_camera(&plan, rect, &sets, &mut self.pixels, &halt);
+            let buffers = Buffers { pixels: &mut self.pixels, features: &mut self.features };
+            let traced = self.engine.trace_camera(&plan, rect, &sets, buffers, &halt);
             let time = clock.lap();
             times.camera += time;
             let Some(own) = traced else { break };
@@ -169,7 +177,7 @@ impl<'a> Renderer<'a> {
             done = sets.end;
         }
         if done > missing.start {
-            counters.dropped += film.add_part(iteration, missing.start..done, &self.pixels);
+            counters.dropped += film.add_part(iteration, missing.start..done, &self.pixels, &self.features);
             times.film = clock.lap();
             self.film_time = times.film;
             // What a state file says may be of any size: sums that saturate.

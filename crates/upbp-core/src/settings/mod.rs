@@ -62,6 +62,9 @@ pub struct Settings {
     pub radii: Radii,
     /// Whether radii shrink, so that the result converges.
     pub progressive: bool,
+    /// Whether the film has [albedo, normal and depth](crate::FeatureImages) besides the picture, for denoisers
+    /// and compositing.
+    pub features: bool,
     /// Memory for light vertices, beams, look-up structures and the film, MiB; `None` for half of what the
     /// machine has free. If choices are [deterministic](Self::deterministic), light vertices, beams and
     /// look-ups then take at most 2048 MiB on any machine.
@@ -86,6 +89,7 @@ impl Default for Settings {
             query_beams: BeamExtent::Long,
             radii: Radii::default(),
             progressive: true,
+            features: false,
             memory: None,
         }
     }

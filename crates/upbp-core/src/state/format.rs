@@ -5,7 +5,7 @@
 //! version      u32, little-endian as all numbers
 //! block        the header: RON text
 //! block ...    one per row of the film: the sums of each layer, of the even iterations, of what is seen
-//!              directly in even and in odd ones, of squares
+//!              directly in even and in odd ones, of squares, of features if there are any
 //! ```
 //!
 //! A block is its length (u32), its bytes, and the checksum (u64) of all blocks so far: each block is known
@@ -144,7 +144,8 @@ impl State {
                 return Err(damaged("header", &format!("no part of an iteration: {iteration}, {done} sets")));
             }
         }
-        let mut film = Film::without_sums(rect, identity.plan.techniques, iterations, parts);
+        let mut film =
+            Film::without_sums(rect, identity.plan.techniques, identity.settings.features, iterations, parts);
         let longest = u64::from(rect.width) * (film.all_mut().count() * MAX_ENCODED) as u64;
         for row in 0..rect.height {
             let what = || format!("row {row} of {}", rect.height);

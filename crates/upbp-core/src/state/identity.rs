@@ -68,7 +68,7 @@ impl Identity {
 
     /// Names and values of whatever counts beside the plan, as text: the shortest decimals of two different
     /// numbers differ.
-    fn fields(&self) -> [(&'static str, String); 11] {
+    fn fields(&self) -> [(&'static str, String); 12] {
         let s = &self.settings;
         let (width, height) = self.film;
         let (x, y, columns, rows) = self.part;
@@ -83,6 +83,7 @@ impl Identity {
             ("heuristic", format!("{:?}", s.heuristic)),
             ("photon_beams", format!("{:?}", s.photon_beams)),
             ("query_beams", format!("{:?}", s.query_beams)),
+            ("features", s.features.to_string()),
             ("choice of emitters", fingerprint(format!("{:?}", self.emitters).as_bytes())),
         ]
     }

@@ -4,12 +4,14 @@ use glam::Vec2;
 use upbp_media::Spectrum;
 
 use crate::counters::Counters;
+use crate::features::Features;
 use crate::film_sample::{CameraWalk, Output};
 use crate::light_map::LightMap;
 use crate::mis::{Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, CameraEdge, CameraVertex, Context, Extent, Interaction, Scratch, arrive, ray_origin, scatter,
+    Arrival, Arrived, CameraEdge, CameraVertex, Context, Extent, Interaction, Scratch, arrive, ray_origin,
+    scatter,
 };
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
@@ -29,7 +31,8 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     counters: &mut Counters,
     observer: &mut O,
 ) -> CameraWalk {
-    let mut walk = CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
+    let mut walk =
+        CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO, features: Features::NONE };
     let mut scattered_before = false;
     let Context { prepared, plan } = *context;
     let scene = prepared.scene;
@@ -56,6 +59,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         depth: 1,
     };
 
+    let mut travelled = 0.0;
     let mut survival = Survival::of_camera(plan.roulette);
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
@@ -71,6 +75,9 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             Arrival::Vertex(arrived) => arrived,
             Arrival::Escaped => {
                 techniques::environment(context, edge_trace, &edge, &mut out);
+                if !scattered_before {
+                    walk.features = Features::NONE;
+                }
                 break;
             }
             Arrival::Absorbed => break,
@@ -95,6 +102,11 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         );
         if !in_medium && let Some(hit) = &edge_trace.hit {
             techniques::emitter_hit(context, hit, direction, origin, &mis_edge, throughput, &edge, &mut out);
+        }
+        if plan.features && !scattered_before {
+            let Arrived { interaction, position, distance, .. } = &arrived;
+            travelled += distance;
+            walk.features = Features::at(scene, interaction, *position, from, throughput, travelled);
         }
         if depth == plan.lengths.max {
             out.counters.cut_walks += u64::from(arrived.interaction.is_connectible());
@@ -162,6 +174,9 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     }
     if !scattered_before {
         walk.seen = walk.layers[Layer::Bpt as usize];
+    }
+    if plan.features {
+        walk.features = walk.features.with_light(walk.seen);
     }
     walk
 }

@@ -106,6 +106,10 @@ impl Bsdf for Conductor {
         true
     }
 
+    fn albedo(&self, from: Vec3) -> Spectrum {
+        self.fresnel.reflectance(from.z.abs().min(1.0), 1.0)
+    }
+
     fn continuation(&self, from: Vec3) -> f32 {
         continuation_by_albedo(self.fresnel.reflectance(from.z.abs().min(1.0), 1.0))
     }

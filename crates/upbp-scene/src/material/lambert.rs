@@ -45,4 +45,8 @@ impl Bsdf for Lambert {
     fn continuation(&self, _: Vec3) -> f32 {
         continuation_by_albedo(self.reflectance)
     }
+
+    fn albedo(&self, _: Vec3) -> Spectrum {
+        self.reflectance
+    }
 }

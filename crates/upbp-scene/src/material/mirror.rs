@@ -39,6 +39,10 @@ impl Bsdf for Mirror {
         false
     }
 
+    fn albedo(&self, _: Vec3) -> Spectrum {
+        self.reflectance
+    }
+
     fn continuation(&self, _: Vec3) -> f32 {
         continuation_by_albedo(self.reflectance)
     }

@@ -96,6 +96,10 @@ impl Bsdf for Material {
     fn continuation(&self, from: Vec3) -> f32 {
         dispatch!(self, material => material.continuation(from))
     }
+
+    fn albedo(&self, from: Vec3) -> Spectrum {
+        dispatch!(self, material => material.albedo(from))
+    }
 }
 
 #[cfg(test)]

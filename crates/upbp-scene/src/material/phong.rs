@@ -102,4 +102,8 @@ impl Bsdf for Phong {
     fn continuation(&self, _: Vec3) -> f32 {
         continuation_by_albedo(self.diffuse + self.specular)
     }
+
+    fn albedo(&self, _: Vec3) -> Spectrum {
+        self.diffuse + self.specular
+    }
 }

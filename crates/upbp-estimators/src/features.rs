@@ -1,0 +1,60 @@
+//! Auxiliary features of a pixel, for denoisers and compositing: what the camera sees first.
+//!
+//! The first vertex with a smooth lobe counts, on a surface or in a medium, behind mirrors and through glass.
+//! So do Cycles (its denoising data) and Arnold; Intel's Open Image Denoise asks for albedos in `[0, 1]`, for
+//! normals in `[-1, 1]` of any length, and for a normal of zero where there is no surface.
+
+use glam::Vec3;
+use upbp_media::{Medium, Spectrum};
+
+use crate::path::Interaction;
+use crate::scene::{Bsdf, Scene};
+
+/// Albedo, normal and distance of what one camera sub-path sees first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Features {
+    /// Share of light that is scattered, as it is tinted by mirrors and glass on the way, with light that is
+    /// emitted there or by the environment; in `[0, 1]`.
+    pub albedo: Spectrum,
+    /// Shading normal in world space, on the side that is seen; zero in a medium and where nothing is.
+    pub normal: Vec3,
+    /// Length of the way from the lens, in scene units; `None` where nothing is.
+    pub distance: Option<f32>,
+}
+
+impl Features {
+    /// Nothing is seen.
+    pub const NONE: Self = Self { albedo: Spectrum::ZERO, normal: Vec3::ZERO, distance: None };
+
+    /// What a vertex looks like that a sub-path comes to from `from`, after `distance`.
+    pub(crate) fn at<S: Scene>(
+        scene: &S,
+        interaction: &Interaction<S::Bsdf>,
+        position: Vec3,
+        from: Vec3,
+        throughput: Spectrum,
+        distance: f32,
+    ) -> Self {
+        let (albedo, normal) = match interaction {
+            Interaction::Surface(surface) => {
+                let albedo = surface.bsdf.albedo(surface.local(from));
+                (albedo, surface.shading_normal * surface.shading_normal.dot(from).signum())
+            }
+            Interaction::Medium(medium) => {
+                let medium = &scene.media()[medium.0 as usize];
+                (medium.sigma_s(position) / medium.sigma_t(position), Vec3::ZERO)
+            }
+        };
+        Self { albedo: bounded(throughput) * bounded(albedo), normal, distance: Some(distance) }
+    }
+
+    /// With the light that is seen before anything scatters.
+    pub(crate) fn with_light(self, seen: Spectrum) -> Self {
+        Self { albedo: bounded(self.albedo + seen), ..self }
+    }
+}
+
+/// In `[0, 1]`, and zero for what is not a number.
+fn bounded(spectrum: Spectrum) -> Spectrum {
+    spectrum.map(|value| value.max(0.0).min(1.0))
+}
