@@ -9,8 +9,8 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use upbp_core::glam::{Vec2, Vec3};
 use upbp_core::media::{Homogeneous, MediaError, PhaseFunction, orthonormal_basis};
 use upbp_core::scene::{
-    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterId,
-    EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
+    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterBounds,
+    EmitterId, EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
 use upbp_core::{BodyId, Interior, MediumId, Ray, Spectrum};
 
@@ -72,6 +72,10 @@ impl Emitter for Lamp {
 
     fn power(&self, _: &BoundingSphere) -> f32 {
         PI * self.area() * self.radiance.luminance()
+    }
+
+    fn bounds(&self, _: &BoundingSphere) -> Option<EmitterBounds> {
+        Some(EmitterBounds::all_around(self.centre - self.radius, self.centre + self.radius))
     }
 
     fn sample_emission(&self, _: &BoundingSphere, place: [f32; 2], u: [f32; 2]) -> Option<Emission> {

@@ -4,6 +4,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::emission_guide::EmissionGuide;
+use crate::emitter_tree::EmitterTree;
+use crate::receiver_shares::ReceiverShares;
 use crate::scene::{BoundingSphere, EmitterId};
 
 /// The probabilities of emitters: part of a plan, so that iterations on all machines choose alike.
@@ -12,8 +14,12 @@ use crate::scene::{BoundingSphere, EmitterId};
 pub struct EmitterChoice {
     /// Where light sub-paths start.
     pub(crate) emission: Selection,
-    /// Where camera vertices look for light.
+    /// Where camera vertices look for light, wherever they are.
     pub(crate) next_event: Selection,
+    /// Where camera vertices look for light by the place that they are at, but for a [part](EVERYWHERE) of
+    /// the choice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) receivers: Option<ReceiverShares>,
     /// Where on an emitter, and in which direction, light sub-paths start; emitters that are left out have no
     /// guide.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -36,7 +42,47 @@ impl EmitterChoice {
             radius: bounds.radius + centre.distance(bounds.centre),
         })
     }
+
+    /// Chooses an emitter for `receiver` by two numbers in `[0, 1)`; with its probability.
+    pub(crate) fn next_event(
+        &self,
+        tree: Option<&EmitterTree>,
+        receiver: Vec3,
+        [u, fine]: [f32; 2],
+    ) -> Option<(EmitterId, f32)> {
+        let (Some(shares), Some(tree)) = (&self.receivers, tree) else {
+            return self.next_event.choose(f64::from(u));
+        };
+        // The second number begins where the first one ends: there may be a million emitters.
+        let u = f64::from(u) + f64::from(fine) / f64::from(STEPS);
+        let emitter = if u < EVERYWHERE {
+            self.next_event.choose(u / EVERYWHERE)?.0
+        } else {
+            let (cluster, u) = shares.choose(receiver, (u - EVERYWHERE) / (1.0 - EVERYWHERE));
+            tree.choose(cluster, receiver, u)
+        };
+        Some((emitter, self.next_event_probability(Some(tree), receiver, emitter)))
+    }
+
+    /// The probability of [`next_event`](Self::next_event).
+    pub(crate) fn next_event_probability(
+        &self,
+        tree: Option<&EmitterTree>,
+        receiver: Vec3,
+        emitter: EmitterId,
+    ) -> f32 {
+        let everywhere = self.next_event.probability(emitter);
+        let (Some(shares), Some(tree)) = (&self.receivers, tree) else { return everywhere };
+        let Some((cluster, [of_cluster, within])) = tree.probability(emitter, receiver) else { return 0.0 };
+        let [own, all] = shares.probabilities(receiver, cluster);
+        let here = within * (own + all * of_cluster);
+        (EVERYWHERE * f64::from(everywhere) + (1.0 - EVERYWHERE) * here) as f32
+    }
 }
+
+/// Part of the next events that choose an emitter without regard to the receiver: no contribution has more
+/// than the inverse of it times the weight that it would have without.
+const EVERYWHERE: f64 = 1.0 / 16.0;
 
 /// Light that each emitter was seen to bring, as
 /// [`choose_emitters_by`](crate::PreparedScene::choose_emitters_by) takes it.
@@ -48,11 +94,56 @@ pub struct EmitterShares {
     pub samples: f64,
 }
 
+/// A contribution of some emitter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmitterSample {
+    /// The emitter.
+    pub emitter: EmitterId,
+    /// The contribution before weighting, divided by the probability that the emitter was chosen with.
+    pub light: f64,
+    /// All other techniques, relative to this one if it chose the emitter with a probability of one.
+    pub others: f64,
+}
+
+impl EmitterShares {
+    /// The light that each emitter would bring and nothing else would find, if emitters were chosen in
+    /// proportion to just that: contributions times the square of their weights. The `probabilities` of
+    /// emitters are where the search for these begins.
+    #[must_use]
+    pub fn of(mut probabilities: Vec<f64>, samples: &[EmitterSample]) -> Self {
+        let mut light = vec![0.0; probabilities.len()];
+        for _ in 0..ROUNDS {
+            light.fill(0.0);
+            for sample in samples {
+                let emitter = sample.emitter.0 as usize;
+                let weight = probabilities[emitter] / (probabilities[emitter] + sample.others);
+                if weight > 0.0 {
+                    light[emitter] += sample.light * weight * weight;
+                }
+            }
+            let sum: f64 = light.iter().sum();
+            if !(sum > 0.0 && sum.is_finite()) {
+                break;
+            }
+            for (probability, light) in probabilities.iter_mut().zip(&light) {
+                *probability = light / sum;
+            }
+        }
+        Self { light, samples: samples.len() as f64 }
+    }
+}
+
+/// Steps towards probabilities that reproduce themselves.
+const ROUNDS: u32 = 16;
+
 /// Power keeps at least this share of a choice.
 const POWER_SHARE: f64 = 0.1;
 
 /// Samples per emitter from which on a measured share counts more than power.
 const TELLING_SAMPLES: f64 = 16.0;
+
+/// Even part of the choice by which lights are measured: what power alone never chooses is not learnt.
+const EVEN: f64 = 0.5;
 
 /// Random numbers are multiples of 2⁻²⁴.
 const STEPS: u32 = 1 << 24;
@@ -93,6 +184,15 @@ impl Selection {
         Self { cumulative }
     }
 
+    /// The even distribution over the emitters that this one can choose, mixed with this one.
+    pub(crate) fn spread(&self) -> Self {
+        let count = self.cumulative.len();
+        let power = |i: usize| f64::from(self.probability(EmitterId(i as u32)));
+        let shining = (0..count).filter(|&i| power(i) > 0.0).count() as f64;
+        let weight = |i| if power(i) > 0.0 { (1.0 - EVEN) * power(i) + EVEN / shining } else { 0.0 };
+        Self::new(&(0..count).map(weight).collect::<Vec<_>>())
+    }
+
     /// Whether this is a distribution over the emitters that `power` can choose.
     pub(crate) fn fits(&self, power: &Self) -> bool {
         let steps = |selection: &Self| {
@@ -125,8 +225,8 @@ impl Selection {
         Self::new(&weights)
     }
 
-    pub(crate) fn choose(&self, u: f32) -> Option<(EmitterId, f32)> {
-        let target = (u * STEPS as f32) as u32;
+    pub(crate) fn choose(&self, u: f64) -> Option<(EmitterId, f32)> {
+        let target = ((u * f64::from(STEPS)) as u32).min(STEPS - 1);
         let index = self.cumulative.partition_point(|&end| end <= target);
         let emitter = EmitterId(u32::try_from(index).ok()?);
         (index < self.cumulative.len()).then(|| (emitter, self.probability(emitter)))
@@ -141,73 +241,4 @@ impl Selection {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn emitters_are_chosen_in_proportion_and_dark_ones_never() {
-        let selection = Selection::new(&[0.0, 1.0, 0.0, 3.0, 0.0]);
-        assert_eq!(selection.choose(0.0), Some((EmitterId(1), 0.25)));
-        assert_eq!(selection.choose(0.249), Some((EmitterId(1), 0.25)));
-        assert_eq!(selection.choose(0.25), Some((EmitterId(3), 0.75)));
-        assert_eq!(selection.choose(1.0 - f32::EPSILON / 2.0), Some((EmitterId(3), 0.75)));
-        assert_eq!(Selection::new(&[]).choose(0.5), None);
-        assert_eq!(Selection::new(&[0.0]).choose(0.5), None);
-        assert_eq!(selection.probability(EmitterId(9)), 0.0);
-    }
-
-    #[test]
-    fn shares_move_the_choice_and_power_keeps_a_floor() {
-        let power = Selection::new(&[0.0, 1.0, 0.0, 3.0]);
-        let seen = |light: &[f64], samples| EmitterShares { light: light.to_vec(), samples };
-        let probabilities = |shares| {
-            let blend = power.blend(&shares);
-            [0, 1, 2, 3].map(|i| blend.probability(EmitterId(i)))
-        };
-        // All the light comes from the weaker one, and there is no doubt about it. What is dark stays out.
-        let [dark, weak, _, strong] = probabilities(seen(&[5.0, 2.0, 0.0, 0.0], 1e9));
-        assert_eq!(dark, 0.0);
-        assert!((weak - 0.925).abs() < 1e-6 && (strong - 0.075).abs() < 1e-6, "{weak}, {strong}");
-        // Nothing seen, or nothing that is a number: power decides.
-        for shares in [seen(&[], 1e9), seen(&[0.0; 4], 1e9), seen(&[0.0, f64::NAN, 0.0, f64::INFINITY], 1.0)]
-        {
-            assert_eq!(probabilities(shares), [0.0, 0.25, 0.0, 0.75]);
-        }
-        // A few samples say little.
-        let [_, weak, ..] = probabilities(seen(&[0.0, 1.0], 4.0));
-        assert!((0.25..0.35).contains(&weak), "{weak}");
-    }
-
-    #[test]
-    fn probabilities_are_exact_whatever_the_ratio_of_powers() {
-        let many = vec![1e-3; 100_000];
-        for powers in [&[1.0, 1e-12][..], &[1e-12, 1.0], &[1e-30, 0.0, 1e30, 1e-30], &[5.0, 1e12, 3.0], &many]
-        {
-            let selection = Selection::new(powers);
-            let mut counts = vec![0_u32; powers.len()];
-            for step in 0..STEPS {
-                let (emitter, _) = selection.choose(step as f32 / STEPS as f32).unwrap();
-                counts[emitter.0 as usize] += 1;
-            }
-            for (i, (&power, &count)) in powers.iter().zip(&counts).enumerate() {
-                assert_eq!(power > 0.0, count > 0, "{i}");
-                let probability = selection.probability(EmitterId(i as u32));
-                assert_eq!(probability, count as f32 / STEPS as f32, "{i}");
-            }
-        }
-        // The strong one gets what its power is worth.
-        assert!(Selection::new(&[1.0, 1e-12]).probability(EmitterId(0)) > 0.99);
-    }
-
-    #[test]
-    fn a_choice_of_other_emitters_does_not_fit() {
-        let power = Selection::new(&[0.0, 1.0, 3.0]);
-        let given = |ends: &[u32]| Selection { cumulative: ends.to_vec() }.fits(&power);
-        assert!(given(&[0, 1, STEPS]));
-        assert!(!given(&[0, STEPS]), "fewer");
-        assert!(!given(&[1, 2, STEPS]), "a dark one");
-        assert!(!given(&[0, 0, STEPS]), "one left out");
-        assert!(!given(&[0, 9, 5]), "not ascending");
-        assert!(!given(&[0, 1, 2]), "not a whole");
-    }
-}
+mod tests;

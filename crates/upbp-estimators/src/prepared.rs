@@ -5,7 +5,9 @@ use std::sync::Arc;
 use upbp_media::{Medium, MediumStack, RaySegment, SegmentDensity};
 
 use crate::emission_guide::EmissionGuide;
-use crate::emitter_choice::{EmitterChoice, EmitterShares, Selection};
+use crate::emitter_choice::{EmitterChoice, EmitterSample, EmitterShares, Selection};
+use crate::emitter_tree::EmitterTree;
+use crate::receiver_shares::{ClusterSample, ReceiverShares};
 use crate::scene::{BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, Scene};
 
 /// A [`Scene`] with all that is derived from it once.
@@ -16,6 +18,8 @@ pub struct PreparedScene<'a, S: Scene> {
     pub bounds: BoundingSphere,
     /// By power.
     power: Selection,
+    /// By place and power; `None` where that tells nothing.
+    tree: Option<EmitterTree>,
     choice: Arc<EmitterChoice>,
     /// Of [`EmitterChoice::emission_bounds`].
     emission_bounds: BoundingSphere,
@@ -91,13 +95,17 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         let choice = Arc::new(EmitterChoice {
             emission: power.clone(),
             next_event: power.clone(),
-            guides: Vec::new(),
-            focus: None,
+            ..EmitterChoice::default()
         });
+        let mut tree = EmitterTree::new(scene.emitters(), &powers, &bounds);
+        if let Some(tree) = &mut tree {
+            tree.set_shares(&power);
+        }
         Ok(Self {
             scene,
             bounds,
             power,
+            tree,
             choice,
             emission_bounds: bounds,
             environments,
@@ -115,13 +123,67 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// Power keeps a share, so that no emitter is lost that was not seen.
     pub fn choose_emitters_by(&mut self, emission: &EmitterShares, next_event: &EmitterShares) {
         let [emission, next_event] = [emission, next_event].map(|shares| self.power.blend(shares));
-        self.choice = Arc::new(EmitterChoice { emission, next_event, ..EmitterChoice::clone(&self.choice) });
+        self.change(|choice| (choice.emission, choice.next_event) = (emission, next_event));
+    }
+
+    /// Chooses emitters by power and evenly, half each, to measure what they bring.
+    pub fn choose_emitters_to_measure(&mut self) {
+        let spread = self.power.spread();
+        self.change(|choice| (choice.emission, choice.next_event) = (spread.clone(), spread));
+    }
+
+    /// Whether the choice of emitters for next events can depend on the receiver: at least two emitters say
+    /// where they are.
+    #[must_use]
+    pub const fn can_choose_by_receiver(&self) -> bool {
+        self.tree.is_some()
+    }
+
+    /// Chooses emitters for next events by the place of the receiver: by their [bounds](Emitter::bounds), and
+    /// by the light that next events have brought to receivers in its neighbourhood. Samples must have been
+    /// made by the choice at hand, and this one must not depend on samples that it serves. Without bounds it
+    /// changes nothing.
+    pub fn choose_by_receiver(&mut self, samples: &[(glam::Vec3, EmitterSample)]) {
+        let Some(tree) = &self.tree else { return };
+        let of_cluster = |&(receiver, sample): &(glam::Vec3, EmitterSample)| {
+            let (cluster, [_, within]) = tree.probability(sample.emitter, receiver)?;
+            let EmitterSample { light, others, .. } = sample;
+            Some(ClusterSample { receiver, cluster, light, others: others / within })
+        };
+        let samples: Vec<_> = samples.iter().filter_map(of_cluster).collect();
+        let receivers = Some(ReceiverShares::fit(&samples));
+        self.change(|choice| choice.receivers = receivers);
+    }
+
+    /// Chooses emitters for next events alike for all receivers.
+    pub fn choose_alike(&mut self) {
+        self.change(|choice| choice.receivers = None);
+    }
+
+    fn change(&mut self, change: impl FnOnce(&mut EmitterChoice)) {
+        let mut choice = EmitterChoice::clone(&self.choice);
+        change(&mut choice);
+        self.set(Arc::new(choice));
+    }
+
+    fn set(&mut self, choice: Arc<EmitterChoice>) {
+        if let Some(tree) = &mut self.tree {
+            tree.set_shares(&choice.next_event);
+        }
+        self.emission_bounds = choice.emission_bounds(&self.bounds);
+        self.choice = choice;
+    }
+
+    /// The sphere that emitters are asked with: they start light from infinity in front of it.
+    #[must_use]
+    pub const fn emission_bounds(&self) -> &BoundingSphere {
+        &self.emission_bounds
     }
 
     /// Starts light from infinity on discs around a point, which guides lead to: finite, and the same for all
     /// that guides learn from and are used with.
     pub fn focus_emission(&mut self, focus: glam::Vec3) {
-        self.choose(EmitterChoice { focus: Some(focus), ..EmitterChoice::clone(&self.choice) });
+        self.change(|choice| choice.focus = Some(focus));
     }
 
     /// Starts the light sub-paths of some emitters by guides; those that are left out go by themselves. The
@@ -133,19 +195,10 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     pub fn guide_emission(&mut self, guides: Vec<Option<EmissionGuide>>) {
         assert!(guides.len() <= self.scene.emitters().len(), "a guide per emitter");
         let guides = if guides.iter().all(Option::is_none) { Vec::new() } else { guides };
-        let focus = self.choice.focus.filter(|_| !guides.is_empty());
-        self.choose(EmitterChoice { guides, focus, ..EmitterChoice::clone(&self.choice) });
-    }
-
-    fn choose(&mut self, choice: EmitterChoice) {
-        self.emission_bounds = choice.emission_bounds(&self.bounds);
-        self.choice = Arc::new(choice);
-    }
-
-    /// The sphere that emitters are asked with: they start light from infinity in front of it.
-    #[must_use]
-    pub const fn emission_bounds(&self) -> &BoundingSphere {
-        &self.emission_bounds
+        self.change(|choice| {
+            choice.focus = choice.focus.filter(|_| !guides.is_empty());
+            choice.guides = guides;
+        });
     }
 
     /// The choice of emitters, for a plan.
@@ -165,18 +218,22 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         let can_be_followed = guides.len() <= self.scene.emitters().len()
             && guides.iter().flatten().all(EmissionGuide::is_valid)
             && choice.focus.is_none_or(glam::Vec3::is_finite);
-        if !(is_of_these && can_be_followed) {
+        let clusters = self.tree.as_ref().map(EmitterTree::clusters);
+        let is_by_these = choice
+            .receivers
+            .as_ref()
+            .is_none_or(|receivers| clusters.is_some_and(|clusters| receivers.fits(clusters)));
+        if !(is_of_these && is_by_these && can_be_followed) {
             return Err(PrepareError::EmitterChoice { emitters: self.scene.emitters().len() });
         }
-        self.emission_bounds = choice.emission_bounds(&self.bounds);
-        self.choice = choice.clone();
+        self.set(choice.clone());
         Ok(())
     }
 
     /// Chooses the emitter of a light sub-path; returns its probability. `None` without light.
     #[must_use]
     pub fn choose_emission(&self, u: f32) -> Option<(EmitterId, f32)> {
-        self.choice.emission.choose(u)
+        self.choice.emission.choose(f64::from(u))
     }
 
     /// The probability of [`choose_emission`](Self::choose_emission); 0 if the emitter does not exist.
@@ -235,16 +292,16 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         (!at.iter().any(|x| x.is_nan())).then_some((at, [position, position, direction, direction]))
     }
 
-    /// Chooses the emitter of a next event; returns its probability. `None` without light.
+    /// Chooses the emitter of a next event at `receiver`; returns its probability. `None` without light.
     #[must_use]
-    pub fn choose_next_event(&self, u: f32) -> Option<(EmitterId, f32)> {
-        self.choice.next_event.choose(u)
+    pub fn choose_next_event(&self, receiver: glam::Vec3, u: [f32; 2]) -> Option<(EmitterId, f32)> {
+        self.choice.next_event(self.tree.as_ref(), receiver, u)
     }
 
     /// The probability of [`choose_next_event`](Self::choose_next_event); 0 if the emitter does not exist.
     #[must_use]
-    pub fn next_event_probability(&self, emitter: EmitterId) -> f32 {
-        self.choice.next_event.probability(emitter)
+    pub fn next_event_probability(&self, receiver: glam::Vec3, emitter: EmitterId) -> f32 {
+        self.choice.next_event_probability(self.tree.as_ref(), receiver, emitter)
     }
 
     /// The emitters that every escaping ray hits.

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::{DVec3, Vec3};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
 use upbp_estimators::observer::LightEnd;
-use upbp_estimators::{Interior, IterationPlan, MediumId, Roulette};
+use upbp_estimators::{Interior, IterationPlan, MediumId, PreparedScene, Roulette};
 
 use upbp_testing::closed_form::fog::Fog;
 use upbp_testing::closed_form::light::Source;
@@ -255,6 +255,14 @@ impl Trace {
         })
     }
 
+    /// The probability that next events at a receiver choose the light, if it depends on the receiver.
+    fn next_event_probability(&self, scene: &ClosedForm, receiver: DVec3) -> Option<f64> {
+        let choice = scene.choice.as_ref()?;
+        let mut world = PreparedScene::new(scene).expect("the scene is in order");
+        world.set_emitter_choice(choice).expect("a choice of this scene");
+        Some(f64::from(world.next_event_probability(receiver.as_vec3(), self.light.emitter)))
+    }
+
     /// All densities of the path.
     pub(crate) fn rebuild(&self, scene: &ClosedForm, plan: &IterationPlan) -> Result<Path, Doubt> {
         let roulette = plan.roulette;
@@ -335,7 +343,7 @@ impl Trace {
             edges: edges.collect(),
             vertices,
             pdf_position: probability * pdf_position,
-            pdf_incident: probability * incident,
+            pdf_incident: self.next_event_probability(scene, receiver).unwrap_or(probability) * incident,
             hittable: matches!(light.source, Source::Area(_) | Source::Environment),
         })
     }

@@ -4,6 +4,8 @@
 //! The abstract test of the recursion takes densities as given. Here they are those of the walks: wrong
 //! distances, stacks of bodies, reverse densities and thresholds show.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use upbp_estimators::mis::oracle::{Path, Strategy};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
@@ -12,8 +14,9 @@ use upbp_estimators::path::{Context, EdgeTrace, Extent, Interaction, LightChunk,
 use upbp_estimators::scene::{EmitterId, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, EmissionGuide, EmissionSample, IterationChoices, IterationPlan, Kernel, Kernels, LightMap,
-    FootprintField, MergePeriods, PathLengths, PreparedScene, RadiusField, Roulette, Stream, StreamKind, Technique, TechniqueSet,
+    Counters, EmissionGuide, EmissionSample, EmitterChoice, EmitterSample, FootprintField, IterationChoices,
+    IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths, PreparedScene, RadiusField, Roulette,
+    Stream, StreamKind, Technique, TechniqueSet,
 };
 
 use super::rebuild::{Trace, Vertex};
@@ -242,6 +245,9 @@ fn audit(name: &str, camera: Vec3, size: u32, choices: &IterationChoices, at_lea
 fn audit_scene(name: &str, scene: &ClosedForm, choices: &IterationChoices, at_least: usize) {
     let size = scene.camera.size;
     let mut world = PreparedScene::new(scene).expect("the scene is in order");
+    if let Some(choice) = &scene.choice {
+        world.set_emitter_choice(choice).expect("a choice of this scene");
+    }
     if let Some(focus) = scene.focus {
         world.focus_emission(focus);
     }
@@ -366,6 +372,31 @@ fn radii_that_are_a_function_of_place() {
             let choices = IterationChoices { radius_field, query_beams, heuristic, ..choices() };
             audit("radii by place", camera, 64, &choices, 500);
         }
+    }
+}
+
+/// A choice by the place of the receiver that differs much from one place to the next.
+fn by_receiver(scene: &ClosedForm) -> Arc<EmitterChoice> {
+    let mut world = PreparedScene::new(scene).expect("the scene is in order");
+    let lights = scene.lights.len() as f32;
+    let mut stream = Stream::new(4, 0, StreamKind::Light, 0);
+    let mut sample = || {
+        let receiver = Vec3::from([0; 3].map(|_| 3.0 * stream.uniform() - 1.5));
+        let emitter =
+            EmitterId(((receiver.x + receiver.y + 5.0 * receiver.z).rem_euclid(1.0) * lights) as u32);
+        (receiver, EmitterSample { emitter, light: f64::from(stream.uniform()), others: 0.0 })
+    };
+    world.choose_by_receiver(&(0..20_000).map(|_| sample()).collect::<Vec<_>>());
+    world.emitter_choice().clone()
+}
+
+#[test]
+fn emitters_chosen_by_receiver() {
+    for camera in CAMERAS {
+        let mut scene = ClosedForm::new(camera, 64);
+        scene.choice = Some(by_receiver(&scene));
+        let choices = IterationChoices { light_paths: 12_000, beam_paths: 1000, ..choices() };
+        audit_scene("emitters chosen by receiver", &scene, &choices, 1000);
     }
 }
 

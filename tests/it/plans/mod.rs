@@ -4,3 +4,4 @@ mod adaptation;
 mod census;
 mod guides;
 mod radii;
+mod receivers;

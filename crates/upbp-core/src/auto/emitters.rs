@@ -4,8 +4,9 @@
 //! them are lost: the light goes past the scene, or emission hits find it anyway. So a small run counts the
 //! weighted contributions that come from each emitter, by next events and by light sub-paths, as far as no
 //! other technique would find them, and emitters are then chosen in proportion (`docs/theory.md`, section
-//! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image. Further
-//! rounds learn where on the emitters light sub-paths should start ([`guides`]).
+//! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image. Next events
+//! choose by the place of the receiver where that pays. Further rounds learn where on the emitters light
+//! sub-paths should start ([`guides`]).
 
 use glam::Vec3;
 use upbp_estimators::observer::{
@@ -15,7 +16,7 @@ use upbp_estimators::path::{Context, LightChunk};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, EmitterShares, IterationPlan, LightMap, PreparedScene, StreamKind, TechniqueSet,
+    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, StreamKind, TechniqueSet,
 };
 
 use super::full_plan::{iteration_plan, plan_with};
@@ -34,8 +35,10 @@ const LIGHT_PATHS: u32 = 4096;
 const MANY: usize = 8;
 /// Light vertices that are enough.
 const LIGHT_VERTICES: f64 = 2e5;
-/// Steps towards probabilities that reproduce themselves.
-const ROUNDS: u32 = 16;
+/// Camera sub-paths per one of these, if many emitters are to be chosen by receiver: there is more to learn.
+const MORE_CAMERA_PATHS: u32 = 4;
+/// The most that a choice by receiver may leave of the second moment of next events.
+const WORTH: f64 = 0.9;
 /// Runs, if starts are guided: one that looks for places, and two that are guided there.
 const GUIDED_ROUNDS: u32 = 3;
 
@@ -50,7 +53,7 @@ fn enough(emitters: usize) -> f64 {
 }
 
 /// Lets the scene choose its emitters, and the starts of light sub-paths on them, by what they contribute
-/// under a plan with `techniques`. The scene has to be as it was prepared, with emitters chosen by power.
+/// under a plan with `techniques`. The scene has to be as it was prepared.
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
@@ -65,11 +68,17 @@ pub(crate) fn choose<S: Scene>(
     if emitters < 2 && !is_guided {
         return Ok(());
     }
+    if emitters > 1 {
+        scene.choose_emitters_to_measure();
+        scene.choose_by_receiver(&[]);
+    }
     let quick = budget.part(QUICK_LOOK * PART);
     let statistics = statistics::measure(scene, settings, techniques, statistics::FEW_LIGHT_PATHS, &quick)?;
     let vertices = statistics.vertices_per_path.max(1.0);
     let light_paths = (LIGHT_VERTICES / vertices).clamp(64.0, f64::from(LIGHT_PATHS));
-    let paths = [light_paths, f64::from(CAMERA_PATHS)].map(|paths| (paths * enough(emitters)) as u32);
+    let is_much = emitters >= MANY && scene.can_choose_by_receiver();
+    let camera_paths = CAMERA_PATHS * if is_much { MORE_CAMERA_PATHS } else { 1 };
+    let paths = [light_paths, f64::from(camera_paths)].map(|paths| (paths * enough(emitters)) as u32);
     let plan = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / 8]);
     let plan = iteration_plan(scene, settings, &plan, 0);
     let rounds = if is_guided { GUIDED_ROUNDS } else { 1 };
@@ -81,7 +90,8 @@ pub(crate) fn choose<S: Scene>(
         let run = |part, halt: &Halt<'_>| measure(scene, &plan, paths[1], part, halt);
         let seen = budget.part(part).largest(run).ok_or(RenderError::Cancelled)?;
         if emitters > 1 {
-            scene.choose_emitters_by(&seen.emission, &seen.next_event);
+            scene.choose_emitters_by(&seen.emission, &shares(&seen.next_events, emitters));
+            choose_by_receiver(scene, &seen.next_events);
         }
         if is_guided {
             let guides: Vec<_> = if round == 0 {
@@ -107,9 +117,49 @@ pub(crate) fn choose<S: Scene>(
 struct Measured {
     /// The contribution of every emitter by light sub-paths.
     emission: EmitterShares,
-    /// The contribution of every emitter by next events.
-    next_event: EmitterShares,
+    /// Contributions of next events, in two halves of different camera sub-paths.
+    next_events: [Vec<NextEvent>; 2],
     guides: Evidence,
+}
+
+/// A contribution of a next event.
+#[derive(Clone, Copy)]
+struct NextEvent {
+    receiver: Vec3,
+    sample: EmitterSample,
+    /// The probability that its emitter was chosen with.
+    chosen: f64,
+}
+
+/// The contribution of every emitter by next events.
+fn shares(next_events: &[Vec<NextEvent>; 2], emitters: usize) -> EmitterShares {
+    let samples: Vec<_> = next_events.iter().flatten().map(|event| event.sample).collect();
+    let even = vec![1.0 / emitters as f64; emitters];
+    EmitterShares::of(even, &samples)
+}
+
+/// Lets next events choose by receiver, if what one half of those that were seen tells makes the variance of
+/// the other half less.
+fn choose_by_receiver<S: Scene>(scene: &mut PreparedScene<'_, S>, seen: &[Vec<NextEvent>; 2]) {
+    let samples = |events: &[NextEvent]| events.iter().map(|e| (e.receiver, e.sample)).collect::<Vec<_>>();
+    scene.choose_alike();
+    let alike = second_moment(scene, &seen[1]);
+    scene.choose_by_receiver(&samples(&seen[0]));
+    if second_moment(scene, &seen[1]) < WORTH * alike {
+        scene.choose_by_receiver(&samples(&seen.concat()));
+    } else {
+        scene.choose_alike();
+    }
+}
+
+/// The second moment of next events, as the scene chooses emitters now.
+fn second_moment<S: Scene>(scene: &PreparedScene<'_, S>, seen: &[NextEvent]) -> f64 {
+    let moment = |event: &NextEvent| {
+        let probability = f64::from(scene.next_event_probability(event.receiver, event.sample.emitter));
+        let weighted = event.sample.light * event.chosen / (probability + event.sample.others);
+        probability / event.chosen * weighted * weighted
+    };
+    seen.iter().map(moment).sum()
 }
 
 /// Traces the light sub-paths of `plan` and some camera sub-paths, or a part of both. `None` if it was
@@ -132,8 +182,8 @@ fn measure<S: Scene>(
     let film = PixelRect { x: 0, y: 0, width, height };
     let pixels = u64::from(width) * u64::from(height);
     let emitters = scene.scene.emitters().len();
-    let mut emission = Tally::new(emitters, |emitter| scene.emission_probability(emitter));
-    let mut next_event = Tally::new(emitters, |emitter| scene.next_event_probability(emitter));
+    let emission_probability = |emitter| f64::from(scene.emission_probability(emitter));
+    let mut emission = Vec::new();
 
     let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
     let kind = StreamKind::PilotLight;
@@ -161,7 +211,7 @@ fn measure<S: Scene>(
     let mut by_path = |seen: &[(u32, Contribution)], scale| {
         for &(path, contribution) in seen {
             if let Some((end, light)) = &mut starts[path as usize] {
-                emission.add(end.emitter.0, contribution, scale);
+                emission.push(contribution.of(end.emitter, emission_probability(end.emitter), scale));
                 *light += scale * contribution.value * contribution.weight;
             }
         }
@@ -179,71 +229,20 @@ fn measure<S: Scene>(
     // Light tracing fills the whole picture, camera sub-paths a part of it.
     let scale = pixels as f64 / f64::from(camera_paths);
     let mut guides = Evidence::default();
-    for seen in walks {
+    let mut next_events = [Vec::new(), Vec::new()];
+    for (piece, seen) in walks.into_iter().enumerate() {
         by_path(&seen.emission, scale);
         for (end, receiver, contribution) in seen.next_event {
-            next_event.add(end.emitter.0, contribution, scale);
+            let chosen = f64::from(scene.next_event_probability(receiver, end.emitter));
+            let sample = contribution.of(end.emitter, chosen, scale);
+            next_events[piece % 2].push(NextEvent { receiver, sample, chosen });
             guides.lit.push((end, receiver));
         }
         guides.specular.extend(seen.specular);
     }
     guides.starts = starts.into_iter().flatten().collect();
-    Some(Measured { emission: emission.shares(), next_event: next_event.shares(), guides })
-}
-
-/// Weighted contributions by emitter.
-struct Tally {
-    /// The probabilities that they were made with.
-    chosen: Vec<f64>,
-    samples: Vec<Sample>,
-}
-
-struct Sample {
-    emitter: usize,
-    /// Contribution before weighting, for a probability of one.
-    value: f64,
-    /// All other techniques, relative to this one with a probability of one.
-    others: f64,
-}
-
-impl Tally {
-    fn new(emitters: usize, probability: impl Fn(EmitterId) -> f32) -> Self {
-        let chosen = (0..emitters).map(|i| f64::from(probability(EmitterId(i as u32)))).collect();
-        Self { chosen, samples: Vec::new() }
-    }
-
-    fn add(&mut self, emitter: u32, seen: Contribution, scale: f64) {
-        let emitter = emitter as usize;
-        let p = self.chosen[emitter];
-        let others = p * (1.0 - seen.weight) / seen.weight;
-        self.samples.push(Sample { emitter, value: scale * seen.value * p, others });
-    }
-
-    /// The light of each emitter that no other technique would find: contributions times the square of their
-    /// weights, at the probabilities that follow from just that. A sky that emission hits find anyway so
-    /// fades out of the next events.
-    fn shares(&self) -> EmitterShares {
-        let mut p = self.chosen.clone();
-        let mut light = vec![0.0; p.len()];
-        for _ in 0..ROUNDS {
-            light.fill(0.0);
-            for sample in &self.samples {
-                let weight = p[sample.emitter] / (p[sample.emitter] + sample.others);
-                if weight > 0.0 {
-                    // Made with `chosen`, so each stands for one over that many.
-                    light[sample.emitter] += sample.value / self.chosen[sample.emitter] * weight * weight;
-                }
-            }
-            let sum: f64 = light.iter().sum();
-            if !(sum > 0.0 && sum.is_finite()) {
-                break;
-            }
-            for (p, light) in p.iter_mut().zip(&light) {
-                *p = light / sum;
-            }
-        }
-        EmitterShares { light, samples: self.samples.len() as f64 }
-    }
+    let probabilities = (0..emitters).map(|i| emission_probability(EmitterId(i as u32))).collect();
+    Some(Measured { emission: EmitterShares::of(probabilities, &emission), next_events, guides })
 }
 
 /// Contributions that sub-paths of one piece of work made.
@@ -271,6 +270,14 @@ struct Contribution {
     /// Before weighting.
     value: f64,
     weight: f64,
+}
+
+impl Contribution {
+    /// As a sample of its emitter, which was chosen with a probability.
+    fn of(self, emitter: EmitterId, chosen: f64, scale: f64) -> EmitterSample {
+        let others = chosen * (1.0 - self.weight) / self.weight;
+        EmitterSample { emitter, light: scale * self.value, others }
+    }
 }
 
 impl<B> Observer<B> for Seen {
@@ -303,39 +310,6 @@ impl<B> Observer<B> for Seen {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Samples of two emitters that were chosen equally often.
-    fn shares(samples: &[(u32, f64, f64)]) -> Vec<f64> {
-        let mut tally = Tally::new(2, |_| 0.5);
-        for &(emitter, value, weight) in samples {
-            tally.add(emitter, Contribution { value, weight }, 1.0);
-        }
-        let light = tally.shares().light;
-        let sum: f64 = light.iter().sum();
-        light.iter().map(|l| l / sum).collect()
-    }
-
-    #[test]
-    fn emitters_that_nothing_else_finds_are_chosen_in_proportion_to_their_light() {
-        let [one, other] = shares(&[(0, 1.0, 1.0), (0, 2.0, 1.0), (1, 9.0, 1.0)])[..] else { unreachable!() };
-        assert!((one - 0.25).abs() < 1e-12 && (other - 0.75).abs() < 1e-12, "{one}, {other}");
-    }
-
-    #[test]
-    fn an_emitter_that_others_find_anyway_fades() {
-        // Equal light; the first is found by another technique four times out of five.
-        let [one, other] = shares(&[(0, 1.0, 0.2), (1, 1.0, 1.0)])[..] else { unreachable!() };
-        assert!(one < 0.01, "{one}, {other}");
-        // Found elsewhere once in a while it keeps most of its share.
-        let [one, other] = shares(&[(0, 1.0, 0.95), (1, 1.0, 1.0)])[..] else { unreachable!() };
-        assert!((0.4..0.5).contains(&one), "{one}, {other}");
-    }
-
-    #[test]
-    fn without_samples_nothing_is_said() {
-        let tally = Tally::new(2, |_| 0.5);
-        assert_eq!(tally.shares(), EmitterShares { light: vec![0.0; 2], samples: 0.0 });
-    }
 
     #[test]
     fn pixels_lie_on_the_film_and_are_spread() {

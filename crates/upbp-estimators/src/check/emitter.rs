@@ -12,6 +12,9 @@ use crate::scene::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint}
 pub fn check_emitter(emitter: &impl Emitter, bounds: &BoundingSphere, receivers: &[Vec3]) -> Check {
     let power = emitter.power(bounds);
     require(power.is_finite() && power >= 0.0, "power is finite and not negative", power)?;
+    let place = emitter.bounds(bounds);
+    let is_place = place.is_none_or(|place| place.is_valid() && !emitter.kind().is_infinite());
+    require(is_place, "bounds are finite and ascending, with a unit axis, and of a finite light", place)?;
     let mut random = Random(7);
     for _ in 0..2000 {
         check_emission(emitter, bounds, &mut random)?;
@@ -55,6 +58,7 @@ fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut 
     }
     let receiver = emission.point.position + emission.direction * bounds.radius;
     check_coordinates(emitter, bounds, [u_position, u_direction], &emission, receiver)?;
+    check_bounds(emitter, bounds, &emission)?;
     let seen = emitter.hit(bounds, &emission.point, emission.direction, receiver);
     require(seen.is_some() == kind.is_hittable(), "hit answers for lights that can be hit", emission)?;
     let Some(seen) = seen else { return Ok(()) };
@@ -62,6 +66,19 @@ fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut 
         && same(seen.pdf_position, emission.pdf_position)
         && same(seen.pdf_direction, emission.pdf_direction);
     require(agrees, "hit agrees with sample_emission", (emission, seen))
+}
+
+/// Light starts within the bounds of its emitter, and goes where these say.
+fn check_bounds(emitter: &impl Emitter, bounds: &BoundingSphere, emission: &Emission) -> Check {
+    let Some(place) = emitter.bounds(bounds) else { return Ok(()) };
+    let at = emission.point.position;
+    let nearest = at.clamp(place.min, place.max);
+    let rounding = 1e-5 * (at.length() + (place.max - place.min).length());
+    require(at.distance(nearest) <= rounding, "light starts within the bounds of its emitter", (place, at))?;
+    let angle = |cos: f32| cos.clamp(-1.0, 1.0).acos();
+    let most = angle(place.cos_normals) + angle(place.cos_emission);
+    let is_towards = angle(emission.direction.dot(place.axis)) <= most + 1e-3;
+    require(is_towards, "light goes within the angles of its emitter's bounds", (place, emission))
 }
 
 /// Coordinates that are known start the same light again.

@@ -84,7 +84,7 @@ impl EdgeSource {
                     position,
                     *pdf_position,
                 );
-                let choice = f64::from(prepared.next_event_probability(*emitter))
+                let choice = f64::from(prepared.next_event_probability(position, *emitter))
                     / f64::from(prepared.emission_probability(*emitter));
                 let count = mis.nee * choice * f64::from(pdf) / f64::from(*pdf_position);
                 D::of(Technique::Nee, mis.pow(count))

@@ -114,9 +114,68 @@ pub struct EmissionCoordinates {
     pub direction: Option<[f32; 2]>,
 }
 
+/// The place of an emitter and the directions of its light, for the choice among many emitters by receiver.
+///
+/// The light leaves within an angle around normals, which lie within an angle around an axis. Bounds that
+/// are too wide cost samples; a receiver outside of bounds that are too narrow gets few, of large weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmitterBounds {
+    /// Least coordinates of the emitter's points, scene units.
+    pub min: Vec3,
+    /// Greatest coordinates of the emitter's points, scene units.
+    pub max: Vec3,
+    /// The middle of the normals, a unit vector.
+    pub axis: Vec3,
+    /// Cosine of the largest angle between the axis and a normal; -1 for light in all directions.
+    pub cos_normals: f32,
+    /// Cosine of the largest angle between a normal and the light there, in `[-1, 1)`: 0 for a hemisphere.
+    /// The intensity is taken to fall linearly in the cosine, down to zero at that angle.
+    pub cos_emission: f32,
+}
+
+impl EmitterBounds {
+    /// The bounds of points that shine in all directions.
+    #[must_use]
+    pub const fn all_around(min: Vec3, max: Vec3) -> Self {
+        Self { min, max, axis: Vec3::Z, cos_normals: -1.0, cos_emission: 0.0 }
+    }
+
+    /// Whether these bounds are finite, hold something and have directions.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let size = self.max - self.min;
+        self.min.is_finite()
+            && size.is_finite()
+            && size.min_element() >= 0.0
+            && self.axis.is_normalized()
+            && (-1.0..=1.0).contains(&self.cos_normals)
+            && (-1.0..1.0).contains(&self.cos_emission)
+    }
+
+    /// Bounds of both, not always the smallest.
+    pub(crate) fn around(&self, other: &Self) -> Self {
+        let axis = (self.axis + other.axis).try_normalize();
+        // The largest angle of a normal is at most the sum of that of its own axis and that around it.
+        let cos_to = |axis: Vec3, of: &Self| {
+            let (cos, around) = (axis.dot(of.axis).clamp(-1.0, 1.0), of.cos_normals);
+            let sines = ((1.0 - cos * cos) * (1.0 - around * around)).sqrt();
+            // A sum beyond π, where the cosine would rise again.
+            if cos <= -around { -1.0 } else { (cos * around - sines).max(-1.0) }
+        };
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+            axis: axis.unwrap_or(Vec3::Z),
+            cos_normals: axis.map_or(-1.0, |axis| cos_to(axis, self).min(cos_to(axis, other))),
+            cos_emission: self.cos_emission.min(other.cos_emission),
+        }
+    }
+}
+
 /// A light.
 ///
-/// Emitters are chosen in proportion to [`power`](Self::power); the walks multiply that probability in. The
+/// Emitters are chosen by [`power`](Self::power), by [`bounds`](Self::bounds) and by what small runs find
+/// that they bring; the walks multiply that probability in. The
 /// radiance of an emitter that is given here and the one that [`hit`](Self::hit) returns must be the same
 /// function.
 pub trait Emitter: Send + Sync {
@@ -126,6 +185,14 @@ pub trait Emitter: Send + Sync {
     /// Power in W (any common factor may be left out): how often the emitter is chosen. For infinite
     /// emitters the power that falls on the disc `π radius²`. Finite, not negative; zero is never chosen.
     fn power(&self, bounds: &BoundingSphere) -> f32;
+
+    /// Where the emitter is, and which way it shines. The default is an emitter of which that is unknown, or
+    /// that is infinitely far away: all receivers then choose it equally often, unless it turns out where it
+    /// is needed.
+    fn bounds(&self, scene: &BoundingSphere) -> Option<EmitterBounds> {
+        let _ = scene;
+        None
+    }
 
     /// Starts a light sub-path. The four random numbers are uniform in `[0, 1)`.
     fn sample_emission(

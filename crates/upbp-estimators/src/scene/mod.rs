@@ -21,7 +21,8 @@ mod hit;
 pub use bsdf::{Bsdf, BsdfSample, Interface, Walk};
 pub use camera::{Camera, CameraConnection, CameraRay, PixelRect};
 pub use emitter::{
-    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
+    HitDensities, Incident,
 };
 pub use hit::{Crossing, EmitterId, Hit};
 

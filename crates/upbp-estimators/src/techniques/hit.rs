@@ -123,7 +123,7 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             edge.mis.arrive(mis, Walk::Camera, mis_edge, O::Densities::of(Technique::Nee, mis.pow(mis.nee)));
         mis.hit_weight(
             &vertex_mis,
-            f64::from(prepared.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
+            f64::from(prepared.next_event_probability(receiver, emitter)) * f64::from(densities.pdf_incident),
             f64::from(prepared.emission_probability(emitter)) * f64::from(densities.pdf_position),
             f64::from(
                 densities.pdf_direction * prepared.emission_factor(emitter, point, direction, receiver),

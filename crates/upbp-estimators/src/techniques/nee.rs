@@ -37,7 +37,9 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let Context { prepared, plan } = *context;
     let (scene, mis) = (prepared.scene, &plan.mis);
-    let Some((emitter, probability)) = prepared.choose_next_event(stream.uniform()) else { return };
+    let Some((emitter, probability)) = prepared.choose_next_event(vertex.position, stream.pair()) else {
+        return;
+    };
     let light = &scene.emitters()[emitter.0 as usize];
     let Some(incident) = light.sample_incident(prepared.emission_bounds(), vertex.position, stream.pair())
     else {

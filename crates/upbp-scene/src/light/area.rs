@@ -6,9 +6,10 @@
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::Vec3;
-use upbp_accel::{Shape, Sphere};
+use upbp_accel::{Shape, Sphere, TriangleMesh};
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
+    HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -75,6 +76,18 @@ impl AreaLight {
     }
 }
 
+/// Bounds with the normals of a mesh.
+fn with_normals(mesh: &TriangleMesh, bounds: EmitterBounds) -> EmitterBounds {
+    let normal = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|corner| mesh.positions()[corner as usize]);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let sum: Vec3 = mesh.triangles().iter().map(normal).sum();
+    let Some(axis) = sum.try_normalize() else { return bounds };
+    let cos = mesh.triangles().iter().map(|triangle| normal(triangle).dot(axis)).fold(1.0, f32::min);
+    EmitterBounds { axis, cos_normals: cos.max(-1.0), ..bounds }
+}
+
 impl Emitter for AreaLight {
     fn kind(&self) -> EmitterKind {
         EmitterKind::Area
@@ -82,6 +95,16 @@ impl Emitter for AreaLight {
 
     fn power(&self, _: &BoundingSphere) -> f32 {
         PI * self.area * self.radiance.mean()
+    }
+
+    fn bounds(&self, _: &BoundingSphere) -> Option<EmitterBounds> {
+        let (min, max) = self.shape.aabb();
+        let around = EmitterBounds::all_around(min, max);
+        Some(match &self.shape {
+            Shape::Quad(quad) => EmitterBounds { axis: quad.normal(), cos_normals: 1.0, ..around },
+            Shape::Mesh(mesh) => with_normals(mesh, around),
+            Shape::Sphere(_) | Shape::Box(_) => around,
+        })
     }
 
     fn sample_emission(

@@ -14,7 +14,8 @@ mod spot;
 
 use glam::Vec3;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
+    HitDensities, Incident,
 };
 
 pub use self::area::AreaLight;
@@ -72,6 +73,10 @@ impl Emitter for Light {
 
     fn power(&self, bounds: &BoundingSphere) -> f32 {
         dispatch!(self, light => light.power(bounds))
+    }
+
+    fn bounds(&self, scene: &BoundingSphere) -> Option<EmitterBounds> {
+        dispatch!(self, light => light.bounds(scene))
     }
 
     fn sample_emission(

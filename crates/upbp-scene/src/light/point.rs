@@ -4,7 +4,8 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
+    HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -30,6 +31,10 @@ impl Emitter for PointLight {
 
     fn power(&self, _: &BoundingSphere) -> f32 {
         4.0 * PI * self.intensity.mean()
+    }
+
+    fn bounds(&self, _: &BoundingSphere) -> Option<EmitterBounds> {
+        Some(EmitterBounds::all_around(self.position, self.position))
     }
 
     fn sample_emission(&self, _: &BoundingSphere, _: [f32; 2], u_direction: [f32; 2]) -> Option<Emission> {

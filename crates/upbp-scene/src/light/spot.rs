@@ -5,7 +5,8 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
+    HitDensities, Incident,
 };
 use upbp_media::Spectrum;
 
@@ -84,6 +85,15 @@ impl Emitter for SpotLight {
 
     fn power(&self, _: &BoundingSphere) -> f32 {
         self.cone.solid_angle() * self.intensity.mean()
+    }
+
+    fn bounds(&self, _: &BoundingSphere) -> Option<EmitterBounds> {
+        Some(EmitterBounds {
+            axis: self.cone.axis,
+            cos_normals: 1.0,
+            cos_emission: (1.0 - self.cone.height()).clamp(-1.0, 1.0_f32.next_down()),
+            ..EmitterBounds::all_around(self.position, self.position)
+        })
     }
 
     fn sample_emission(&self, _: &BoundingSphere, _: [f32; 2], u_direction: [f32; 2]) -> Option<Emission> {

@@ -5,7 +5,8 @@ use std::f64::consts::{FRAC_1_PI, TAU};
 use glam::{DVec3, Vec3};
 use upbp_estimators::Spectrum;
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
+    HitDensities, Incident,
 };
 use upbp_media::orthonormal_basis;
 
@@ -126,6 +127,19 @@ impl Emitter for Light {
 
     fn power(&self, _: &BoundingSphere) -> f32 {
         self.power
+    }
+
+    fn bounds(&self, _: &BoundingSphere) -> Option<EmitterBounds> {
+        match self.source {
+            Source::Area(Shape::Rectangle { corner, edges: [u, v] }) => {
+                let corners = [corner, corner + u, corner + v, corner + u + v].map(DVec3::as_vec3);
+                let [min, max] = [Vec3::min, Vec3::max].map(|f| corners.into_iter().fold(corners[0], f));
+                let axis = u.cross(v).normalize().as_vec3();
+                Some(EmitterBounds { axis, cos_normals: 1.0, ..EmitterBounds::all_around(min, max) })
+            }
+            Source::Point(point) => Some(EmitterBounds::all_around(point.as_vec3(), point.as_vec3())),
+            Source::Area(Shape::Sphere { .. }) | Source::Directional(_) | Source::Environment => None,
+        }
     }
 
     fn sample_emission(&self, bounds: &BoundingSphere, u: [f32; 2], v: [f32; 2]) -> Option<Emission> {

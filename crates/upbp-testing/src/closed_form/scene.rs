@@ -1,8 +1,10 @@
 //! The scene.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 use upbp_estimators::scene::{BoundingSphere, EmitterId, Hit, Scene};
-use upbp_estimators::{BodyId, EmissionGuide, Interior, MediumId, Ray};
+use upbp_estimators::{BodyId, EmissionGuide, EmitterChoice, Interior, MediumId, Ray};
 
 use super::camera::Pinhole;
 use super::fog::Fog;
@@ -62,6 +64,8 @@ pub struct ClosedForm {
     pub guides: Vec<Option<EmissionGuide>>,
     /// Point that light from infinity starts on discs around, for oracles of guided starts; none at first.
     pub focus: Option<Vec3>,
+    /// The choice of emitters, for oracles, without guides; by power at first.
+    pub choice: Option<Arc<EmitterChoice>>,
 }
 
 impl ClosedForm {
@@ -118,7 +122,7 @@ impl ClosedForm {
             light(Source::Environment, 2.0),
         ];
         let camera = Pinhole { centre, size, film_distance: size as f32 };
-        Self { objects, lights, media, camera, guides: Vec::new(), focus: None }
+        Self { objects, lights, media, camera, guides: Vec::new(), focus: None, choice: None }
     }
 
     /// The sphere that light from infinity starts in front of.

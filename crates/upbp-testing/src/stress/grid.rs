@@ -457,10 +457,6 @@ fn slabs(cases: &mut Vec<Case>) {
 /// A camera exactly on a photon of its first iteration, with kernels from nothing to everything.
 fn on_photons(cases: &mut Vec<Case>) {
     for light in LIGHTS {
-        // The far one takes all light sub-paths, and hardly any arrives.
-        if matches!(light, Light::Uneven(_)) {
-            continue;
-        }
         for layout in [Layout::Ball, Layout::Floor, Layout::Room] {
             for (tau, radius) in
                 [(1.0, None), (1.0, Some(1e-7)), (1.0, Some(1.0)), (1e2, None), (1e2, Some(1e-7))]
