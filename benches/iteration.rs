@@ -14,7 +14,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use upbp_core::{MediumId, Settings, TechniqueSet};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy, VertexKind};
 use upbp_estimators::mis::{
-    BeamExtent, Edge, EdgeMis, Heuristic, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
+    BeamExtent, Edge, EdgeMis, EdgeStart, Heuristic, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
 };
 use upbp_estimators::scene::Walk;
 use upbp_scene::ReadyScene;
@@ -114,7 +114,7 @@ fn kind(vertex: &PathVertex) -> MergeKind {
         VertexKind::Medium(medium) => {
             MergeKind::Medium { medium, sin_theta: vertex.sin_theta, scale: vertex.scale }
         }
-        VertexKind::End | VertexKind::Delta => MergeKind::None,
+        VertexKind::End | VertexKind::Volume | VertexKind::Delta => MergeKind::None,
     }
 }
 
@@ -134,8 +134,14 @@ impl<'a> Ends<'a> {
     fn new(plan: &'a MisPlan, path: &'a Path) -> Self {
         let (length, v) = (path.length(), &path.vertices);
         let middle = length / 2;
-        let mut edge_mis =
-            EdgeMis::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
+        let mut edge_mis = EdgeMis::at_light(
+            plan,
+            EdgeStart::Surface,
+            f64::from(u8::from(path.hittable)),
+            v[0].cos_camera,
+            path.pdf_position,
+            v[0].rho_light,
+        );
         let mut light = [edge_mis; 2];
         for (i, vertex) in v.iter().enumerate().take(middle).skip(1) {
             let vertex_mis = Self::arrive(plan, path, Walk::Light, &edge_mis, i);
@@ -160,7 +166,7 @@ impl<'a> Ends<'a> {
             kind: kind(vertex),
             distance_factor: vertex_mis.distance_factor,
             connectible: true,
-            in_medium: in_medium(vertex),
+            start: if in_medium(vertex) { EdgeStart::Medium } else { EdgeStart::Surface },
         }
     }
 

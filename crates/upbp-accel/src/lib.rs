@@ -10,8 +10,8 @@ pub use glam;
 
 #[cfg(feature = "geometry")]
 pub use geometry::{
-    AxisBox, Candidate, GeometryError, Quad, SceneGeometry, Shape, ShapeId, Sphere, SurfacePoint,
-    TriangleMesh, Visit,
+    AxisBox, Candidate, GeometryError, Quad, SceneGeometry, Shape, ShapeId, ShapeVolume, Sphere,
+    SurfacePoint, TriangleMesh, Visit,
 };
 pub use lookup::{
     ClosestApproach, PARALLEL_SIN2, PointTree, Segment, SegmentTree, SplitParams, closest_approach,

@@ -202,6 +202,13 @@ impl Selection {
         self.cumulative.last() == power.cumulative.last() && steps(self) == steps(power)
     }
 
+    /// This distribution without some of the emitters.
+    pub(crate) fn without(&self, is_left_out: impl Fn(EmitterId) -> bool) -> Self {
+        let probability = |id| if is_left_out(id) { 0.0 } else { f64::from(self.probability(id)) };
+        let rest: Vec<f64> = (0..self.cumulative.len()).map(|i| probability(EmitterId(i as u32))).collect();
+        Self::new(&rest)
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.cumulative.last().is_none_or(|&end| end == 0)
     }

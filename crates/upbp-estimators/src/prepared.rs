@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use upbp_media::{Medium, MediumStack, RaySegment, SegmentDensity};
+use upbp_media::{BodyId, Medium, MediumStack, RaySegment, SegmentDensity};
 
 use crate::emission_guide::EmissionGuide;
 use crate::emitter_choice::{EmitterChoice, EmitterSample, EmitterShares, Selection};
@@ -24,6 +24,8 @@ pub struct PreparedScene<'a, S: Scene> {
     /// Of [`EmitterChoice::emission_bounds`].
     emission_bounds: BoundingSphere,
     environments: Vec<EmitterId>,
+    /// Bodies whose volume emits and where sub-paths begin, in order.
+    volumes: Vec<(BodyId, EmitterId)>,
     passes_from_infinity: f64,
     camera_stack: Option<MediumStack>,
     emitting_media: bool,
@@ -63,7 +65,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         // No light from infinity gets through: such emitters are never chosen.
         let closed = from_infinity.transmittance.is_black();
         let mut powers = Vec::with_capacity(scene.emitters().len());
-        let mut environments = Vec::new();
+        let (mut environments, mut volumes) = (Vec::new(), Vec::new());
         for (index, emitter) in scene.emitters().iter().enumerate() {
             let power = emitter.power(&bounds);
             if !(power.is_finite() && power >= 0.0) {
@@ -74,7 +76,13 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             if reaches && power > 0.0 && emitter.kind() == EmitterKind::Environment {
                 environments.push(EmitterId(index as u32));
             }
+            if power > 0.0
+                && let EmitterKind::Volume(body) = emitter.kind()
+            {
+                volumes.push((body, EmitterId(index as u32)));
+            }
         }
+        volumes.sort_unstable();
         let camera_stack = camera
             .is_pinhole()
             .then(|| {
@@ -109,6 +117,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             choice,
             emission_bounds: bounds,
             environments,
+            volumes,
             passes_from_infinity: from_infinity.pass_probability,
             camera_stack,
             emitting_media,
@@ -207,11 +216,13 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         &self.choice
     }
 
-    /// Chooses emitters as a plan says.
+    /// Chooses emitters as a plan says; volumes that it never chooses are
+    /// [left out](Self::leave_out_volumes).
     ///
     /// # Errors
     /// [`PrepareError::EmitterChoice`], if it is of other emitters.
     pub fn set_emitter_choice(&mut self, choice: &Arc<EmitterChoice>) -> Result<(), PrepareError> {
+        self.leave_out_volumes(|emitter| choice.emission.probability(emitter) == 0.0);
         let is_of_these =
             [&choice.emission, &choice.next_event].iter().all(|selection| selection.fits(&self.power));
         let guides = &choice.guides;
@@ -302,6 +313,40 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     #[must_use]
     pub fn next_event_probability(&self, receiver: glam::Vec3, emitter: EmitterId) -> f32 {
         self.choice.next_event_probability(self.tree.as_ref(), receiver, emitter)
+    }
+
+    /// Leaves volumes that emit to the rays that pass through them: no sub-path begins there any more. Of
+    /// other kinds of emitters none is left out.
+    pub fn leave_out_volumes(&mut self, is_left_out: impl Fn(EmitterId) -> bool) {
+        let (out, kept): (Vec<_>, Vec<_>) =
+            self.volumes.iter().copied().partition(|&(_, emitter)| is_left_out(emitter));
+        if out.is_empty() {
+            return;
+        }
+        self.volumes = kept;
+        let leave = |selection: &Selection| selection.without(|id| out.iter().any(|&(_, other)| other == id));
+        self.power = leave(&self.power);
+        let EmitterChoice { emission, next_event, guides } = &*self.choice;
+        let (emission, next_event) = (leave(emission), leave(next_event));
+        self.choice = Arc::new(EmitterChoice { emission, next_event, guides: guides.clone() });
+    }
+
+    /// The emitter that is the volume of a body, if sub-paths begin there.
+    #[must_use]
+    pub fn volume_emitter(&self, body: BodyId) -> Option<EmitterId> {
+        let place = self.volumes.binary_search_by_key(&body, |&(body, _)| body).ok()?;
+        Some(self.volumes[place].1)
+    }
+
+    /// The emitters that are volumes of bodies, and that sub-paths begin at.
+    pub fn volume_emitters(&self) -> impl Iterator<Item = EmitterId> + '_ {
+        self.volumes.iter().map(|&(_, emitter)| emitter)
+    }
+
+    /// Whether sub-paths begin in the volume of any body.
+    #[must_use]
+    pub const fn has_volume_emitters(&self) -> bool {
+        !self.volumes.is_empty()
     }
 
     /// The emitters that every escaping ray hits.

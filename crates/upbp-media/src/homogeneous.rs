@@ -39,6 +39,9 @@ pub struct Homogeneous {
     sigma_s: Spectrum,
     sigma_t: Spectrum,
     emission: Spectrum,
+    glow: Spectrum,
+    /// `σ_a L_e` and the glow.
+    source: Spectrum,
     phase: PhaseFunction,
     sampling: Sampling,
 }
@@ -60,19 +63,46 @@ impl Homogeneous {
         } else {
             Sampling::Chromatic(channel_probabilities(sigma_s, sigma_t))
         };
-        Ok(Self { sigma_a, sigma_s, sigma_t, emission: Spectrum::ZERO, phase, sampling })
+        Ok(Self {
+            sigma_a,
+            sigma_s,
+            sigma_t,
+            emission: Spectrum::ZERO,
+            glow: Spectrum::ZERO,
+            source: Spectrum::ZERO,
+            phase,
+            sampling,
+        })
     }
 
-    /// Makes the medium glow with radiance `L_e`, in W m⁻² sr⁻¹: the source term per length is `σ_a L_e`, and
-    /// an opaque stretch without scattering shows `L_e`.
+    /// Makes the medium emit what it absorbs, with radiance `L_e`, in W m⁻² sr⁻¹: the source term per length
+    /// is `σ_a L_e`, and an opaque stretch without scattering shows `L_e`.
     ///
-    /// A channel without absorption does not glow.
+    /// A channel without absorption emits nothing.
     ///
     /// # Errors
     ///
-    /// If a channel of `radiance` is negative or not finite.
+    /// If a channel of `radiance` is negative or not finite, or of the source is not finite.
     pub fn with_emission(mut self, radiance: Spectrum) -> Result<Self, MediaError> {
         self.emission = check_non_negative("the emitted radiance", radiance)?;
+        self.with_sum()
+    }
+
+    /// Makes the medium glow whether or not it absorbs, with `radiance` per length in W m⁻² sr⁻¹ per scene
+    /// unit, on top of what it [emits by absorption](Self::with_emission): a stretch of length ℓ without
+    /// extinction shows `radiance · ℓ`.
+    ///
+    /// # Errors
+    ///
+    /// If a channel of `radiance` is negative or not finite, or of the source is not finite.
+    pub fn with_glow(mut self, radiance: Spectrum) -> Result<Self, MediaError> {
+        self.glow = check_non_negative("the radiance of the glow per length", radiance)?;
+        self.with_sum()
+    }
+
+    fn with_sum(mut self) -> Result<Self, MediaError> {
+        let source = self.sigma_a * self.emission + self.glow;
+        self.source = check_non_negative("the emitted radiance per length", source)?;
         Ok(self)
     }
 
@@ -98,6 +128,17 @@ impl Homogeneous {
     #[must_use]
     pub const fn emission(&self) -> Spectrum {
         self.emission
+    }
+
+    /// Light of one channel that a stretch sends to its start, W m⁻² sr⁻¹: `∫₀^ℓ j e^{−σ_t t} dt`.
+    fn emitted_in(&self, channel: usize, length: f64) -> f64 {
+        let (source, sigma_t) = (f64::from(self.source[channel]), f64::from(self.sigma_t[channel]));
+        match (source, sigma_t) {
+            (0.0, _) => 0.0,
+            (_, 0.0) => source * length,
+            // With `exp_m1`, a thin stretch keeps all its digits.
+            _ => source / sigma_t * -f64::exp_m1(-sigma_t * length),
+        }
     }
 }
 
@@ -206,22 +247,55 @@ impl Medium for Homogeneous {
 
     #[inline]
     fn emits(&self) -> bool {
-        !(self.sigma_a * self.emission).is_black()
+        !self.source.is_black()
     }
 
     fn emitted(&self, segment: &RaySegment) -> Spectrum {
         let length = finite_length(segment);
-        let channel = |channel: usize| {
-            let sigma_t = f64::from(self.sigma_t[channel]);
-            if sigma_t == 0.0 {
-                // No extinction, hence no absorption, hence no emission.
-                return 0.0;
-            }
-            // ∫₀^ℓ σ_a L_e e^{−σ_t t} dt. With `exp_m1`, a thin stretch keeps all its digits.
-            let share = f64::from(self.sigma_a[channel]) / sigma_t;
-            (f64::from(self.emission[channel]) * share * -f64::exp_m1(-sigma_t * length)) as f32
+        to_spectrum([0, 1, 2].map(|channel| self.emitted_in(channel, length)))
+    }
+
+    #[inline]
+    fn source(&self, _position: Vec3) -> Spectrum {
+        self.source
+    }
+
+    fn sample_emitted(&self, segment: &RaySegment, u: f32) -> Option<f32> {
+        let length = segment.length_f64();
+        let emitted = [0, 1, 2].map(|channel| self.emitted_in(channel, length));
+        let total: f64 = emitted.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        // A channel by what it sends, and the rest of the random number for the distance.
+        let mut rest = f64::from(u) * total;
+        let channel = (0..2).find(|&channel| {
+            let is_here = rest < emitted[channel];
+            rest -= if is_here { 0.0 } else { emitted[channel] };
+            is_here
+        });
+        let channel = channel.unwrap_or(2);
+        let share = (rest / emitted[channel]).clamp(0.0, 1.0);
+        let sigma_t = f64::from(self.sigma_t[channel]);
+        let t = if sigma_t == 0.0 {
+            share * length
+        } else {
+            -f64::ln_1p(share * f64::exp_m1(-sigma_t * length)) / sigma_t
         };
-        Spectrum::new(channel(0), channel(1), channel(2))
+        let distance = (f64::from(segment.start) + t) as f32;
+        t.is_finite().then(|| distance.min(segment.end.next_down()))
+    }
+
+    fn pdf_emitted(&self, segment: &RaySegment, distance: f32) -> f64 {
+        let length = segment.length_f64();
+        let t = f64::from(distance) - f64::from(segment.start);
+        let (mut here, mut total) = (0.0, 0.0);
+        for channel in 0..3 {
+            let sigma_t = f64::from(self.sigma_t[channel]);
+            here += f64::from(self.source[channel]) * (-sigma_t * t).exp();
+            total += self.emitted_in(channel, length);
+        }
+        here / total
     }
 
     #[inline]

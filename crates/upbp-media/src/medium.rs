@@ -151,11 +151,38 @@ pub trait Medium: Send + Sync {
         false
     }
 
-    /// Radiance that the medium inside the segment emits towards `start`: `∫ T(start, t) σ_a L_e dt`, in
-    /// W m⁻² sr⁻¹.
+    /// Radiance that the medium inside the segment emits towards `start`: `∫ T(start, t) j dt` with the
+    /// [source](Self::source) j, in W m⁻² sr⁻¹.
     fn emitted(&self, segment: &RaySegment) -> Spectrum {
         let _ = segment;
         Spectrum::ZERO
+    }
+
+    /// Radiance that the medium emits per length at `position`, in W m⁻² sr⁻¹ per scene unit, the same in all
+    /// directions: `σ_a L_e` where it emits what it absorbs.
+    ///
+    /// Needed only where light sub-paths start in the medium, in a body that is an emitter: the light that
+    /// rays meet is [`emitted`](Self::emitted).
+    fn source(&self, position: Vec3) -> Spectrum {
+        let _ = position;
+        Spectrum::ZERO
+    }
+
+    /// Draws the distance from the ray's origin, in `[start, end)`, of a point whose light is looked at;
+    /// `None` if nothing is seen. `u` is uniform in `[0, 1)`.
+    ///
+    /// Good in proportion to the light that it sends to `start`; the default is uniform.
+    fn sample_emitted(&self, segment: &RaySegment, u: f32) -> Option<f32> {
+        let length = segment.length();
+        (length > 0.0 && length.is_finite())
+            .then(|| (segment.start + u * length).min(segment.end.next_down()))
+    }
+
+    /// Density, per length, of [`sample_emitted`](Self::sample_emitted) at `distance`: positive wherever the
+    /// [source](Self::source) is.
+    fn pdf_emitted(&self, segment: &RaySegment, distance: f32) -> f64 {
+        let _ = distance;
+        1.0 / segment.length_f64()
     }
 
     /// Probability in `(0, 1]` that a walk goes on after a collision at `position`.

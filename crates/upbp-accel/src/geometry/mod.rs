@@ -11,6 +11,7 @@ mod scene;
 mod shape;
 mod sphere;
 mod triangle;
+mod volume;
 
 pub use axis_box::AxisBox;
 pub use error::GeometryError;
@@ -20,3 +21,4 @@ pub use quad::Quad;
 pub use scene::SceneGeometry;
 pub use shape::Shape;
 pub use sphere::Sphere;
+pub use volume::ShapeVolume;

@@ -29,6 +29,9 @@ pub fn check_emitter(emitter: &impl Emitter, bounds: &BoundingSphere, receivers:
         EmitterKind::Point => check_point_directions(emitter, bounds, &mut random),
         EmitterKind::Directional => Ok(()),
         EmitterKind::Environment => check_environment_directions(emitter, bounds, &mut random),
+        EmitterKind::Volume(_) => receivers
+            .iter()
+            .try_for_each(|&receiver| check_volume_fluence(emitter, bounds, receiver, &mut random)),
     }
 }
 
@@ -191,6 +194,36 @@ fn check_area_irradiance(
         emitted.add(f64::from(term));
     }
     chosen.agrees(emitted.value(), "both ways to choose points give the same irradiance")
+}
+
+/// The light of a volume must be the same by points for a receiver and by points of emission, out to the same
+/// distances. Near the receiver the second way does not converge, so that near light counts less.
+fn check_volume_fluence(
+    emitter: &impl Emitter,
+    bounds: &BoundingSphere,
+    receiver: Vec3,
+    random: &mut Random,
+) -> Check {
+    let near = 0.1 * bounds.radius;
+    let fluence = |point: &EmitterPoint, radiance: f32, pdf: f32| {
+        let passage = emitter.pdf_passage(point);
+        require(passage > 0.0 && is_density(passage), "a passage has a density", (point, passage))?;
+        Ok(f64::from(radiance / (receiver.distance_squared(point.position) + near * near) / pdf))
+    };
+    let (mut chosen, mut emitted) = (Mean::default(), Mean::default());
+    for _ in 0..DRAWS {
+        let term = match emitter.sample_incident(bounds, receiver, random.pair()) {
+            Some(incident) => fluence(&incident.point, incident.radiance.mean(), incident.pdf)?,
+            None => 0.0,
+        };
+        chosen.add(term);
+        let term = match emitter.sample_emission(bounds, random.pair(), random.pair()) {
+            Some(emission) => fluence(&emission.point, emission.radiance.mean(), emission.pdf_position)?,
+            None => 0.0,
+        };
+        emitted.add(term);
+    }
+    chosen.agrees(emitted.value(), "both ways to choose points give the same fluence")
 }
 
 /// `∫ pdf_direction dω = 1` around a point, seen by receivers around it.

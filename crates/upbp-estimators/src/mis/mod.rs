@@ -14,4 +14,4 @@ mod weights;
 
 pub use counts::{BeamExtent, Heuristic, MergeKind, MisPlan, PARALLEL_SIN2, VolumeMerges};
 pub use density_sum::{ByTechnique, Densities, Weight};
-pub use recursion::{Edge, EdgeMis, End, VertexMis};
+pub use recursion::{Edge, EdgeMis, EdgeStart, End, VertexMis};

@@ -14,6 +14,9 @@ use super::counts::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2};
 pub enum VertexKind {
     /// The light end or the camera end.
     End,
+    /// The light end in an emitting volume: `tC_0` of its edge is the density with which weights take camera
+    /// sub-paths that pass there to stop.
+    Volume,
     /// A surface vertex that can be connected and merged.
     Surface,
     /// A medium vertex.
@@ -187,7 +190,7 @@ impl Path {
                     let bb1d = both + log(c_light) + log(c_camera) + log(sin);
                     push(Strategy::Bb1d(i), here(v.bb1d, 1, width.bb1d), bb1d);
                 }
-                VertexKind::End | VertexKind::Delta => {}
+                VertexKind::End | VertexKind::Volume | VertexKind::Delta => {}
             }
         }
 

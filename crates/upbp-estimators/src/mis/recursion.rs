@@ -95,22 +95,49 @@ pub struct EdgeMis<D = f64> {
     pub distance_factor: f64,
     /// Whether the vertex can be connected to the next one.
     pub connectible: bool,
-    /// Whether it lies in a medium, so that a walk of the other side stops there by a sampled distance.
-    pub in_medium: bool,
+    /// The way in which walks of the other side come to it.
+    pub start: EdgeStart,
+}
+
+/// The way in which walks of the other side come to the first vertex of an edge: their density of distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EdgeStart {
+    /// By passing the whole edge, to a surface or an end of the path.
+    Surface,
+    /// By stopping at a sampled distance, in a medium.
+    Medium,
+    /// By seeing it on their way through an emitting volume, wherever they stop. That density does not depend
+    /// on the edge and is part of the vertex's `B` (section 2.9).
+    Volume,
+}
+
+impl EdgeStart {
+    /// The density of distance of a walk of the other side that comes to the start of an edge.
+    #[inline]
+    #[must_use]
+    pub const fn backward(self, density: &EdgeDensity) -> f64 {
+        match self {
+            Self::Surface => density.backward(false),
+            Self::Medium => density.backward(true),
+            Self::Volume => 1.0,
+        }
+    }
 }
 
 impl<D: Densities> EdgeMis<D> {
-    /// The light end of a light sub-path (section 4.2). `hit` is the count of emission hits, 0 if the emitter
-    /// cannot be hit; `pdf_position` and `pdf_direction` are `L_0` and `ρL_0`.
+    /// The light end of a light sub-path (section 4.2). `hit` is 0 if the emitter cannot be hit,
+    /// [`pdf_passage`](crate::scene::Emitter::pdf_passage) in a volume, else 1; `pdf_position` and
+    /// `pdf_direction` are `L_0` and `ρL_0`.
     #[must_use]
     pub fn at_light(
         plan: &MisPlan,
-        hittable: bool,
+        start: EdgeStart,
+        hit: f64,
         cos_out: f64,
         pdf_position: f64,
         pdf_direction: f64,
     ) -> Self {
-        let hit = if hittable { plan.hit } else { 0.0 };
+        let hit = hit * plan.hit;
         Self {
             before: D::of(Technique::Hit, plan.pow(hit / pdf_position)),
             rho: pdf_direction,
@@ -118,7 +145,7 @@ impl<D: Densities> EdgeMis<D> {
             kind: MergeKind::None,
             distance_factor: 0.0,
             connectible: true,
-            in_medium: false,
+            start,
         }
     }
 
@@ -132,8 +159,15 @@ impl<D: Densities> EdgeMis<D> {
             kind: MergeKind::None,
             distance_factor: 0.0,
             connectible: true,
-            in_medium: false,
+            start: EdgeStart::Surface,
         }
+    }
+
+    /// Whether no technique but the walk itself makes a path that goes on from here.
+    #[inline]
+    #[must_use]
+    pub fn is_alone(&self) -> bool {
+        !self.connectible && self.kind == MergeKind::None && self.before.total() == 0.0
     }
 
     /// One step (section 4.3): the arrival at the next vertex. `connections` is the number of samples that
@@ -145,8 +179,8 @@ impl<D: Densities> EdgeMis<D> {
     pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: D) -> VertexMis<D> {
         let inverse = 1.0 / (self.rho * edge.cos_in * edge.forward);
         let below = if edge.backward > 0.0 {
-            let opposite =
-                plan.distance_factor(walk.other(), self.in_medium, edge.pass_probability, edge.backward);
+            let stops = self.start == EdgeStart::Medium;
+            let opposite = plan.distance_factor(walk.other(), stops, edge.pass_probability, edge.backward);
             let merges: D = merges(plan, walk, self.kind, self.distance_factor, opposite);
             (merges + self.before) * plan.pow(inverse * self.cos_out * edge.backward)
         } else {
@@ -189,14 +223,14 @@ impl Edge {
         density: &EdgeDensity,
         distance: f64,
         cos_in: f64,
-        starts_in_medium: bool,
+        start: EdgeStart,
         ends_in_medium: bool,
     ) -> Self {
         Self {
             distance_squared: if distance.is_finite() { distance * distance } else { 1.0 },
             cos_in,
             forward: density.forward(ends_in_medium),
-            backward: density.backward(starts_in_medium),
+            backward: start.backward(density),
             pass_probability: density.pass_probability,
             ends_in_medium,
         }

@@ -6,7 +6,7 @@ use upbp_media::EdgeDensity;
 use super::context::Context;
 use super::edge::EdgeTrace;
 use super::interaction::{Interaction, MediumInterface, Scattered};
-use crate::mis::{Densities, EdgeMis, MergeKind, VertexMis};
+use crate::mis::{Densities, EdgeMis, EdgeStart, MergeKind, VertexMis};
 use crate::scene::Scene;
 
 /// The end of an edge.
@@ -92,6 +92,6 @@ pub(crate) fn scatter<S: Scene, D: Densities>(
         },
         distance_factor: mis.distance_factor,
         connectible: !scattered.delta,
-        in_medium: interaction.in_medium(),
+        start: if interaction.in_medium() { EdgeStart::Medium } else { EdgeStart::Surface },
     }
 }

@@ -128,7 +128,7 @@ impl<D: Densities> PhotonBeam<D> {
         let segment = RaySegment { origin, direction, start, end: t };
         let density = self.before.with(&prepared.scene.media()[self.medium.0 as usize].segment(&segment));
         let distance = if self.from_infinity { f64::INFINITY } else { f64::from(t) };
-        let edge = Edge::new(&density, distance, 1.0, self.mis.in_medium, true);
+        let edge = Edge::new(&density, distance, 1.0, self.mis.start, true);
         if !(edge.forward > 0.0) {
             return None;
         }
@@ -204,7 +204,7 @@ impl<D: Densities> CameraEdge<D> {
     ) -> Option<CameraVertex<S::Bsdf, D>> {
         let Context { prepared, plan } = *context;
         let density = edge_trace.density_to(prepared.scene, span, t);
-        let edge = Edge::new(&density, f64::from(t), 1.0, self.mis.in_medium, true);
+        let edge = Edge::new(&density, f64::from(t), 1.0, self.mis.start, true);
         (edge.forward > 0.0).then(|| CameraVertex {
             position: edge_trace.origin + edge_trace.direction * t,
             towards_camera: -edge_trace.direction,

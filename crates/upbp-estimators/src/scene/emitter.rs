@@ -1,7 +1,7 @@
 //! Lights: how they are sampled, and with which densities.
 
 use glam::Vec3;
-use upbp_media::Spectrum;
+use upbp_media::{BodyId, Spectrum};
 
 /// A sphere around everything that is finite in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +24,12 @@ pub enum EmitterKind {
     /// Light from all directions, infinitely far: "points" are directions by solid angle, is hit by every ray
     /// that escapes.
     Environment,
+    /// The inside of a body whose medium emits: points by volume, is hit by every ray that passes through.
+    ///
+    /// A point shines only if the body counts there: points outside of it, or inside a body of higher
+    /// priority, may be chosen, and are then lost. A medium that emits in a body without such an emitter, or
+    /// around everything, is found by rays alone.
+    Volume(BodyId),
 }
 
 impl EmitterKind {
@@ -36,7 +42,7 @@ impl EmitterKind {
     /// Whether a camera sub-path can end on it by chance.
     #[must_use]
     pub const fn is_hittable(self) -> bool {
-        matches!(self, Self::Area | Self::Environment)
+        matches!(self, Self::Area | Self::Environment | Self::Volume(_))
     }
 }
 
@@ -58,10 +64,11 @@ pub struct Emission {
     pub point: EmitterPoint,
     /// Direction of the light, a unit vector.
     pub direction: Vec3,
-    /// Radiance (area, environment), radiant intensity (point) or irradiance on a perpendicular plane
-    /// (directional) in `direction`.
+    /// Radiance (area, environment), radiant intensity (point), irradiance on a perpendicular plane
+    /// (directional) or radiance per length (volume) in `direction`.
     pub radiance: Spectrum,
-    /// `L_0`: per area for a surface, 1 for a Dirac, per solid angle for an environment.
+    /// `L_0`: per area for a surface, 1 for a Dirac, per solid angle for an environment, per volume for a
+    /// volume.
     pub pdf_position: f32,
     /// `ρL_0`: per solid angle for a finite emitter; per area of the disc that rays start from, `1/(πR²)`,
     /// for an infinite one.
@@ -79,8 +86,8 @@ pub struct Incident {
     pub distance: f32,
     /// As [`Emission::radiance`], towards the receiver.
     pub radiance: Spectrum,
-    /// `p_nee`: density of this choice, in the measure of [`Emission::pdf_position`] (area, 1, or solid
-    /// angle).
+    /// `p_nee`: density of this choice, in the measure of [`Emission::pdf_position`] (area, 1, solid angle,
+    /// or volume).
     pub pdf: f32,
     /// [`Emission::pdf_position`] of this point.
     pub pdf_position: f32,
@@ -205,8 +212,8 @@ pub trait Emitter: Send + Sync {
     /// Chooses a point of the emitter for next event estimation at `receiver`.
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident>;
 
-    /// Radiance and densities for a path from `point` (on a surface that carries this emitter; for an
-    /// environment only `direction` counts) in `direction`, the direction of the light, to `receiver`. `None`
+    /// Radiance and densities for a path from `point` (on a surface that carries this emitter, or in its
+    /// volume; for an environment only `direction` counts) in `direction`, the direction of the light, to `receiver`. `None`
     /// for lights that cannot be hit, and on a side that does not shine.
     fn hit(
         &self,
@@ -215,6 +222,16 @@ pub trait Emitter: Send + Sync {
         direction: Vec3,
         receiver: Vec3,
     ) -> Option<HitDensities>;
+
+    /// Density, per length, with which weights take a camera sub-path that passes through an emitting volume
+    /// to end at `point`, where [`hit`](Self::hit) answers (`docs/theory.md`, section 2.9).
+    ///
+    /// Good is one over the length of a ray inside from which light gets out. Of no meaning for other kinds
+    /// than [`EmitterKind::Volume`].
+    fn pdf_passage(&self, point: &EmitterPoint) -> f32 {
+        let _ = point;
+        1.0
+    }
 
     /// The random numbers with which [`sample_emission`](Self::sample_emission) starts the light that leaves
     /// `point` in `direction` and passes `on_ray`; an infinite emitter is asked for that ray alone, and

@@ -7,39 +7,123 @@ use crate::film_sample::Output;
 use crate::mis::{Densities, Edge, Weight};
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::Context;
-use crate::path::{CameraEdge, EdgeTrace};
-use crate::scene::{Emitter, EmitterId, EmitterPoint, Hit, Scene, Walk};
+use crate::path::{CameraEdge, EdgeTrace, MediumSpan};
+use crate::random::Stream;
+use crate::scene::{Bsdf, Emitter, EmitterId, EmitterPoint, Hit, HitDensities, Scene, Walk};
 use crate::technique::Technique;
 
-/// Emission of media along the whole ray to the next surface, integrated in closed form.
+/// Emission of media along the whole ray to the next surface.
 ///
-/// No other technique starts a path in a medium, so the weight is one.
+/// Where light sub-paths start in the volume the weight changes along the ray, and one point of each stretch
+/// stands for all of it; elsewhere there is no other technique, and the integral is in closed form
+/// (`docs/theory.md`, section 2.9).
 pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     edge_trace: &EdgeTrace<S::Bsdf>,
     edge: &CameraEdge<O::Densities>,
+    stream: &mut Stream,
     out: &mut Output<'_, O>,
 ) {
     let Context { prepared, plan } = *context;
     if plan.mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
         return;
     }
+    let has_others = prepared.has_volume_emitters() && edge.depth > 1 && !edge.mis.is_alone();
     for span in &edge_trace.spans {
         let Some(medium) = span.medium else { continue };
         let medium = &prepared.scene.media()[medium.0 as usize];
-        if medium.emits() {
-            let emitted = medium.emitted(&edge_trace.segment(span, span.end));
-            let value = edge.throughput * span.before.transmittance * emitted;
-            let weight = Weight::<O::Densities>::alone(Technique::Hit);
-            out.record(&ObservedSample {
-                technique: Technique::Hit,
-                camera_depth: edge.depth,
-                completion: Completion::Emission,
-                weight,
-                value,
-            });
+        if !medium.emits() {
+            continue;
+        }
+        let segment = edge_trace.segment(span, span.end);
+        if has_others {
+            if let Some(t) = medium.sample_emitted(&segment, stream.uniform()) {
+                let pdf = medium.pdf_emitted(&segment, t);
+                emission_at(context, edge_trace, span, t, pdf, medium, edge, out);
+            }
+        } else {
+            let value = edge.throughput * span.before.transmittance * medium.emitted(&segment);
+            record_hit(edge, Completion::Emission, Weight::alone(Technique::Hit), value, out);
         }
     }
+}
+
+/// Emission of a medium at distance `t` in a span, for all of the span; `pdf` is the density of `t`.
+#[expect(clippy::too_many_arguments, reason = "a point of an edge, used here only")]
+fn emission_at<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+    context: &Context<'_, S>,
+    edge_trace: &EdgeTrace<S::Bsdf>,
+    span: &MediumSpan,
+    t: f32,
+    pdf: f64,
+    medium: &S::Medium,
+    edge: &CameraEdge<O::Densities>,
+    out: &mut Output<'_, O>,
+) {
+    let prepared = context.prepared;
+    let density = edge_trace.density_to(prepared.scene, span, t);
+    let (receiver, direction) = (edge_trace.origin, -edge_trace.direction);
+    let position = receiver + t * edge_trace.direction;
+    let value = edge.throughput * density.transmittance * (medium.source(position) / pdf as f32);
+    let point = EmitterPoint { position, normal: direction };
+    let light = edge_trace.stack_in(span, t).top().and_then(|top| prepared.volume_emitter(top.body));
+    let seen = light.and_then(|emitter| {
+        let light = &prepared.scene.emitters()[emitter.0 as usize];
+        Some((emitter, light.pdf_passage(&point), light.hit(&prepared.bounds, &point, direction, receiver)?))
+    });
+    let Some((emitter, passage, densities)) = seen else {
+        record_hit(edge, Completion::Emission, Weight::alone(Technique::Hit), value, out);
+        return;
+    };
+    let mis_edge = Edge {
+        distance_squared: f64::from(t) * f64::from(t),
+        cos_in: 1.0,
+        forward: f64::from(passage),
+        backward: edge.mis.start.backward(&density),
+        pass_probability: density.pass_probability,
+        ends_in_medium: false,
+    };
+    let end = LightEnd { emitter, point, direction };
+    let weight = weight_of_hit(context, &end, &densities, receiver, &mis_edge, edge);
+    record_hit(edge, Completion::Hit(end), weight, value, out);
+}
+
+fn record_hit<B: Bsdf, O: Observer<B> + ?Sized>(
+    edge: &CameraEdge<O::Densities>,
+    completion: Completion<B>,
+    weight: Weight<O::Densities>,
+    value: Spectrum,
+    out: &mut Output<'_, O>,
+) {
+    out.record(&ObservedSample {
+        technique: Technique::Hit,
+        camera_depth: edge.depth,
+        completion,
+        weight,
+        value,
+    });
+}
+
+/// The weight of a camera sub-path that ends on a light by `mis_edge`.
+fn weight_of_hit<S: Scene, D: Densities>(
+    context: &Context<'_, S>,
+    end: &LightEnd,
+    densities: &HitDensities,
+    receiver: Vec3,
+    mis_edge: &Edge,
+    edge: &CameraEdge<D>,
+) -> Weight<D> {
+    let Context { prepared, plan } = *context;
+    let mis = &plan.mis;
+    let LightEnd { emitter, point, direction } = *end;
+    // On arrival at a light the vertex before is connected by next event estimation.
+    let vertex_mis = edge.mis.arrive(mis, Walk::Camera, mis_edge, D::of(Technique::Nee, mis.pow(mis.nee)));
+    mis.hit_weight(
+        &vertex_mis,
+        f64::from(prepared.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
+        f64::from(prepared.emission_probability(emitter)) * f64::from(densities.pdf_position),
+        f64::from(densities.pdf_direction * prepared.emission_factor(emitter, &point, direction, receiver)),
+    )
 }
 
 /// The camera sub-path has hit a surface that may shine.
@@ -76,7 +160,7 @@ pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     if throughput.is_black() || !throughput.is_finite() {
         return;
     }
-    let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.mis.in_medium, false);
+    let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.mis.start, false);
     let away = prepared.bounds.centre + edge_trace.direction * (2.0 * prepared.bounds.radius);
     let point = EmitterPoint { position: away, normal: -edge_trace.direction };
     for &emitter in prepared.environments() {
@@ -108,34 +192,17 @@ fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let Context { prepared, plan } = *context;
-    let mis = &plan.mis;
-    if mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
+    if plan.mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
         return;
     }
     let Some(light) = prepared.scene.emitters().get(emitter.0 as usize) else { return };
     let Some(densities) = light.hit(prepared.emission_bounds(), point, direction, receiver) else { return };
+    let end = LightEnd { emitter, point: *point, direction };
     let weight = if edge.depth == 1 {
         // Nothing else makes a path of one edge.
         Weight::alone(Technique::Hit)
     } else {
-        // On arrival at a light the vertex before is connected by next event estimation.
-        let vertex_mis =
-            edge.mis.arrive(mis, Walk::Camera, mis_edge, O::Densities::of(Technique::Nee, mis.pow(mis.nee)));
-        mis.hit_weight(
-            &vertex_mis,
-            f64::from(prepared.next_event_probability(receiver, emitter)) * f64::from(densities.pdf_incident),
-            f64::from(prepared.emission_probability(emitter)) * f64::from(densities.pdf_position),
-            f64::from(
-                densities.pdf_direction * prepared.emission_factor(emitter, point, direction, receiver),
-            ),
-        )
+        weight_of_hit(context, &end, &densities, receiver, mis_edge, edge)
     };
-    let value = throughput * densities.radiance;
-    out.record(&ObservedSample {
-        technique: Technique::Hit,
-        camera_depth: edge.depth,
-        completion: Completion::Hit(LightEnd { emitter, point: *point, direction }),
-        weight,
-        value,
-    });
+    record_hit(edge, Completion::Hit(end), weight, throughput * densities.radiance, out);
 }

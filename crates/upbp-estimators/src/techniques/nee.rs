@@ -1,5 +1,7 @@
 //! Next event estimation: a camera vertex and a point chosen on a light.
 
+use upbp_media::{BodyId, MediumStack};
+
 use crate::film_sample::Output;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, ray_origin};
@@ -67,6 +69,11 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let target = Target { direction, distance: incident.distance, surface };
     let stack = sides.towards(crosses);
     let Some(density) = clear_edge(scene, &stack, origin, &target, crossings) else { return };
+    if let EmitterKind::Volume(body) = kind
+        && !is_in_body(stack, crossings, body)
+    {
+        return;
+    }
 
     let in_medium = vertex.interaction.in_medium();
     let distance2 = if kind.is_infinite() { 1.0 } else { f64::from(incident.distance).powi(2) };
@@ -74,11 +81,12 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let pdf_position = f64::from(prepared.emission_probability(emitter)) * f64::from(incident.pdf_position);
     let geometry = f64::from(cos_light) * scattering.cos / distance2;
 
-    let hit_density = if kind.is_hittable() {
-        scattering.rho_own * f64::from(cos_light) / distance2 * density.forward(false)
-    } else {
-        0.0
+    let arrives = match kind {
+        EmitterKind::Volume(_) => f64::from(light.pdf_passage(&incident.point)),
+        _ if kind.is_hittable() => density.forward(false),
+        _ => 0.0,
     };
+    let hit_density = scattering.rho_own * f64::from(cos_light) / distance2 * arrives;
     let factor = prepared.emission_factor(emitter, &incident.point, -direction, vertex.position);
     let camera_density =
         f64::from(incident.pdf_direction * factor) * scattering.cos / distance2 * density.backward(in_medium);
@@ -102,4 +110,12 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         weight,
         value,
     });
+}
+
+/// Whether `body` counts at the end of an edge that starts in the bodies of `stack`.
+fn is_in_body(mut stack: MediumStack, crossings: &[Crossing], body: BodyId) -> bool {
+    for crossing in crossings {
+        let _ = stack.cross(crossing.interior, crossing.entering);
+    }
+    stack.top().is_some_and(|top| top.body == body)
 }

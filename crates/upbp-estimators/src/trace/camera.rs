@@ -67,7 +67,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, &mut stream);
         out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
         let edge_trace = &scratch.edge_trace;
-        techniques::emission_along(context, edge_trace, &edge, &mut out);
+        techniques::emission_along(context, edge_trace, &edge, &mut stream, &mut out);
         techniques::pb2d(context, map, edge_trace, &edge, &mut out);
         techniques::bb1d(context, map, edge_trace, &edge, &mut out);
 
@@ -97,7 +97,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             &arrived.density,
             f64::from(arrived.distance),
             arrived.interaction.cosine(from),
-            edge.mis.in_medium,
+            edge.mis.start,
             in_medium,
         );
         if !in_medium && let Some(hit) = &edge_trace.hit {

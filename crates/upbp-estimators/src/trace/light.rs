@@ -5,7 +5,7 @@ use upbp_accel::{Segment, offset_origin};
 use upbp_media::{Medium, MediumId, MediumStack, Spectrum};
 
 use crate::counters::Counters;
-use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
+use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
     Arrival, Arrived, Context, EdgeSource, EdgeTrace, Extent, LightChunk, LightVertex, MIN_COSINE,
@@ -80,7 +80,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             &density,
             if flight.infinite { f64::INFINITY } else { f64::from(distance) },
             interaction.cosine(from),
-            flight.mis.in_medium,
+            flight.mis.start,
             in_medium,
         );
         let connections = if connectible {
@@ -163,7 +163,7 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     }
     let cos = match kind {
         EmitterKind::Area => emission.point.normal.dot(emission.direction),
-        EmitterKind::Point | EmitterKind::Directional | EmitterKind::Environment => 1.0,
+        _ => 1.0,
     };
     let pdf_position = emission.pdf_position * probability;
     let density = pdf_position * emission.pdf_direction;
@@ -171,7 +171,6 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     if !(cos >= MIN_COSINE && density > 0.0) || throughput.is_black() || !throughput.is_finite() {
         return None;
     }
-    observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
     let origin = match kind {
         EmitterKind::Area => {
             offset_origin(emission.point.position, emission.point.normal, emission.direction)
@@ -187,13 +186,25 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             _ => origin,
         })
     };
+    let hit = match kind {
+        EmitterKind::Volume(body) => {
+            // The point may be beside the body, or in another one that counts more.
+            if stack.top().is_none_or(|top| top.body != body) {
+                return None;
+            }
+            f64::from(light.pdf_passage(&emission.point))
+        }
+        _ => f64::from(u8::from(kind.is_hittable())),
+    };
+    observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
     Some(Flight {
         origin,
         direction: emission.direction,
         stack,
         mis: EdgeMis::at_light(
             &context.plan.mis,
-            kind.is_hittable(),
+            if matches!(kind, EmitterKind::Volume(_)) { EdgeStart::Volume } else { EdgeStart::Surface },
+            hit,
             f64::from(cos),
             f64::from(pdf_position),
             f64::from(emission.pdf_direction),

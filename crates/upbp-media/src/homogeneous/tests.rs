@@ -305,6 +305,57 @@ fn emission_has_its_limits() {
 }
 
 #[test]
+fn a_glow_needs_no_absorption() {
+    let radiance = Spectrum::new(3.0, 0.5, 0.0);
+    let glow = medium([0.0; 3], [0.0; 3]).with_glow(radiance).unwrap();
+    assert!(glow.emits() && !glow.scatters());
+    assert_eq!(glow.emitted(&segment(1.0, 5.0)), 4.0 * radiance);
+    assert_eq!(glow.emitted(&segment(1.0, 1.0)), Spectrum::ZERO);
+    // It comes on top of what is emitted by absorption, in whichever order.
+    let both = medium([2.0; 3], [0.0; 3]).with_glow(radiance).unwrap().with_emission(radiance).unwrap();
+    assert_eq!(both.source(Vec3::ZERO), 3.0 * radiance);
+    let opaque = both.emitted(&segment(0.0, f32::INFINITY));
+    assert_eq!(opaque, 1.5 * radiance);
+    assert!(medium([0.0; 3], [0.0; 3]).with_glow(Spectrum::new(0.0, -1.0, 0.0)).is_err());
+    assert!(medium([1e30; 3], [0.0; 3]).with_emission(Spectrum::splat(1e30)).is_err());
+}
+
+#[test]
+fn points_are_drawn_by_the_light_that_they_send() {
+    let media = scattering_media().map(|medium| medium.with_emission(Spectrum::new(3.0, 0.5, 20.0)).unwrap());
+    let thin = medium([0.0; 3], [0.0; 3]).with_glow(Spectrum::new(1.0, 0.0, 2.0)).unwrap();
+    let mut random = Random(5);
+    for medium in media.into_iter().filter(Homogeneous::emits).chain([thin]) {
+        for length in [1e-6_f32, 0.1, 1.0, 25.0] {
+            let segment = segment(2.0, 2.0 + length);
+            let pdf = |t: f64| medium.pdf_emitted(&segment, (2.0 + t) as f32);
+            let total = integrate_towards_zero(pdf, segment.length_f64());
+            assert!((total - 1.0).abs() < 1e-3, "{medium:?}, {length}: {total}");
+            let emitted = medium.emitted(&segment);
+            let (mut sum, mut below, count) = (Spectrum::ZERO, 0_u32, 20_000);
+            let middle = 2.0 + 0.3 * length;
+            for _ in 0..count {
+                let t = medium.sample_emitted(&segment, random.uniform()).unwrap();
+                assert!((segment.start..segment.end).contains(&t));
+                let through = medium.segment(&RaySegment { end: t, ..segment }).transmittance;
+                sum += through * medium.source(Vec3::ZERO) / medium.pdf_emitted(&segment, t) as f32;
+                below += u32::from(t < middle);
+            }
+            for channel in 0..3 {
+                let (mean, expected) = (sum[channel] / count as f32, emitted[channel]);
+                // No sample is more than the sum of the channels: five standard errors at most.
+                let most = 5.0 * (expected * 3.0 * emitted.mean() / count as f32).sqrt();
+                assert!((mean - expected).abs() <= most + 1e-3 * expected, "{mean} of {expected}, {length}");
+            }
+            let part = integrate_towards_zero(pdf, f64::from(middle - 2.0));
+            let error = (part * (1.0 - part) / f64::from(count)).sqrt();
+            let found = f64::from(below) / f64::from(count);
+            assert!(length < 1e-3 || (found - part).abs() < 5.0 * error + 1e-4, "{found} of {part}");
+        }
+    }
+}
+
+#[test]
 fn roulette_follows_the_largest_albedo() {
     let at = |medium: &Homogeneous| medium.continuation(Vec3::ZERO);
     assert!((at(&medium([0.5, 0.1, 0.0], [0.5, 0.4, 0.0])) - 0.8).abs() < 1e-6);

@@ -19,10 +19,12 @@ impl Builder<'_> {
     }
 
     fn homogeneous(&mut self, medium: &Medium) -> Result<Homogeneous, String> {
-        let Medium::Homogeneous { sigma_a, sigma_s, phase, emission } = medium;
+        let Medium::Homogeneous { sigma_a, sigma_s, phase, emission, glow } = medium;
         let phase = self.phase_function(phase)?;
-        let medium = Homogeneous::new(sigma_a.get(), sigma_s.get(), phase);
-        medium.and_then(|medium| medium.with_emission(emission.get())).map_err(|error| error.to_string())
+        Homogeneous::new(sigma_a.get(), sigma_s.get(), phase)
+            .and_then(|medium| medium.with_emission(emission.get()))
+            .and_then(|medium| medium.with_glow(glow.get()))
+            .map_err(|error| error.to_string())
     }
 
     fn phase_function(&mut self, phase: &Phase) -> Result<PhaseFunction, String> {

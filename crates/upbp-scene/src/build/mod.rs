@@ -16,13 +16,13 @@ use std::path::Path;
 
 use upbp_accel::SceneGeometry;
 use upbp_estimators::scene::EmitterId;
-use upbp_media::MediumId;
+use upbp_media::{Homogeneous, MediumId};
 
 use self::builder::Builder;
 use self::surfaces::ShapeDraft;
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::SceneError;
-use crate::light::{AreaLight, Light};
+use crate::light::{AreaLight, Light, VolumeLight};
 use crate::scene::{Body, ReadyScene, Surface};
 
 impl ReadyScene {
@@ -118,6 +118,7 @@ impl Builder<'_> {
         let bounds = extent::bounds(&drafts, &lights, &camera);
         let bodies = bodies::rank(&drafts);
         let surfaces = self.records(&drafts, &bodies, &mut lights);
+        lights.extend(volume_lights(&drafts, &bodies, &media, bounds.radius));
         let geometry = SceneGeometry::build(drafts.into_iter().map(|draft| draft.shape).collect());
         let geometry = geometry.map_err(|error| self.problem("shapes", error)).ok()?;
         let (hash, files) = (self.hash.0, std::mem::take(&mut self.files));
@@ -156,4 +157,18 @@ impl Builder<'_> {
         }
         surfaces
     }
+}
+
+/// The bodies whose medium emits, as far as light sub-paths can start there.
+fn volume_lights(
+    drafts: &[ShapeDraft],
+    bodies: &[Body],
+    media: &[Homogeneous],
+    scene_radius: f32,
+) -> impl Iterator<Item = Light> {
+    bodies.iter().filter_map(move |Body { shape, interior, .. }| {
+        let medium = media.get(interior.medium?.0 as usize)?.clone();
+        let shape = &drafts.get(shape.0 as usize)?.shape;
+        Some(Light::Volume(VolumeLight::new(interior.body, shape, medium, scene_radius)?))
+    })
 }

@@ -25,6 +25,10 @@ pub enum Medium {
         /// Radiance of an opaque stretch of the medium if it did not scatter, W m⁻² sr⁻¹.
         #[serde(default, skip_serializing_if = "is_default")]
         emission: Colour,
+        /// Radiance per length that the medium emits whether or not it absorbs, W m⁻² sr⁻¹ per scene unit,
+        /// on top of `emission`.
+        #[serde(default, skip_serializing_if = "is_default")]
+        glow: Colour,
     },
 }
 

@@ -11,6 +11,7 @@ mod image;
 mod infinite;
 mod point;
 mod spot;
+mod volume;
 
 use glam::Vec3;
 use upbp_estimators::scene::{
@@ -24,6 +25,7 @@ pub use self::directional::DirectionalLight;
 pub use self::image::{EnvironmentImage, EnvironmentImageError, ImageEnvironment};
 pub use self::point::PointLight;
 pub use self::spot::{SpotCone, SpotLight};
+pub use self::volume::VolumeLight;
 
 /// A light of a ready-made scene.
 #[derive(Clone, Debug)]
@@ -40,15 +42,18 @@ pub enum Light {
     Constant(ConstantEnvironment),
     /// Light from all directions, by an image.
     Image(ImageEnvironment),
+    /// The inside of a body that emits.
+    Volume(VolumeLight),
 }
 
 impl Light {
-    /// Moves a point or spot light. A surface that shines is made of a shape that has been moved already.
+    /// Moves a point or spot light. A surface or volume that shines is made of a shape that has been moved
+    /// already.
     pub(crate) fn translate(&mut self, by: Vec3) {
         match self {
             Self::Point(light) => light.position += by,
             Self::Spot(light) => light.position += by,
-            Self::Area(_) | Self::Directional(_) | Self::Constant(_) | Self::Image(_) => {}
+            Self::Area(_) | Self::Directional(_) | Self::Constant(_) | Self::Image(_) | Self::Volume(_) => {}
         }
     }
 }
@@ -62,6 +67,7 @@ macro_rules! dispatch {
             Light::Directional($light) => $call,
             Light::Constant($light) => $call,
             Light::Image($light) => $call,
+            Light::Volume($light) => $call,
         }
     };
 }
@@ -100,6 +106,10 @@ impl Emitter for Light {
         receiver: Vec3,
     ) -> Option<HitDensities> {
         dispatch!(self, light => light.hit(bounds, point, direction, receiver))
+    }
+
+    fn pdf_passage(&self, point: &EmitterPoint) -> f32 {
+        dispatch!(self, light => light.pdf_passage(point))
     }
 
     fn emission_coordinates(

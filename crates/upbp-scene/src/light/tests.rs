@@ -3,9 +3,9 @@
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
-use upbp_accel::{AxisBox, Quad, Shape, Sphere, TriangleMesh};
+use upbp_accel::{AxisBox, Quad, Shape, ShapeVolume, Sphere, TriangleMesh};
 use upbp_estimators::check::check_emitter;
-use upbp_media::Spectrum;
+use upbp_media::{BodyId, Homogeneous, PhaseFunction, Spectrum};
 
 use super::*;
 
@@ -22,6 +22,12 @@ fn check(light: impl Into<Light>) {
 
 fn area(shape: impl Into<Shape>) -> Light {
     Light::Area(AreaLight::new(shape.into(), Spectrum::new(3.0, 2.0, 1.0)).unwrap())
+}
+
+fn tetrahedron() -> TriangleMesh {
+    let corners =
+        vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].into_iter().map(|corner| corner * 0.3).collect();
+    TriangleMesh::new(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], None).unwrap()
 }
 
 fn spot(beam: f32, cutoff: f32) -> SpotLight {
@@ -49,10 +55,60 @@ fn area_lights_satisfy_the_contract() {
     check(area(Sphere::new(Vec3::new(0.2, 0.5, 0.0), 0.3).unwrap()));
     check(area(Sphere::new(Vec3::new(0.2, 0.5, 0.0), 1e-3).unwrap()));
     check(area(AxisBox::new(Vec3::new(-0.2, 0.6, -0.4), Vec3::new(0.4, 0.9, 0.1)).unwrap()));
-    let corners =
-        vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].into_iter().map(|corner| corner * 0.3).collect();
-    let tetrahedron = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-    check(area(TriangleMesh::new(corners, tetrahedron, None).unwrap()));
+    check(area(tetrahedron()));
+}
+
+fn volume(shape: impl Into<Shape>, sigma_a: Spectrum) -> Light {
+    let medium = Homogeneous::new(sigma_a, Spectrum::splat(0.5), PhaseFunction::Isotropic).unwrap();
+    let medium = medium.with_glow(Spectrum::new(3.0, 2.0, 1.0)).unwrap();
+    Light::Volume(VolumeLight::new(BodyId(3), &shape.into(), medium, 4.0).unwrap())
+}
+
+#[test]
+fn volumes_satisfy_the_contract() {
+    let near = Sphere::new(Vec3::new(0.2, 0.5, 0.0), 0.3).unwrap();
+    for sigma_a in [Spectrum::ZERO, Spectrum::splat(20.0), Spectrum::new(100.0, 1.0, 0.0)] {
+        // The last receiver is inside.
+        check(volume(near, sigma_a));
+        check(volume(Sphere::new(Vec3::new(0.2, 0.5, 0.0), 1e-3).unwrap(), sigma_a));
+        check(volume(AxisBox::new(Vec3::new(-0.2, 0.6, -0.4), Vec3::new(0.4, 0.9, 0.1)).unwrap(), sigma_a));
+        check(volume(tetrahedron(), sigma_a));
+    }
+}
+
+#[test]
+fn the_density_of_next_events_to_a_sphere_integrates_to_one() {
+    let sphere = Sphere::new(Vec3::new(0.2, 0.5, 0.0), 0.3).unwrap();
+    let inside = ShapeVolume::new(&sphere.into()).unwrap();
+    for sigma_a in [0.0, 5.0, 60.0] {
+        let light = volume(sphere, Spectrum::new(sigma_a, 0.5 * sigma_a, 0.0));
+        for receiver in [Vec3::new(2.0, 0.0, 1.0), Vec3::new(0.2, 0.85, 0.0), Vec3::new(0.25, 0.4, 0.1)] {
+            let steps = 100;
+            let mut sum = 0.0;
+            for i in 0..steps * steps * steps {
+                let at = |i: i32| (f64::from(i % steps) + 0.5) / f64::from(steps);
+                let position = inside.sample([at(i), at(i / steps), at(i / steps / steps)]);
+                let direction = (receiver - position).normalize();
+                let point = EmitterPoint { position, normal: direction };
+                let pdf = light.hit(&BOUNDS, &point, direction, receiver).unwrap().pdf_incident;
+                sum += f64::from(pdf) / inside.pdf() / f64::from(steps).powi(3);
+            }
+            assert!((sum - 1.0).abs() < 0.02, "{sigma_a}, {receiver}: {sum}");
+        }
+    }
+}
+
+#[test]
+fn what_positions_cannot_tell_apart_is_no_volume_light() {
+    let light = |radius: f32, sigma_a: f32| {
+        let medium = Homogeneous::new(Spectrum::splat(sigma_a), Spectrum::ZERO, PhaseFunction::Isotropic);
+        let medium = medium.unwrap().with_glow(Spectrum::ONE).unwrap();
+        VolumeLight::new(BodyId(0), &Sphere::new(Vec3::ZERO, radius).unwrap().into(), medium, 4.0)
+    };
+    assert!(light(0.5, 0.0).is_some() && light(0.5, 1e3).is_some());
+    assert!(light(0.5, 1e5).is_none(), "too dense");
+    assert!(light(1e-5, 1.0).is_none(), "too small");
+    assert!(light(1e15, 0.0).is_none(), "too large");
 }
 
 #[test]

@@ -68,6 +68,7 @@ enum Light {
     Point,
     Directional,
     Environment,
+    Volume,
 }
 
 /// A path of 1 to `longest` edges whose densities lie between `e^{-spread}` and `e^{spread}`, independent in
@@ -77,7 +78,8 @@ pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
         Just(Light::Area),
         Just(Light::Point),
         Just(Light::Directional),
-        Just(Light::Environment)
+        Just(Light::Environment),
+        Just(Light::Volume),
     ];
     let ends =
         (light, around_one(spread), around_one(spread), around_one(spread), around_one(spread), cosine());
@@ -93,7 +95,8 @@ pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
             scale: 1.0,
         };
         let cos_camera = if matches!(light, Light::Area) { cos } else { 1.0 };
-        let mut vertices = vec![PathVertex { cos_camera, ..end }];
+        let kind = if matches!(light, Light::Volume) { VertexKind::Volume } else { VertexKind::End };
+        let mut vertices = vec![PathVertex { kind, cos_camera, ..end }];
         vertices.extend(steps.iter().map(|step| step.0));
         vertices.push(end);
         let mut edges: Vec<PathEdge> = Vec::new();
@@ -101,7 +104,7 @@ pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
             steps.iter().map(|step| step.1).chain([last]).enumerate()
         {
             let t = |vertex: &PathVertex, stop| match vertex.kind {
-                VertexKind::Medium(_) => stop,
+                VertexKind::Medium(_) | VertexKind::Volume => stop,
                 _ => pass_probability,
             };
             edges.push(PathEdge {

@@ -30,7 +30,7 @@ fn strategies(path: &Path) -> Vec<(Way, u32)> {
             VertexKind::Medium(_) => {
                 ways.extend([(Way::Pp3d(i), 5), (Way::Pb2d(i), 6), (Way::Bp2d(i), 7), (Way::Bb1d(i), 8)]);
             }
-            VertexKind::End | VertexKind::Delta => {}
+            VertexKind::End | VertexKind::Volume | VertexKind::Delta => {}
         }
     }
     ways

@@ -3,7 +3,7 @@
 use upbp_estimators::Technique;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
 use upbp_estimators::mis::{
-    Densities, Edge, EdgeMis, End, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
+    Densities, Edge, EdgeMis, EdgeStart, End, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
 };
 use upbp_estimators::scene::Walk;
 
@@ -26,13 +26,21 @@ fn in_medium(vertex: &PathVertex) -> bool {
     matches!(vertex.kind, VertexKind::Medium(_))
 }
 
+fn start(vertex: &PathVertex) -> EdgeStart {
+    match vertex.kind {
+        VertexKind::Medium(_) => EdgeStart::Medium,
+        VertexKind::Volume => EdgeStart::Volume,
+        VertexKind::End | VertexKind::Surface | VertexKind::Delta => EdgeStart::Surface,
+    }
+}
+
 fn kind(vertex: &PathVertex) -> MergeKind {
     match vertex.kind {
         VertexKind::Surface => MergeKind::Surface { scale: vertex.scale },
         VertexKind::Medium(medium) => {
             MergeKind::Medium { medium, sin_theta: vertex.sin_theta, scale: vertex.scale }
         }
-        VertexKind::End | VertexKind::Delta => MergeKind::None,
+        VertexKind::End | VertexKind::Volume | VertexKind::Delta => MergeKind::None,
     }
 }
 
@@ -57,7 +65,7 @@ fn scatter<D: Densities>(
         kind: kind(vertex),
         distance_factor: vertex_mis.distance_factor,
         connectible: is_ok(vertex),
-        in_medium: in_medium(vertex),
+        start: start(vertex),
     }
 }
 
@@ -66,15 +74,19 @@ impl<'a, D: Densities> Recursion<'a, D> {
         let (k, v) = (path.length(), &path.vertices);
         let nowhere = VertexMis { connect: D::ZERO, below: D::ZERO, distance_factor: 0.0 };
         let mut light = vec![nowhere; k + 1];
+        let hit = match v[0].kind {
+            VertexKind::Volume => path.edges[0].t_camera,
+            _ => f64::from(u8::from(path.hittable)),
+        };
         let mut edge_mis =
-            EdgeMis::at_light(plan, path.hittable, v[0].cos_camera, path.pdf_position, v[0].rho_light);
+            EdgeMis::at_light(plan, start(&v[0]), hit, v[0].cos_camera, path.pdf_position, v[0].rho_light);
         for i in 1..k {
             let e = &path.edges[i - 1];
             let edge = Edge {
                 distance_squared: distance_squared(e),
                 cos_in: v[i].cos_light,
                 forward: e.t_light,
-                backward: e.t_camera,
+                backward: if edge_mis.start == EdgeStart::Volume { 1.0 } else { e.t_camera },
                 pass_probability: e.pass_probability,
                 ends_in_medium: in_medium(&v[i]),
             };

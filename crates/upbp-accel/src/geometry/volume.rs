@@ -1,0 +1,298 @@
+//! The inside of a closed shape, made ready to draw points from it by volume.
+//!
+//! Spheres and boxes are drawn from exactly. A mesh is covered by the cells of a grid that it has a part in,
+//! and points are uniform over these cells: some lie outside of the mesh, and the density is exact.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec3, UVec3, Vec3};
+
+use super::axis_box::AxisBox;
+use super::mesh::TriangleMesh;
+use super::shape::Shape;
+use super::sphere::Sphere;
+
+/// Cells of the grid of a mesh along its longest axis.
+const CELLS: u32 = 32;
+
+/// Part of a cell by which triangles are taken to be larger than they are, so that no rounding loses a cell.
+const MARGIN: f64 = 1e-3;
+
+/// The inside of a closed shape.
+#[derive(Clone, Debug)]
+pub struct ShapeVolume {
+    cover: Cover,
+    volume: f64,
+    pdf: f64,
+}
+
+#[derive(Clone, Debug)]
+enum Cover {
+    Sphere(Sphere),
+    Box(AxisBox),
+    Cells(Cells),
+}
+
+impl ShapeVolume {
+    /// The inside of `shape`; `None` if it is not closed, or encloses nothing.
+    #[must_use]
+    pub fn new(shape: &Shape) -> Option<Self> {
+        let (cover, volume, covered) = match shape {
+            Shape::Sphere(sphere) => {
+                let volume = f64::from(sphere.radius()).powi(3) * (TAU * 2.0 / 3.0);
+                (Cover::Sphere(*sphere), volume, volume)
+            }
+            Shape::Box(axis_box) => {
+                let volume = (axis_box.max().as_dvec3() - axis_box.min().as_dvec3()).element_product();
+                (Cover::Box(*axis_box), volume, volume)
+            }
+            Shape::Mesh(mesh) if mesh.is_closed() => {
+                let cells = Cells::cover(mesh);
+                let covered = cells.size.element_product() * cells.indices.len() as f64;
+                (Cover::Cells(cells), f64::from(mesh.signed_volume()).abs().min(covered), covered)
+            }
+            Shape::Mesh(_) | Shape::Quad(_) => return None,
+        };
+        (volume > 0.0 && covered.is_finite()).then(|| Self { cover, volume, pdf: 1.0 / covered })
+    }
+
+    /// The enclosed volume, cubic scene units.
+    #[must_use]
+    pub const fn volume(&self) -> f64 {
+        self.volume
+    }
+
+    /// The density of [`sample`](Self::sample), per cubic scene unit, at every point inside.
+    #[must_use]
+    pub const fn pdf(&self) -> f64 {
+        self.pdf
+    }
+
+    /// The sphere, if it is one.
+    #[must_use]
+    pub const fn as_sphere(&self) -> Option<&Sphere> {
+        match &self.cover {
+            Cover::Sphere(sphere) => Some(sphere),
+            Cover::Box(_) | Cover::Cells(_) => None,
+        }
+    }
+
+    /// Draws a point, inside of a sphere or a box, inside or near a mesh; `u` is uniform in `[0, 1)³`.
+    #[must_use]
+    pub fn sample(&self, u: [f64; 3]) -> Vec3 {
+        match &self.cover {
+            Cover::Sphere(sphere) => {
+                let y = 1.0 - 2.0 * u[1];
+                let ring = (4.0 * u[1] * (1.0 - u[1])).max(0.0).sqrt();
+                let (sin, cos) = (TAU * u[2]).sin_cos();
+                let offset = DVec3::new(ring * cos, y, ring * sin) * u[0].cbrt();
+                (sphere.centre().as_dvec3() + offset * f64::from(sphere.radius())).as_vec3()
+            }
+            Cover::Box(axis_box) => {
+                let min = axis_box.min().as_dvec3();
+                (min + (axis_box.max().as_dvec3() - min) * DVec3::from(u)).as_vec3()
+            }
+            Cover::Cells(cells) => cells.sample(u),
+        }
+    }
+}
+
+/// Cells of a regular grid.
+#[derive(Clone, Debug)]
+struct Cells {
+    min: DVec3,
+    /// Size of a cell.
+    size: DVec3,
+    /// Number of cells of the grid along each axis.
+    counts: UVec3,
+    /// The cells that count, as places in the grid: x first.
+    indices: Vec<u32>,
+}
+
+impl Cells {
+    /// All cells with a part inside of a closed mesh.
+    fn cover(mesh: &TriangleMesh) -> Self {
+        let (min, max) = mesh.aabb();
+        let (min, max) = (min.as_dvec3(), max.as_dvec3());
+        let extent = max - min;
+        let counts = (extent / extent.max_element() * f64::from(CELLS))
+            .ceil()
+            .clamp(DVec3::ONE, DVec3::splat(f64::from(CELLS)));
+        let size = extent / counts;
+        let mut cells = Self { min, size, counts: counts.as_uvec3(), indices: Vec::new() };
+        let mut state = vec![State::Unknown; cells.counts.element_product() as usize];
+        for triangle in 0..mesh.triangles().len() as u32 {
+            cells.mark(mesh.corners(triangle).map(|corner| corner.as_dvec3() - min), &mut state);
+        }
+        // Cells that no triangle touches hang together, all inside or all outside.
+        for start in 0..state.len() as u32 {
+            if state[start as usize] == State::Unknown {
+                let centre = (min + cells.corner(start) + 0.5 * size).as_vec3();
+                let is_inside = mesh.contains(centre) == Some(true);
+                cells.fill(start, if is_inside { State::Covered } else { State::Outside }, &mut state);
+            }
+        }
+        cells.indices =
+            (0..state.len() as u32).filter(|&index| state[index as usize] == State::Covered).collect();
+        cells
+    }
+
+    fn place(&self, index: u32) -> UVec3 {
+        let UVec3 { x, y, .. } = self.counts;
+        UVec3::new(index % x, index / x % y, index / x / y)
+    }
+
+    fn index(&self, place: UVec3) -> u32 {
+        (place.z * self.counts.y + place.y) * self.counts.x + place.x
+    }
+
+    /// The lower corner of a cell, from that of the grid.
+    fn corner(&self, index: u32) -> DVec3 {
+        self.place(index).as_dvec3() * self.size
+    }
+
+    /// Marks the cells that a triangle may touch: those that its box and its plane meet.
+    fn mark(&self, corners: [DVec3; 3], state: &mut [State]) {
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a);
+        let half = 0.5 * self.size * (1.0 + 2.0 * MARGIN);
+        let reach = normal.abs().dot(half) + 1e-12 * normal.length() * self.size.max_element();
+        let last = (self.counts - 1).as_dvec3();
+        let place =
+            |p: DVec3, margin: f64| (p / self.size + margin).floor().clamp(DVec3::ZERO, last).as_uvec3();
+        let (low, high) = (place(a.min(b).min(c), -MARGIN), place(a.max(b).max(c), MARGIN));
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                for x in low.x..=high.x {
+                    let at = UVec3::new(x, y, z);
+                    let centre = (at.as_dvec3() + 0.5) * self.size;
+                    if normal.dot(centre - a).abs() <= reach {
+                        state[self.index(at) as usize] = State::Covered;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Gives all unknown cells that hang together with `start` the state `to`.
+    fn fill(&self, start: u32, to: State, state: &mut [State]) {
+        let mut waiting = vec![start];
+        state[start as usize] = to;
+        while let Some(index) = waiting.pop() {
+            let place = self.place(index);
+            for step in [UVec3::X, UVec3::Y, UVec3::Z] {
+                let below = place.cmpge(step).all().then(|| place - step);
+                let above = (place + step).cmplt(self.counts).all().then(|| place + step);
+                for next in [below, above].into_iter().flatten().map(|next| self.index(next)) {
+                    if state[next as usize] == State::Unknown {
+                        state[next as usize] = to;
+                        waiting.push(next);
+                    }
+                }
+            }
+        }
+    }
+
+    fn sample(&self, u: [f64; 3]) -> Vec3 {
+        let count = self.indices.len() as f64;
+        // The rest of the random number inside the cell is uniform again.
+        let cell = (u[0] * count).floor().min(count - 1.0);
+        let inside = DVec3::new(u[0] * count - cell, u[1], u[2]).clamp(DVec3::ZERO, DVec3::ONE);
+        (self.min + self.corner(self.indices[cell as usize]) + inside * self.size).as_vec3()
+    }
+}
+
+/// What is known of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Unknown,
+    Covered,
+    Outside,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of a sequence that fills the cube evenly.
+    fn points(count: u32) -> impl Iterator<Item = [f64; 3]> {
+        let step = [0.819_172_513_396_164, 0.671_043_606_703_789, 0.549_700_477_901_970];
+        (0..count).map(move |i| step.map(|step| (0.5 + step * f64::from(i)).fract()))
+    }
+
+    /// A torus-like ring of square cross-section, closed, with a hole: neither convex nor star-shaped.
+    fn ring(segments: u32) -> TriangleMesh {
+        let mut positions = Vec::new();
+        for i in 0..segments {
+            let (sin, cos) = (TAU * f64::from(i) / f64::from(segments)).sin_cos();
+            for [radius, height] in [[1.0, -0.2], [2.0, -0.2], [2.0, 0.3], [1.0, 0.3]] {
+                positions.push(DVec3::new(radius * cos, height, radius * sin).as_vec3());
+            }
+        }
+        let mut triangles = Vec::new();
+        for i in 0..segments {
+            let (here, next) = (4 * i, 4 * ((i + 1) % segments));
+            for side in 0..4 {
+                let other = (side + 1) % 4;
+                let corners = [here + side, here + other, next + other, next + side];
+                triangles
+                    .extend([[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]]);
+            }
+        }
+        TriangleMesh::new(positions, triangles, None).unwrap()
+    }
+
+    /// The part of the points inside a shape tells its volume, and their mean its centre.
+    fn check(shape: &Shape) {
+        let inside = ShapeVolume::new(shape).unwrap();
+        let count = 40_000;
+        let (mut hits, mut sum) = (0.0, DVec3::ZERO);
+        for u in points(count) {
+            let point = inside.sample(u);
+            if shape.contains(point) == Some(true) {
+                hits += 1.0;
+                sum += point.as_dvec3();
+            }
+        }
+        let found = hits / f64::from(count) / inside.pdf();
+        assert!((found / inside.volume() - 1.0).abs() < 0.01, "{shape:?}: {found}, {}", inside.volume());
+        let (min, max) = shape.aabb();
+        let off = (sum / hits - (0.5 * min + 0.5 * max).as_dvec3()).length();
+        assert!(off < 0.01 * f64::from((max - min).length()), "{shape:?}: {off}");
+        assert!(found * inside.pdf() > 0.6, "{shape:?}: {} lost", 1.0 - found * inside.pdf());
+    }
+
+    #[test]
+    fn points_fill_the_inside_evenly() {
+        check(&Sphere::new(Vec3::new(1.0, -2.0, 5.0), 0.3).unwrap().into());
+        check(&AxisBox::new(Vec3::new(-1.0, 2.0, 0.0), Vec3::new(1.0, 2.5, 7.0)).unwrap().into());
+        for segments in [4, 12, 400] {
+            check(&ring(segments).into());
+        }
+    }
+
+    #[test]
+    fn cells_cover_every_point_of_a_mesh() {
+        for segments in [3, 7, 400] {
+            let mesh = ring(segments);
+            let cells = Cells::cover(&mesh);
+            let (min, max) = mesh.aabb();
+            for u in points(20_000) {
+                let point = min + (max - min) * DVec3::from(u).as_vec3();
+                if mesh.contains(point) == Some(true) {
+                    let place = ((point.as_dvec3() - cells.min) / cells.size).floor().as_uvec3();
+                    let index = cells.index(place.min(cells.counts - 1));
+                    assert!(cells.indices.binary_search(&index).is_ok(), "{point}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_encloses_nothing_has_no_volume() {
+        let quad = super::super::Quad::new(Vec3::ZERO, Vec3::X, Vec3::Y).unwrap();
+        assert!(ShapeVolume::new(&quad.into()).is_none());
+        let triangle = TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]], None).unwrap();
+        assert!(ShapeVolume::new(&triangle.into()).is_none());
+    }
+}

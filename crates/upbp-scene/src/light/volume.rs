@@ -1,0 +1,212 @@
+//! The inside of a body that emits: the same radiance per length in all directions.
+//!
+//! Light sub-paths start uniformly by volume. So do next events, except at a sphere: there a direction is
+//! chosen uniformly among those in which the receiver sees it, and a point on that chord by the light that it
+//! sends, so that neither distance nor extinction make the light uneven (`docs/theory.md`, section 2.9).
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+use glam::{DVec3, Vec3};
+use upbp_accel::{Shape, ShapeVolume, Sphere};
+use upbp_estimators::scene::{
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+};
+use upbp_media::{BodyId, Homogeneous, Medium, RaySegment};
+
+use super::finite::direction_and_distance;
+use crate::sampling;
+
+/// Nearer to the centre of a sphere than this many radii (squared), directions are chosen from all.
+const NEAR_SPHERE: f64 = 1.001;
+
+/// Density of a uniform direction, sr⁻¹.
+const PDF_DIRECTION: f32 = 0.25 * FRAC_1_PI;
+
+/// Light gets out of a volume from this part of the radius of the scene at least, or rounding of positions
+/// would decide what it is attenuated by.
+const LEAST_DEPTH: f64 = 3e-5;
+
+/// A body whose medium emits.
+#[derive(Clone, Debug)]
+pub struct VolumeLight {
+    body: BodyId,
+    inside: ShapeVolume,
+    medium: Homogeneous,
+    /// Length of a ray inside from which light gets out, scene units.
+    depth: f64,
+}
+
+impl VolumeLight {
+    /// The light of `body`, which is the inside of `shape` filled with `medium`, in a scene of the given
+    /// radius. `None` if it does not emit, or if positions in single precision cannot tell its points apart.
+    #[must_use]
+    pub fn new(body: BodyId, shape: &Shape, medium: Homogeneous, scene_radius: f32) -> Option<Self> {
+        let inside = ShapeVolume::new(shape).filter(|_| medium.emits())?;
+        let mean_chord = 4.0 * inside.volume() / f64::from(shape.area());
+        let depth = mean_chord.min(f64::from(medium.mean_free_path()));
+        let light = Self { body, inside, medium, depth };
+        let densities = [light.pdf_position(), (1.0 / depth) as f32, light.power_f64() as f32];
+        let is_fit = densities.iter().all(|x| x.is_normal()) && depth > LEAST_DEPTH * f64::from(scene_radius);
+        is_fit.then_some(light)
+    }
+
+    fn power_f64(&self) -> f64 {
+        f64::from(4.0 * PI) * self.inside.volume() * f64::from(self.medium.source(Vec3::ZERO).mean())
+    }
+
+    fn pdf_position(&self) -> f32 {
+        self.inside.pdf() as f32
+    }
+
+    fn sample_point(&self, receiver: Vec3, u: [f32; 2]) -> Option<Vec3> {
+        let Some(sphere) = self.inside.as_sphere() else { return Some(self.inside.sample(three(u))) };
+        let [_, _, u_distance] = three(u);
+        let direction = match cone(sphere, receiver) {
+            Some((axis, height)) => sampling::cone(axis, height, u),
+            None => sampling::sphere(u),
+        };
+        // A ray on the rim of the cone may miss by rounding.
+        let (from, direction) = (receiver.as_dvec3(), direction.as_dvec3().normalize());
+        let [start, end] = chord(sphere, from, direction)?;
+        let t = self.medium.sample_emitted(&stretch(end - start), u_distance as f32)?;
+        Some((from + direction * (start + f64::from(t))).as_vec3())
+    }
+}
+
+/// Three numbers from the two of a start: the third is a hash of both, as are the digits that single precision
+/// leaves out.
+fn three([u, v]: [f32; 2]) -> [f64; 3] {
+    /// Random numbers are multiples of 2⁻²⁴.
+    const LAST_BIT: f64 = 1.0 / 16_777_216.0;
+    // The finaliser of SplitMix64 (Steele et al. 2014).
+    let mut z = (u64::from(u.to_bits()) << 32 | u64::from(v.to_bits())).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^= z >> 31;
+    let part = |shift: u32, bits: u32| (z >> shift & ((1 << bits) - 1)) as f64 / (1_u64 << bits) as f64;
+    [f64::from(u) + part(0, 20) * LAST_BIT, f64::from(v) + part(20, 20) * LAST_BIT, part(40, 24)]
+}
+
+/// The cone of directions in which `receiver` sees a sphere: its axis, and one minus the cosine of its half
+/// angle. `None` if it is inside, or so near that the cone is almost a hemisphere.
+fn cone(sphere: &Sphere, receiver: Vec3) -> Option<(Vec3, f32)> {
+    let to_centre = sphere.centre().as_dvec3() - receiver.as_dvec3();
+    let sin2 = f64::from(sphere.radius()).powi(2) / to_centre.length_squared();
+    if sin2 * NEAR_SPHERE >= 1.0 {
+        return None;
+    }
+    // 1 − cos without cancellation for a small sphere.
+    let height = (sin2 / (1.0 + (1.0 - sin2).sqrt())) as f32;
+    (height > 0.0).then_some((to_centre.try_normalize()?.as_vec3(), height))
+}
+
+/// Distances at which a ray from `from` is in the sphere first and last.
+fn chord(sphere: &Sphere, from: DVec3, direction: DVec3) -> Option<[f64; 2]> {
+    let to_centre = sphere.centre().as_dvec3() - from;
+    let along = to_centre.dot(direction);
+    let across = to_centre - direction * along;
+    let half2 = f64::from(sphere.radius()).powi(2) - across.length_squared();
+    let half = if half2 > 0.0 { half2.sqrt() } else { return None };
+    let [start, end] = [(along - half).max(0.0), along + half];
+    (end > start).then_some([start, end])
+}
+
+/// A ray of that length inside of the medium.
+fn stretch(length: f64) -> RaySegment {
+    RaySegment { origin: Vec3::ZERO, direction: Vec3::Z, start: 0.0, end: length as f32 }
+}
+
+impl Emitter for VolumeLight {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Volume(self.body)
+    }
+
+    fn power(&self, _: &BoundingSphere) -> f32 {
+        self.power_f64() as f32
+    }
+
+    fn sample_emission(
+        &self,
+        _: &BoundingSphere,
+        u_position: [f32; 2],
+        u_direction: [f32; 2],
+    ) -> Option<Emission> {
+        let (position, direction) = (self.inside.sample(three(u_position)), sampling::sphere(u_direction));
+        Some(Emission {
+            point: EmitterPoint { position, normal: direction },
+            direction,
+            radiance: self.medium.source(position),
+            pdf_position: self.pdf_position(),
+            pdf_direction: PDF_DIRECTION,
+        })
+    }
+
+    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
+        let position = self.sample_point(receiver, u)?;
+        let (towards_light, distance) = direction_and_distance(receiver, position)?;
+        let point = EmitterPoint { position, normal: -towards_light };
+        let seen = self.hit(bounds, &point, -towards_light, receiver)?;
+        (seen.pdf_incident > 0.0).then_some(Incident {
+            point,
+            towards_light,
+            distance,
+            radiance: seen.radiance,
+            pdf: seen.pdf_incident,
+            pdf_position: seen.pdf_position,
+            pdf_direction: seen.pdf_direction,
+        })
+    }
+
+    fn hit(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        receiver: Vec3,
+    ) -> Option<HitDensities> {
+        let pdf_position = self.pdf_position();
+        Some(HitDensities {
+            radiance: self.medium.source(point.position),
+            pdf_incident: self.pdf_incident(bounds, point, direction, receiver, pdf_position),
+            pdf_position,
+            pdf_direction: PDF_DIRECTION,
+        })
+    }
+
+    fn pdf_passage(&self, _: &EmitterPoint) -> f32 {
+        (1.0 / self.depth) as f32
+    }
+
+    fn pdf_incident(
+        &self,
+        _: &BoundingSphere,
+        point: &EmitterPoint,
+        _: Vec3,
+        receiver: Vec3,
+        pdf_position: f32,
+    ) -> f32 {
+        let Some(sphere) = self.inside.as_sphere() else { return pdf_position };
+        let (from, to) = (receiver.as_dvec3(), point.position.as_dvec3());
+        let between = to - from;
+        let Some(direction) = between.try_normalize() else { return 0.0 };
+        let Some([start, end]) = chord(sphere, from, direction) else { return 0.0 };
+        let pdf_solid_angle =
+            cone(sphere, receiver).map_or(PDF_DIRECTION, |(_, height)| 1.0 / (TAU * height));
+        let segment = stretch(end - start);
+        let distance = (between.length() - start) as f32;
+        let pdf_distance = self.medium.pdf_emitted(&segment, distance.clamp(0.0, segment.end));
+        // p_volume = p_ω p_t / d².
+        let pdf = f64::from(pdf_solid_angle) * pdf_distance / between.length_squared();
+        if (pdf as f32).is_finite() { pdf as f32 } else { 0.0 }
+    }
+
+    fn emission_coordinates(
+        &self,
+        _: &BoundingSphere,
+        _: &EmitterPoint,
+        direction: Vec3,
+        _: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        Some(EmissionCoordinates { position: None, direction: Some(sampling::sphere_inverse(direction)) })
+    }
+}
