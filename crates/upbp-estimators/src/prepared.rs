@@ -195,6 +195,12 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         self.change(|choice| choice.focus = Some(focus));
     }
 
+    /// Chooses emitters by power, and starts no light sub-path by a guide, as in the beginning.
+    pub fn choose_emitters_by_power(&mut self) {
+        let power = || self.power.clone();
+        self.choice = Arc::new(EmitterChoice { emission: power(), next_event: power(), guides: Vec::new() });
+    }
+
     /// Starts the light sub-paths of some emitters by guides; those that are left out go by themselves. The
     /// guides must not depend on samples that they serve. Without guides there is no
     /// [focus](Self::focus_emission) either.
@@ -315,8 +321,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         self.choice.next_event_probability(self.tree.as_ref(), receiver, emitter)
     }
 
-    /// Leaves volumes that emit to the rays that pass through them: no sub-path begins there any more. Of
-    /// other kinds of emitters none is left out.
+    /// Leaves volumes that emit to the rays that pass through them: no sub-path begins there any more. Other
+    /// kinds of emitters stay; all are chosen by power.
     pub fn leave_out_volumes(&mut self, is_left_out: impl Fn(EmitterId) -> bool) {
         let (out, kept): (Vec<_>, Vec<_>) =
             self.volumes.iter().copied().partition(|&(_, emitter)| is_left_out(emitter));
@@ -324,11 +330,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             return;
         }
         self.volumes = kept;
-        let leave = |selection: &Selection| selection.without(|id| out.iter().any(|&(_, other)| other == id));
-        self.power = leave(&self.power);
-        let EmitterChoice { emission, next_event, guides } = &*self.choice;
-        let (emission, next_event) = (leave(emission), leave(next_event));
-        self.choice = Arc::new(EmitterChoice { emission, next_event, guides: guides.clone() });
+        self.power = self.power.without(|id| out.iter().any(|&(_, other)| other == id));
+        self.choose_emitters_by_power();
     }
 
     /// The emitter that is the volume of a body, if sub-paths begin there.

@@ -8,3 +8,4 @@ mod roulette;
 mod subsets;
 mod traced_weights;
 mod unbounded;
+mod volumes;

@@ -291,8 +291,9 @@ impl Trace {
         };
         let [pdf_position, pdf_direction] = light.source.pdf_emission(&scene.emission_bounds(), cos);
         let pdf_direction = pdf_direction * self.guided(scene, start, outwards, receiver);
+        let is_volume = matches!(light.source, Source::Volume(..));
         let end = PathVertex {
-            kind: VertexKind::End,
+            kind: if is_volume { VertexKind::Volume } else { VertexKind::End },
             rho_light: pdf_direction,
             rho_camera: 0.0,
             cos_light: 1.0,
@@ -329,13 +330,18 @@ impl Trace {
             rho_light: 0.0,
             rho_camera: (film / cos).powi(2) / cos,
             cos_camera: 1.0,
+            kind: VertexKind::End,
             ..end
         });
         let stops = |i: usize| i >= 1 && i < k && self.interior[i - 1].in_medium;
         let edges = passed.iter().enumerate().map(|(i, passed)| PathEdge {
             distance: if infinite && i == 0 { f64::INFINITY } else { (ends[i] - starts[i]).length() },
             t_light: if stops(i + 1) { passed.stop_at_end } else { passed.pass_probability },
-            t_camera: if stops(i) { passed.stop_at_start } else { passed.pass_probability },
+            t_camera: match i {
+                0 if is_volume => Source::pdf_passage(start),
+                _ if stops(i) => passed.stop_at_start,
+                _ => passed.pass_probability,
+            },
             pass_probability: passed.pass_probability,
         });
         let incident = light.source.pdf_incident(start, outwards, receiver);
@@ -344,7 +350,7 @@ impl Trace {
             vertices,
             pdf_position: probability * pdf_position,
             pdf_incident: self.next_event_probability(scene, receiver).unwrap_or(probability) * incident,
-            hittable: matches!(light.source, Source::Area(_) | Source::Environment),
+            hittable: matches!(light.source, Source::Area(_) | Source::Environment | Source::Volume(..)),
         })
     }
 }

@@ -10,7 +10,7 @@ use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{NoObserver, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, LightChunk, Scratch};
-use upbp_estimators::scene::Bsdf;
+use upbp_estimators::scene::{Bsdf, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
@@ -19,7 +19,7 @@ use upbp_estimators::{
 
 use upbp_testing::closed_form::scene::ClosedForm;
 
-const SIZE: u32 = 48;
+pub(crate) const SIZE: u32 = 48;
 
 const ITERATIONS: u64 = 60;
 
@@ -52,7 +52,7 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoice
 }
 
 /// Mean of the film in one iteration.
-fn iteration(scene: &ClosedForm, choices: &IterationChoices) -> f64 {
+fn iteration<S: Scene>(scene: &S, choices: &IterationChoices) -> f64 {
     let world = PreparedScene::new(scene).expect("the scene is in order");
     let plan = IterationPlan::new(scene, choices);
     let context = Context { prepared: &world, plan: &plan };
@@ -79,12 +79,12 @@ fn iteration(scene: &ClosedForm, choices: &IterationChoices) -> f64 {
 }
 
 /// Mean and standard error over the iterations.
-fn mean(scene: &ClosedForm, choices: &IterationChoices) -> (f64, f64) {
+fn mean<S: Scene>(scene: &S, choices: &IterationChoices) -> (f64, f64) {
     mean_of_blocks(scene, choices, 1)
 }
 
 /// Mean and standard error over blocks of `block` iterations.
-fn mean_of_blocks(scene: &ClosedForm, choices: &IterationChoices, block: u64) -> (f64, f64) {
+fn mean_of_blocks<S: Scene>(scene: &S, choices: &IterationChoices, block: u64) -> (f64, f64) {
     let one = |i| iteration(scene, &IterationChoices { iteration: i, ..choices.clone() });
     let mean_of = |first: u64| (first..first + block).map(one).sum::<f64>() / block as f64;
     let values: Vec<f64> = (0..ITERATIONS / block).map(|i| mean_of(block * i)).collect();
@@ -105,9 +105,14 @@ fn agree(camera: Vec3, powers: [f32; 5], lengths: PathLengths, sets: &[&str]) {
     for object in &mut scene.objects {
         object.emitter = object.emitter.filter(|emitter| powers[emitter.0 as usize] > 0.0);
     }
+    agree_in(&scene, lengths, sets);
+}
+
+/// Compares sets of techniques with the first one, in any scene.
+pub(crate) fn agree_in<S: Scene>(scene: &S, lengths: PathLengths, sets: &[&str]) {
     let mut reference = None;
     for (seed, techniques) in sets.iter().enumerate() {
-        let (mean, error) = mean(&scene, &choices(techniques, lengths, 100 + seed as u64));
+        let (mean, error) = mean(scene, &choices(techniques, lengths, 100 + seed as u64));
         let (expected, expected_error) = *reference.get_or_insert((mean, error));
         let sigma = error.hypot(expected_error);
         println!("{techniques:30} {mean:.5} ± {error:.5}, {:+.2} %", 100.0 * (mean / expected - 1.0));
@@ -186,6 +191,20 @@ fn each_technique_beside_hits() {
         "all",
     ];
     agree(OUTSIDE, HITTABLE, lengths, &sets);
+}
+
+#[test]
+fn each_technique_beside_hits_of_volumes() {
+    let lengths = PathLengths { min: 2, max: 6 };
+    for (camera, sets) in [
+        (OUTSIDE, &["hit+nee", "hit", "hit+lt", "hit+connect", "hit+surf", "hit+pp3d", "all"][..]),
+        (IN_FOG, &["hit+nee", "hit", "hit+lt", "hit+pb2d", "hit+bp2d", "hit+bb1d", "bpt", "all"]),
+    ] {
+        let mut scene = ClosedForm::glowing(camera, SIZE);
+        scene.lights[..5].iter_mut().for_each(|light| light.power = 0.0);
+        scene.objects.iter_mut().for_each(|object| object.emitter = None);
+        agree_in(&scene, lengths, sets);
+    }
 }
 
 #[test]

@@ -100,7 +100,7 @@ impl<'a> Auditor<'a> {
         let suffix = |vertices: u32| self.camera_vertices[..vertices as usize].iter().rev().copied();
         let depth = sample.camera_depth;
         let (light, interior, lens, strategy) = match sample.completion {
-            Completion::Emission => unreachable!("no medium of the scene emits"),
+            Completion::Emission => unreachable!("looked at before"),
             Completion::Hit(light) => (light, suffix(depth - 1).collect(), self.lens, Strategy::Hit),
             Completion::Nee { light, camera: (position, interaction) } => {
                 let interior = [joint(position, position, &interaction)].into_iter().chain(suffix(depth - 1));
@@ -143,6 +143,12 @@ impl<'a> Auditor<'a> {
         self.comparisons[technique].seen += 1;
         let found = sample.weight.value();
         assert!((0.0..=1.0 + 1e-6).contains(&found), "{sample:?}");
+        if matches!(sample.completion, Completion::Emission) {
+            // In closed form only where nothing else makes the path.
+            let is_alone = self.camera_vertices.iter().all(|vertex| vertex.delta);
+            assert!(found == 1.0 && is_alone, "{sample:?}");
+            return;
+        }
         let (trace, strategy) = self.trace(sample);
         assert!(self.plan.lengths.contain(trace.length() as u32), "{sample:?}");
         let Ok(path) = trace.rebuild(self.scene, self.plan) else {
@@ -322,6 +328,26 @@ fn all_techniques_with_the_balance_heuristic() {
     for (i, camera) in CAMERAS.into_iter().enumerate() {
         let choices = IterationChoices { light_paths: 24_000, beam_paths: 1000, ..choices() };
         audit(&format!("all techniques, camera {i}"), camera, 96, &choices, 3000);
+    }
+}
+
+#[test]
+fn volumes_that_emit() {
+    for (i, camera) in CAMERAS.into_iter().enumerate() {
+        let mut scene = ClosedForm::glowing(camera, 64);
+        let choices = IterationChoices { light_paths: 16_000, beam_paths: 1000, ..choices() };
+        audit_scene(&format!("volumes beside other lights, camera {i}"), &scene, &choices, 1000);
+        for light in &mut scene.lights[..5] {
+            light.power = 1e-3;
+        }
+        let power = IterationChoices { heuristic: Heuristic::Power, ..choices.clone() };
+        for (name, choices) in [("balance", choices), ("power", power)] {
+            audit_scene(&format!("volumes, {name}, camera {i}"), &scene, &choices, 1000);
+        }
+        scene.guides = guides(&scene);
+        let short = (BeamExtent::Long, BeamExtent::Short);
+        let choices = IterationChoices { photon_beams: short.0, query_beams: short.1, ..self::choices() };
+        audit_scene(&format!("volumes, guided, other beams, camera {i}"), &scene, &choices, 300);
     }
 }
 

@@ -22,6 +22,7 @@
 mod ball;
 mod canonical_variance;
 mod furnace;
+mod glowing_ball;
 mod halfspace;
 mod point_source;
 mod references;

@@ -91,18 +91,31 @@ fn techniques_that_can_make_no_light_are_an_error() {
 }
 
 #[test]
-fn light_of_emitting_media_is_said_to_be_found_by_chance() {
-    let fire = ball("null", Some("fire"));
-    for names in ["auto", "pt", "all", "hit"] {
-        let text = census(&(fire.clone() + POINT), &techniques(names)).expect("a scene with light");
-        assert!(text.contains("media that emit: their light is found by chance only"), "{names}: {text}");
+fn light_of_media_that_camera_sub_paths_alone_find_is_named() {
+    const SEEN: &str = "no light sub-path starts in: their light is found by camera sub-paths alone";
+    let says = |parts: &str, names: &str| census(parts, &techniques(names)).expect("a scene with light");
+    // Nothing to connect.
+    let fire = ball("null", Some("fire")) + POINT;
+    for names in ["auto", "all", "hit"] {
+        assert!(says(&fire, names).contains(SEEN), "{names}: {}", says(&fire, names));
     }
-    let text = census(&(ball("null", Some("fog")) + POINT), &techniques("auto")).expect("a scene with light");
-    assert!(!text.contains("emit:"), "{text}");
-    // Without emission hits it is not found at all.
-    let both =
-        "shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"fire\"),
-        (geometry: Sphere(centre: (2, 0, 0), radius: 0.5), material: \"grey\")],";
-    let text = census(&(both.to_owned() + POINT), &techniques("nee+lt")).expect("a scene with light");
-    assert!(text.contains("their light is not found"), "{text}");
+    let with_floor = |radius: f32, more: &str| {
+        format!(
+            "shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: {radius}), material: \"null\", interior: \"fire\"),
+            (geometry: Quad(origin: (-9, -1.5, -9), edge_u: (0, 0, 18), edge_v: (18, 0, 0)), material: \"grey\")],
+            {more} {POINT}"
+        )
+    };
+    // A spark on a floor is a light, a ball that fills the picture is seen anyway, and so is what is all around.
+    for names in ["auto", "pt", "all", "nee+lt"] {
+        assert!(!says(&with_floor(0.02, ""), names).contains("emit that"), "{names}");
+    }
+    assert!(says(&with_floor(0.02, ""), "hit").contains(SEEN));
+    assert!(says(&with_floor(1e-5, ""), "auto").contains(SEEN), "too small for positions");
+    let around = says(&with_floor(0.02, "outside: \"fire\","), "auto");
+    assert!(around.contains(SEEN), "{around}");
+    // Without emission hits that is not found at all.
+    let around = says(&with_floor(0.02, "outside: \"fire\","), "nee+lt");
+    assert!(around.contains("their light is not found"), "{around}");
+    assert!(!says(&(ball("null", Some("fog")) + POINT), "auto").contains("emit that"));
 }

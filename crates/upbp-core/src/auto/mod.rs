@@ -1,9 +1,9 @@
 //! The choice of the plan of a render (`docs/theory.md`, section 6.2).
 //!
 //! First [techniques](technique_support) are left out that cannot contribute to the picture; this is exact.
-//! Then small runs with random numbers of their own look at the scene: they tell radii and the room that
-//! light sub-paths need ([statistics]), which lights are worth samples ([emitters]), and where on them light
-//! sub-paths should start ([guides]). From these follows the [full plan](full_plan): all techniques, a light
+//! Then small runs with random numbers of their own look at the scene: they tell which emitting media are
+//! worth to be lights ([volumes]), radii and the room that light sub-paths need ([statistics]), which lights
+//! are worth samples ([emitters]), and where on them light sub-paths should start ([guides]). From these follows the [full plan](full_plan): all techniques, a light
 //! sub-path per pixel.
 //!
 //! If techniques are to be chosen, a [pilot render](pilot_render) runs the full plan at a few hundred pixels
@@ -33,6 +33,7 @@ mod search;
 pub(crate) mod statistics;
 pub(crate) mod technique_support;
 mod variance;
+mod volumes;
 
 use upbp_estimators::PreparedScene;
 use upbp_estimators::TechniqueSet;
@@ -78,14 +79,16 @@ pub(crate) fn choose<S: Scene>(
     budget: &mut Budget<'_>,
 ) -> Result<Choice, RenderError> {
     let is_auto = settings.techniques == Techniques::Auto;
-    let support = TechniqueSupport::of(scene, settings, given.as_ref().map(|frozen| &frozen.plan))?;
-    let techniques = support.techniques;
-    let room = Room::of(scene, settings, techniques)?;
-
     budget.step("measuring lights", 0.0)?;
     match &given {
         Some(frozen) => scene.set_emitter_choice(&frozen.emitters)?,
-        None => emitters::choose(scene, settings, techniques, budget)?,
+        None => volumes::choose(scene, settings, settings.techniques.candidates(), budget)?,
+    }
+    let support = TechniqueSupport::of(scene, settings, given.as_ref())?;
+    let techniques = support.techniques;
+    let room = Room::of(scene, settings, techniques)?;
+    if given.is_none() {
+        emitters::choose(scene, settings, techniques, budget)?;
     }
     budget.step("looking around", 0.3)?;
     let allowance = budget.part(TIME_FOR_STATISTICS);
@@ -100,7 +103,7 @@ pub(crate) fn choose<S: Scene>(
             let plan = best_plan(scene, settings, &candidates, budget);
             if !plan.uses_light_paths() {
                 // Next events have to find what light sub-paths would have found.
-                *scene = PreparedScene::new(scene.scene)?;
+                scene.choose_emitters_by_power();
                 emitters::choose(scene, settings, techniques.intersection(TechniqueSet::PT), budget)?;
             }
             plan

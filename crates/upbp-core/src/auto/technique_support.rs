@@ -6,12 +6,12 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use upbp_estimators::scene::{Emitter, EmitterId, Scene};
-use upbp_estimators::{PreparedScene, Technique, TechniqueSet};
+use upbp_estimators::scene::{Emitter, EmitterId, EmitterKind, Scene};
+use upbp_estimators::{MediumId, PreparedScene, Technique, TechniqueSet};
 
 use crate::error::RenderError;
 use crate::media::Medium;
-use crate::plan::Plan;
+use crate::plan::FrozenPlan;
 use crate::settings::Settings;
 
 /// The techniques that remain, and why others do not.
@@ -22,8 +22,8 @@ pub struct TechniqueSupport {
     /// Whether there may be light that only merges find: of a light that cannot be hit, through a specular
     /// surface to a place that is seen through another.
     pub needs_merges: bool,
-    /// Whether media emit, in whose volume no light sub-path starts: that light is found by emission hits
-    /// alone, where camera sub-paths happen to pass.
+    /// Whether media emit in whose volume no light sub-path starts: that light is found by emission hits
+    /// alone, where camera sub-paths pass.
     #[serde(default)]
     pub emitting_media: bool,
     /// One sentence for each reason to leave something out.
@@ -38,7 +38,7 @@ impl TechniqueSupport {
     pub(crate) fn of<S: Scene>(
         scene: &PreparedScene<'_, S>,
         settings: &Settings,
-        given: Option<&Plan>,
+        given: Option<&FrozenPlan>,
     ) -> Result<Self, RenderError> {
         let (chosen, max_length) = (settings.techniques.candidates(), settings.max_length);
         let support = Self::find(scene, chosen, max_length);
@@ -49,7 +49,7 @@ impl TechniqueSupport {
             return Err(RenderError::NoLight { chosen, possible, reasons });
         }
         let techniques = support.techniques;
-        match given.map(|plan| plan.techniques.without(techniques)) {
+        match given.map(|frozen| frozen.plan.techniques.without(techniques)) {
             Some(extra) if !extra.is_empty() => Err(RenderError::Plan { extra, techniques }),
             _ => Ok(support),
         }
@@ -62,7 +62,7 @@ impl TechniqueSupport {
         let mut support = Self {
             techniques: chosen,
             needs_merges: scene.has_specular_surfaces() && !all_hittable,
-            emitting_media: prepared.has_emitting_media(),
+            emitting_media: emits_without_emitter(prepared),
             reasons: Vec::new(),
         };
         let scattering = scene.media().iter().any(Medium::scatters);
@@ -114,6 +114,17 @@ impl TechniqueSupport {
     }
 }
 
+/// Whether a medium emits around everything, in a body whose volume was [left out](super::volumes), or in one
+/// that the host has made no emitter of.
+fn emits_without_emitter<S: Scene>(prepared: &PreparedScene<'_, S>) -> bool {
+    let scene = prepared.scene;
+    let is_volume = |emitter: &&S::Emitter| matches!(emitter.kind(), EmitterKind::Volume(_));
+    let volumes = scene.emitters().iter().filter(is_volume).count();
+    let emits = |medium: MediumId| scene.media().get(medium.0 as usize).is_some_and(Medium::emits);
+    let is_complete = volumes > 0 && prepared.volume_emitters().count() == volumes;
+    prepared.has_emitting_media() && (!is_complete || scene.outside().is_some_and(emits))
+}
+
 impl fmt::Display for TechniqueSupport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "techniques that the scene can use: {}", self.techniques)?;
@@ -122,11 +133,11 @@ impl fmt::Display for TechniqueSupport {
         }
         if self.emitting_media {
             let found = if self.techniques.has(Technique::Hit) {
-                "found by chance only, where camera sub-paths pass through them"
+                "found by camera sub-paths alone, where they pass through"
             } else {
                 "not found, since emission hits are off"
             };
-            write!(f, "; no light sub-path starts in the media that emit: their light is {found}")?;
+            write!(f, "; media emit that no light sub-path starts in: their light is {found}")?;
         }
         Ok(())
     }

@@ -69,7 +69,7 @@ fn emission_at<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let light = edge_trace.stack_in(span, t).top().and_then(|top| prepared.volume_emitter(top.body));
     let seen = light.and_then(|emitter| {
         let light = &prepared.scene.emitters()[emitter.0 as usize];
-        Some((emitter, light.pdf_passage(&point), light.hit(&prepared.bounds, &point, direction, receiver)?))
+        Some((emitter, light.pdf_passage(&point), light.hit(prepared.emission_bounds(), &point, direction, receiver)?))
     });
     let Some((emitter, passage, densities)) = seen else {
         record_hit(edge, Completion::Emission, Weight::alone(Technique::Hit), value, out);
@@ -120,7 +120,7 @@ fn weight_of_hit<S: Scene, D: Densities>(
     let vertex_mis = edge.mis.arrive(mis, Walk::Camera, mis_edge, D::of(Technique::Nee, mis.pow(mis.nee)));
     mis.hit_weight(
         &vertex_mis,
-        f64::from(prepared.next_event_probability(emitter)) * f64::from(densities.pdf_incident),
+        f64::from(prepared.next_event_probability(receiver, emitter)) * f64::from(densities.pdf_incident),
         f64::from(prepared.emission_probability(emitter)) * f64::from(densities.pdf_position),
         f64::from(densities.pdf_direction * prepared.emission_factor(emitter, &point, direction, receiver)),
     )

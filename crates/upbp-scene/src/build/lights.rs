@@ -119,6 +119,14 @@ impl Builder<'_> {
                 }
             }
         }
+        if let Some(outside) = &description.outside
+            && medium_of(outside).is_some_and(is_infinitely_bright)
+        {
+            self.problem(
+                "scene, outside",
+                format!("the medium `{outside}` glows in a channel that it does not attenuate: without an end it is infinitely bright"),
+            );
+        }
         let emits = |name: &String| medium_of(name).is_some_and(Homogeneous::emits);
         let named =
             description.outside.iter().chain(description.shapes.iter().flat_map(|shape| &shape.interior));
@@ -137,6 +145,12 @@ impl Builder<'_> {
 /// Whether no light gets through an infinite length of a medium.
 fn is_closed(medium: &Homogeneous) -> bool {
     medium.extinction().to_array().iter().all(|sigma| *sigma > 0.0)
+}
+
+/// Whether an infinite length of a medium shows infinite radiance.
+fn is_infinitely_bright(medium: &Homogeneous) -> bool {
+    let (source, sigma_t) = (medium.source(Vec3::ZERO), medium.extinction());
+    (0..3).any(|channel| source[channel] > 0.0 && sigma_t[channel] == 0.0)
 }
 
 /// The unit vector along a vector of any length, by way of double precision.

@@ -34,24 +34,25 @@ pub struct VolumeLight {
     medium: Homogeneous,
     /// Length of a ray inside from which light gets out, scene units.
     depth: f64,
+    power: f32,
 }
 
 impl VolumeLight {
     /// The light of `body`, which is the inside of `shape` filled with `medium`, in a scene of the given
-    /// radius. `None` if it does not emit, or if positions in single precision cannot tell its points apart.
+    /// radius. `None` if it does not emit.
+    ///
+    /// Without power, so that it is never chosen, if positions in single precision cannot tell its points
+    /// apart.
     #[must_use]
     pub fn new(body: BodyId, shape: &Shape, medium: Homogeneous, scene_radius: f32) -> Option<Self> {
         let inside = ShapeVolume::new(shape).filter(|_| medium.emits())?;
         let mean_chord = 4.0 * inside.volume() / f64::from(shape.area());
         let depth = mean_chord.min(f64::from(medium.mean_free_path()));
-        let light = Self { body, inside, medium, depth };
-        let densities = [light.pdf_position(), (1.0 / depth) as f32, light.power_f64() as f32];
-        let is_fit = densities.iter().all(|x| x.is_normal()) && depth > LEAST_DEPTH * f64::from(scene_radius);
-        is_fit.then_some(light)
-    }
-
-    fn power_f64(&self) -> f64 {
-        f64::from(4.0 * PI) * self.inside.volume() * f64::from(self.medium.source(Vec3::ZERO).mean())
+        let source = f64::from(medium.source(Vec3::ZERO).mean());
+        let power = (f64::from(4.0 * PI) * inside.volume() * source) as f32;
+        let numbers = [inside.pdf() as f32, (1.0 / depth) as f32, power];
+        let is_fit = numbers.iter().all(|x| x.is_normal()) && depth > LEAST_DEPTH * f64::from(scene_radius);
+        Some(Self { body, inside, medium, depth, power: if is_fit { power } else { 0.0 } })
     }
 
     fn pdf_position(&self) -> f32 {
@@ -122,7 +123,7 @@ impl Emitter for VolumeLight {
     }
 
     fn power(&self, _: &BoundingSphere) -> f32 {
-        self.power_f64() as f32
+        self.power
     }
 
     fn sample_emission(

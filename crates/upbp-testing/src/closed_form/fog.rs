@@ -13,6 +13,8 @@ pub struct Fog {
     pub sigma_s: [f32; 3],
     /// Mean cosine of the scattering angle.
     pub g: f32,
+    /// Radiance that is emitted per length.
+    pub glow: Spectrum,
     phase: PhaseFunction,
 }
 
@@ -26,7 +28,7 @@ impl Fog {
     /// Fog of these coefficients that scatters by Henyey and Greenstein.
     pub fn new(sigma_a: [f32; 3], sigma_s: [f32; 3], g: f32) -> Self {
         let phase = PhaseFunction::henyey_greenstein(g).expect("in range");
-        Self { sigma_a, sigma_s, g, phase }
+        Self { sigma_a, sigma_s, g, glow: Spectrum::ZERO, phase }
     }
 
     /// Extinction coefficients per channel, per unit of length.
@@ -75,6 +77,22 @@ impl Medium for Fog {
 
     fn phase(&self) -> &PhaseFunction {
         &self.phase
+    }
+
+    fn emits(&self) -> bool {
+        !self.glow.is_black()
+    }
+
+    fn emitted(&self, segment: &RaySegment) -> Spectrum {
+        let length = segment.length_f64();
+        let sigma = self.extinction();
+        let emitted =
+            [0, 1, 2].map(|c| f64::from(self.glow[c]) / sigma[c] * -f64::exp_m1(-sigma[c] * length));
+        Spectrum::from_array(emitted.map(|x| x as f32))
+    }
+
+    fn source(&self, _: Vec3) -> Spectrum {
+        self.glow
     }
 
     fn continuation(&self, _: Vec3) -> f32 {

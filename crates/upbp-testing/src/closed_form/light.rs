@@ -3,11 +3,11 @@
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 use glam::{DVec3, Vec3};
-use upbp_estimators::Spectrum;
 use upbp_estimators::scene::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
     HitDensities, Incident,
 };
+use upbp_estimators::{BodyId, Spectrum};
 use upbp_media::orthonormal_basis;
 
 use super::material::cosine_hemisphere;
@@ -33,6 +33,8 @@ pub enum Source {
     Directional(DVec3),
     /// Light from all directions at infinity.
     Environment,
+    /// The inside of a sphere, which is the body of that number.
+    Volume(Shape, u32),
 }
 
 fn uniform_sphere(u: [f32; 2]) -> DVec3 {
@@ -43,6 +45,19 @@ fn uniform_sphere(u: [f32; 2]) -> DVec3 {
 }
 
 impl Source {
+    /// Radiance per length of all volumes.
+    pub const GLOW: Spectrum = Spectrum::new(1.5, 0.8, 0.4);
+
+    /// Density per length with which a passing camera sub-path counts as ending at a point of a volume.
+    pub fn pdf_passage(point: DVec3) -> f64 {
+        1.5 + (3.0 * point.x).sin()
+    }
+
+    /// `p_nee` of a volume at its middle and beyond: uniform in the distance from there.
+    fn pdf_in_sphere(centre: DVec3, radius: f64, point: DVec3) -> f64 {
+        0.25 * FRAC_1_PI / (point.distance_squared(centre) * radius)
+    }
+
     /// Preference of the next events of a receiver for one end of a rectangle, in `[0.2, 0.8]`.
     fn slant(receiver: DVec3) -> f64 {
         0.5 + 0.3 * (3.0 * receiver.x).sin()
@@ -53,6 +68,7 @@ impl Source {
             Self::Area(_) => Spectrum::new(6.0, 5.0, 4.0),
             Self::Point(_) => Spectrum::new(0.6, 0.7, 0.8),
             Self::Directional(_) => Spectrum::splat(0.4),
+            Self::Volume(..) => Self::GLOW,
             Self::Environment => Spectrum::new(0.3, 0.4, 0.6) * (1.0 - 0.5 * direction.y) as f32,
         }
     }
@@ -65,6 +81,10 @@ impl Source {
             Self::Point(_) => [1.0, 0.25 * FRAC_1_PI],
             Self::Directional(_) => [1.0, disc],
             Self::Environment => [0.25 * FRAC_1_PI, disc],
+            Self::Volume(shape, _) => {
+                let Shape::Sphere { radius, .. } = shape else { unreachable!("volumes are spheres") };
+                [0.75 * FRAC_1_PI / radius.powi(3), 0.25 * FRAC_1_PI]
+            }
         }
     }
 
@@ -95,7 +115,7 @@ impl Source {
                 [Some(Shape::coordinates(*corner, edges, point)), Some([x * x + y * y, turn(x, y)])]
             }
             Self::Area(Shape::Sphere { .. }) => return None,
-            Self::Point(_) => [None, Some(sphere)],
+            Self::Point(_) | Self::Volume(..) => [None, Some(sphere)],
             Self::Directional(_) => [Some(disc()?), None],
             Self::Environment => [Some(disc()?), Some(sphere)],
         })
@@ -110,6 +130,7 @@ impl Source {
                 (1.0 + slant * (2.0 * u - 1.0)) / (edges[0].length() * edges[1].length())
             }
             Self::Environment => (1.0 - 0.5 * direction.y) * 0.25 * FRAC_1_PI,
+            Self::Volume(Shape::Sphere { centre, radius }, _) => Self::pdf_in_sphere(*centre, *radius, point),
             _ => 1.0,
         }
     }
@@ -122,6 +143,7 @@ impl Emitter for Light {
             Source::Point(_) => EmitterKind::Point,
             Source::Directional(_) => EmitterKind::Directional,
             Source::Environment => EmitterKind::Environment,
+            Source::Volume(_, body) => EmitterKind::Volume(BodyId(body)),
         }
     }
 
@@ -157,7 +179,14 @@ impl Emitter for Light {
                 let local = cosine_hemisphere(v);
                 (point.as_vec3(), normal, (s * local.x + t * local.y + normal * local.z).normalize())
             }
-            Source::Area(Shape::Sphere { .. }) => return None,
+            Source::Area(Shape::Sphere { .. }) | Source::Volume(Shape::Rectangle { .. }, _) => return None,
+            Source::Volume(Shape::Sphere { centre, radius }, _) => {
+                // The third number is what the first one leaves of its digits.
+                let digits = 4096.0 * f64::from(u[0]);
+                let ball = uniform_sphere([digits.fract() as f32, u[1]]);
+                let distance = radius * ((digits.floor() + 0.5) / 4096.0).cbrt();
+                ((centre + distance * ball).as_vec3(), Vec3::Z, uniform_sphere(v).as_vec3())
+            }
             Source::Point(position) => (position.as_vec3(), Vec3::Z, uniform_sphere(v).as_vec3()),
             Source::Directional(direction) => (disc(direction.as_vec3()), Vec3::Z, direction.as_vec3()),
             Source::Environment => {
@@ -186,7 +215,12 @@ impl Emitter for Light {
                 let point = corner + (x - (1.0 - w)) / (2.0 * w) * edges[0] + f64::from(u[1]) * edges[1];
                 (point, edges[0].cross(edges[1]).normalize(), None)
             }
-            Source::Area(Shape::Sphere { .. }) => return None,
+            Source::Area(Shape::Sphere { .. }) | Source::Volume(Shape::Rectangle { .. }, _) => return None,
+            Source::Volume(Shape::Sphere { centre, radius }, _) => {
+                let digits = 4096.0 * f64::from(u[0]);
+                let ball = uniform_sphere([digits.fract() as f32, u[1]]);
+                (centre + radius * ((digits.floor() + 0.5) / 4096.0) * ball, DVec3::Z, None)
+            }
             Source::Point(position) => (position, DVec3::Z, None),
             Source::Directional(direction) => (from - direction, direction, Some(-direction)),
             Source::Environment => {
@@ -224,7 +258,7 @@ impl Emitter for Light {
         let cos = f64::from(point.normal.dot(direction));
         let shines = match self.source {
             Source::Area(_) => cos > 0.0,
-            Source::Environment => true,
+            Source::Environment | Source::Volume(..) => true,
             _ => false,
         };
         let [pdf_position, pdf_direction] = self.source.pdf_emission(bounds, cos);
@@ -236,6 +270,10 @@ impl Emitter for Light {
             pdf_position: pdf_position as f32,
             pdf_direction: pdf_direction as f32,
         })
+    }
+
+    fn pdf_passage(&self, point: &EmitterPoint) -> f32 {
+        Source::pdf_passage(point.position.as_dvec3()) as f32
     }
 
     fn emission_coordinates(

@@ -134,6 +134,20 @@ impl ClosedForm {
         })
     }
 
+    /// The scene with bodies that emit: the cloud, in part hidden by the dark body, the glass and the lantern.
+    /// Their volumes are the last lights.
+    pub fn glowing(centre: Vec3, size: u32) -> Self {
+        let mut scene = Self::new(centre, size);
+        for object in scene.objects.iter().filter(|object| object.interior.is_some()) {
+            let Some(Interior { body, medium: Some(medium), .. }) = object.interior else { continue };
+            if [1, 3, 4].contains(&body.0) {
+                scene.media[medium.0 as usize].glow = Source::GLOW;
+                scene.lights.push(Light { source: Source::Volume(object.shape, body.0), power: 1.0 });
+            }
+        }
+        scene
+    }
+
     /// The body that counts at a point, by asking every body.
     pub fn body_at(&self, point: DVec3) -> Option<Interior> {
         let around = self.objects.iter().filter(|object| object.shape.contains(point));
