@@ -203,7 +203,7 @@ impl<'a> Ends<'a> {
         let light = Self::arrive(plan, path, Walk::Light, &self.light[0], middle);
         let camera = Self::arrive(plan, path, Walk::Camera, &self.camera, middle);
         let (c_light, c_camera) = (light.distance_factor, camera.distance_factor);
-        let factors = plan.volume_factors(MediumId(0), c_light, c_camera, vertex.sin_theta);
+        let factors = plan.volume_factors(MediumId(0), c_light, c_camera, vertex.sin_theta, vertex.scale);
         let (before_light, before_camera) =
             (light.before(plan, vertex.rho_camera), camera.before(plan, vertex.rho_light));
         Weight::of_merge(factors.bb1d, factors.sum::<f64>(), before_light, before_camera).value()

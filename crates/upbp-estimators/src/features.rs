@@ -1,8 +1,7 @@
 //! Auxiliary features of a pixel, for denoisers and compositing: what the camera sees first.
 //!
 //! The first vertex with a smooth lobe counts, on a surface or in a medium, behind mirrors and through glass.
-//! So do Cycles (its denoising data) and Arnold; Intel's Open Image Denoise asks for albedos in `[0, 1]`, for
-//! normals in `[-1, 1]` of any length, and for a normal of zero where there is no surface.
+//! Intel's Open Image Denoise takes albedos in `[0, 1]`, and normals of any length in `[-1, 1]`.
 
 use glam::Vec3;
 use upbp_media::{Medium, Spectrum};

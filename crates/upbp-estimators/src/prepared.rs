@@ -198,7 +198,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// Chooses emitters by power, and starts no light sub-path by a guide, as in the beginning.
     pub fn choose_emitters_by_power(&mut self) {
         let power = || self.power.clone();
-        self.choice = Arc::new(EmitterChoice { emission: power(), next_event: power(), guides: Vec::new() });
+        let by_power = EmitterChoice { emission: power(), next_event: power(), ..EmitterChoice::default() };
+        self.set(Arc::new(by_power));
     }
 
     /// Starts the light sub-paths of some emitters by guides; those that are left out go by themselves. The

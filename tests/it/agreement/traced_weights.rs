@@ -338,7 +338,7 @@ fn volumes_that_emit() {
         let choices = IterationChoices { light_paths: 16_000, beam_paths: 1000, ..choices() };
         audit_scene(&format!("volumes beside other lights, camera {i}"), &scene, &choices, 1000);
         for light in &mut scene.lights[..5] {
-            light.power = 1e-3;
+            light.power = 0.1;
         }
         let power = IterationChoices { heuristic: Heuristic::Power, ..choices.clone() };
         for (name, choices) in [("balance", choices), ("power", power)] {

@@ -1,7 +1,7 @@
 //! The light of a glowing ball on a floor, through air that absorbs: paths of two edges on a fixed ray.
 //!
-//! The ball does not scatter, so that what a point of the floor receives is an integral over the cone in which
-//! it sees the ball: of the chord's emission, attenuated on the way.
+//! The ball does not scatter, so that what a point of the floor receives is an integral over the cone in
+//! which it sees the ball: of the chord's emission, attenuated on the way.
 
 use std::f64::consts::TAU;
 
@@ -84,8 +84,8 @@ fn the_light_of_a_glowing_ball_on_a_floor() {
             let (result, _) = render(&scene, &settings, 60);
             let name = format!("radius {radius}, sigma_a {sigma_a}, at {x}: {techniques}");
             table.check(&name, result, expected, 2e-4 * expected);
-            // A fifth of a per cent from a million samples at most, but for hits alone.
-            assert!(techniques == "hit" || result.error < 2e-3 * expected, "{name}: {result:?}");
+            // From 15 360 samples.
+            assert!(techniques == "hit" || result.error < 5e-3 * expected, "{name}: {result:?}");
         }
     }
     table.finish();

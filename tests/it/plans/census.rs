@@ -106,7 +106,7 @@ fn light_of_media_that_camera_sub_paths_alone_find_is_named() {
             {more} {POINT}"
         )
     };
-    // A spark on a floor is a light, a ball that fills the picture is seen anyway, and so is what is all around.
+    // A spark on a floor is a light; what is all around is seen by camera sub-paths alone.
     for names in ["auto", "pt", "all", "nee+lt"] {
         assert!(!says(&with_floor(0.02, ""), names).contains("emit that"), "{names}");
     }

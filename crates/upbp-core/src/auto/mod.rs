@@ -3,8 +3,8 @@
 //! First [techniques](technique_support) are left out that cannot contribute to the picture; this is exact.
 //! Then small runs with random numbers of their own look at the scene: they tell which emitting media are
 //! worth to be lights ([volumes]), radii and the room that light sub-paths need ([statistics]), which lights
-//! are worth samples ([emitters]), and where on them light sub-paths should start ([guides]). From these follows the [full plan](full_plan): all techniques, a light
-//! sub-path per pixel.
+//! are worth samples ([emitters]), and where on them light sub-paths should start ([guides]). From these
+//! follows the [full plan](full_plan): all techniques, a light sub-path per pixel.
 //!
 //! If techniques are to be chosen, a [pilot render](pilot_render) runs the full plan at a few hundred pixels
 //! and writes down every sample with the density of each technique there. From it follow the [variance] and

@@ -1,9 +1,9 @@
 //! The emitting volumes that sub-paths begin at.
 //!
-//! Light sub-paths and next events to a volume pay where camera sub-paths seldom pass through it: a flame in a
-//! large room. A volume that fills the picture is found by camera sub-paths anyway, in closed form, and is
-//! left to them: its emission then costs what it always did. So a small run with hits and next events compares
-//! the variance that the light of each volume has with that of hits alone, on the same sub-paths
+//! Light sub-paths and next events to a volume pay where camera sub-paths seldom pass through it: a flame in
+//! a large room. A volume that fills the picture is found by camera sub-paths anyway, in closed form, and is
+//! left to them: its emission then costs what it always did. So a small run with hits and next events
+//! compares the variance that the light of each volume has with that of hits alone, on the same sub-paths
 //! (`docs/theory.md`, section 6.12).
 
 use upbp_estimators::observer::{Completion, DynObserver, ObservedSample, Observer};
@@ -30,8 +30,8 @@ const PASSES: u32 = 2;
 const BLOCKS: u32 = 8;
 /// Part of the mean radiance of the picture that is added to that of a block, so that a black one has no say.
 const DARK: f64 = 0.1;
-/// The variance of hits alone, relative to that with next events, up to which a volume is left to hits: a next
-/// event costs as much as a step of the walk.
+/// The variance of hits alone, relative to that with next events, up to which a volume is left to hits: a
+/// next event costs as much as a step of the walk.
 const GAIN: f64 = 2.0;
 /// Camera sub-paths that must have met a volume, or nothing is known of the variance of hits.
 const FEW: f64 = 64.0;

@@ -17,8 +17,8 @@ pub struct FeatureImages {
     /// Normal in world space, with coordinates in `[-1, 1]`: zero in media and where nothing is, shorter than
     /// one where there are several.
     pub normal: Image,
-    /// Length of the way from the lens of the samples that see something, row by row, in scene units; infinite
-    /// where none does.
+    /// Length of the way from the lens of the samples that see something, row by row, in scene units.
+    /// Infinite where none does.
     pub depth: Vec<f32>,
 }
 

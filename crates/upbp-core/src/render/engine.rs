@@ -35,8 +35,8 @@ pub(crate) trait Engine: Send + Sync {
         halt: &Halt<'_>,
     ) -> Option<LightDone>;
 
-    /// The camera sub-paths of the pixels of some sets, added to the buffers. Light sub-paths come first. `None`
-    /// if it was halted: then the pixels of these sets mean nothing.
+    /// The camera sub-paths of the pixels of some sets, added to the buffers. Light sub-paths come first.
+    /// `None` if it was halted: then the pixels of these sets mean nothing.
     fn trace_camera(
         &self,
         plan: &IterationPlan,

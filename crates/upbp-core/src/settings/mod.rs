@@ -62,8 +62,8 @@ pub struct Settings {
     pub radii: Radii,
     /// Whether radii shrink, so that the result converges.
     pub progressive: bool,
-    /// Whether the film has [albedo, normal and depth](crate::FeatureImages) besides the picture, for denoisers
-    /// and compositing.
+    /// Whether the film has [albedo, normal and depth](crate::FeatureImages) besides the picture, for
+    /// denoisers and compositing.
     pub features: bool,
     /// Memory for light vertices, beams, look-up structures and the film, MiB; `None` for half of what the
     /// machine has free. If choices are [deterministic](Self::deterministic), light vertices, beams and

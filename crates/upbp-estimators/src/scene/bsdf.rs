@@ -98,8 +98,8 @@ pub trait Bsdf: Copy + Send + Sync {
         1.0
     }
 
-    /// Share of the light from `from` that is scattered, by channel in `[0, 1]`: for denoisers, no estimate of
-    /// light depends on it. By default grey, the probability to continue.
+    /// Share of the light from `from` that is scattered, by channel in `[0, 1]`: for denoisers. No estimate
+    /// of light depends on it. By default grey, the probability to continue.
     fn albedo(&self, from: Vec3) -> Spectrum {
         Spectrum::splat(self.continuation(from))
     }

@@ -213,8 +213,8 @@ pub trait Emitter: Send + Sync {
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident>;
 
     /// Radiance and densities for a path from `point` (on a surface that carries this emitter, or in its
-    /// volume; for an environment only `direction` counts) in `direction`, the direction of the light, to `receiver`. `None`
-    /// for lights that cannot be hit, and on a side that does not shine.
+    /// volume; for an environment only `direction` counts) in `direction`, the direction of the light, to
+    /// `receiver`. `None` for lights that cannot be hit, and on a side that does not shine.
     fn hit(
         &self,
         bounds: &BoundingSphere,

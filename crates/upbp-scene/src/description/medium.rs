@@ -40,8 +40,8 @@ pub enum Phase {
     Isotropic,
     /// Rayleigh scattering, by particles much smaller than the wavelength.
     Rayleigh,
-    /// The function of Henyey and Greenstein, by its mean cosine, which may differ between the channels: above
-    /// 0 forward, below 0 backward.
+    /// The function of Henyey and Greenstein, by its mean cosine: above 0 forward, below 0 backward. It may
+    /// differ between the channels.
     #[serde(deserialize_with = "single::asymmetries")]
     HenyeyGreenstein(Asymmetries),
     /// Two lobes of Henyey and Greenstein.

@@ -74,8 +74,8 @@ impl VolumeLight {
     }
 }
 
-/// Three numbers from the two of a start: the third is a hash of both, as are the digits that single precision
-/// leaves out.
+/// Three numbers from the two of a start: the third is a hash of both, as are the digits that single
+/// precision leaves out.
 fn three([u, v]: [f32; 2]) -> [f64; 3] {
     /// Random numbers are multiples of 2⁻²⁴.
     const LAST_BIT: f64 = 1.0 / 16_777_216.0;

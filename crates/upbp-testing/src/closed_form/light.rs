@@ -160,7 +160,14 @@ impl Emitter for Light {
                 Some(EmitterBounds { axis, cos_normals: 1.0, ..EmitterBounds::all_around(min, max) })
             }
             Source::Point(point) => Some(EmitterBounds::all_around(point.as_vec3(), point.as_vec3())),
-            Source::Area(Shape::Sphere { .. }) | Source::Directional(_) | Source::Environment => None,
+            Source::Volume(Shape::Sphere { centre, radius }, _) => {
+                let [min, max] = [-radius, radius].map(|r| (centre + DVec3::splat(r)).as_vec3());
+                Some(EmitterBounds::all_around(min, max))
+            }
+            Source::Area(Shape::Sphere { .. })
+            | Source::Volume(Shape::Rectangle { .. }, _)
+            | Source::Directional(_)
+            | Source::Environment => None,
         }
     }
 

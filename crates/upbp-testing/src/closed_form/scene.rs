@@ -134,8 +134,8 @@ impl ClosedForm {
         })
     }
 
-    /// The scene with bodies that emit: the cloud, in part hidden by the dark body, the glass and the lantern.
-    /// Their volumes are the last lights.
+    /// The scene with bodies that emit: the cloud, in part hidden by the dark body, the glass and the
+    /// lantern. Their volumes are the last lights.
     pub fn glowing(centre: Vec3, size: u32) -> Self {
         let mut scene = Self::new(centre, size);
         for object in scene.objects.iter().filter(|object| object.interior.is_some()) {
