@@ -151,12 +151,10 @@ impl Cells {
         self.place(index).as_dvec3() * self.size
     }
 
-    /// Marks the cells that a triangle may touch: those that its box and its plane meet.
+    /// Marks the cells that a triangle touches, or almost.
     fn mark(&self, corners: [DVec3; 3], state: &mut [State]) {
         let [a, b, c] = corners;
-        let normal = (b - a).cross(c - a);
         let half = 0.5 * self.size * (1.0 + 2.0 * MARGIN);
-        let reach = normal.abs().dot(half) + 1e-12 * normal.length() * self.size.max_element();
         let last = (self.counts - 1).as_dvec3();
         let place =
             |p: DVec3, margin: f64| (p / self.size + margin).floor().clamp(DVec3::ZERO, last).as_uvec3();
@@ -166,7 +164,7 @@ impl Cells {
                 for x in low.x..=high.x {
                     let at = UVec3::new(x, y, z);
                     let centre = (at.as_dvec3() + 0.5) * self.size;
-                    if normal.dot(centre - a).abs() <= reach {
+                    if touches(corners.map(|corner| corner - centre), half) {
                         state[self.index(at) as usize] = State::Covered;
                     }
                 }
@@ -200,6 +198,20 @@ impl Cells {
         let inside = DVec3::new(u[0] * count - cell, u[1], u[2]).clamp(DVec3::ZERO, DVec3::ONE);
         (self.min + self.corner(self.indices[cell as usize]) + inside * self.size).as_vec3()
     }
+}
+
+/// Whether a triangle touches the box of the given half size around the origin, if their own boxes do: no
+/// plane across its normal, or across an edge of both, lies between them (Akenine-Möller 2001).
+fn touches(corners: [DVec3; 3], half: DVec3) -> bool {
+    let [a, b, c] = corners;
+    let edges = [b - a, c - b, a - c];
+    let is_between = |across: DVec3| {
+        let [p, q, r] = corners.map(|corner| across.dot(corner));
+        let reach = across.abs().dot(half);
+        p.min(q).min(r) > reach || p.max(q).max(r) < -reach
+    };
+    let mut across = edges.iter().flat_map(|edge| DVec3::AXES.map(|axis| edge.cross(axis)));
+    !is_between(edges[0].cross(edges[1])) && !across.any(is_between)
 }
 
 /// What is known of a cell.

@@ -88,8 +88,8 @@ fn the_density_of_next_events_to_a_sphere_integrates_to_one() {
             let (nearest, farthest) = (0.0, sphere.centre().distance(receiver) + 0.3);
             let step = (farthest - nearest) / distances as f32;
             let axis = (sphere.centre() - receiver).normalize();
-            let sees_all = sphere.centre().distance(receiver) < 0.4;
-            let height = if sees_all { 2.0 } else { 1.0 - 0.3_f32.hypot(0.3).cos() };
+            let sine = 0.3 / sphere.centre().distance(receiver);
+            let height = if sine > 1.0 { 2.0 } else { 1.0 - (1.0 - sine * sine).sqrt() };
             let mut sum = 0.0;
             for i in 0..directions * directions {
                 let at = |i: i32| ((i % directions) as f32 + 0.5) / directions as f32;
