@@ -21,7 +21,7 @@ const MOST_REGIONS: usize = 256;
 /// Deepest nesting of regions.
 const MOST_DEPTH: u32 = 32;
 /// Regions blend over this part of half a region, on both sides of their boundary.
-const BLEND: f32 = 0.25;
+const BLEND: f32 = 0.1;
 /// Samples per cluster from which on what was seen counts more than the tree.
 const TELLING_SAMPLES: f64 = 2.0;
 /// The tree keeps at least this part of the choice.
@@ -155,9 +155,11 @@ impl ReceiverShares {
                 [a + c, b + d]
             }
             Region::Shares(shares) => {
-                let found = shares.binary_search_by_key(&cluster, |&(cluster, _)| cluster);
-                let rest = SHARES - shares.iter().map(|&(_, share)| share).sum::<u16>();
-                let own = found.map_or(0, |place| shares[place].1);
+                let (mut own, mut rest) = (0, SHARES);
+                for &(other, share) in shares {
+                    rest -= share;
+                    own += if other == cluster { share } else { 0 };
+                }
                 [own, rest].map(|share| f64::from(share) / f64::from(SHARES))
             }
         }
