@@ -3,6 +3,7 @@
 
 #[cfg(feature = "geometry")]
 mod geometry;
+mod lanes;
 mod lookup;
 mod ray;
 

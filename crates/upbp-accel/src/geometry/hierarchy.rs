@@ -1,222 +1,235 @@
-//! The hierarchy over a scene's primitives: built by obvhs, walked here.
-//!
-//! The library's own traversal ignores `t_min` and misses boxes without thickness when a ray lies in their
-//! plane; its builder degenerates to a list when many boxes share a centre. So such boxes are grouped before
-//! the build, and the nodes are copied into a form with its own slab test.
+//! The hierarchy of boxes over blocks of primitives, eight to a node, and the walk of a ray through it.
 
-use std::ops::{ControlFlow, Range};
-use std::time::Duration;
+use std::ops::ControlFlow;
 
-use glam::{BVec3A, Vec3, Vec3A};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::{Boundable, BvhBuildParams};
+use glam::Vec3;
 
-use crate::ray::Ray;
+use super::lane_ray::{LaneRay, Planes, SLAB_ROUNDING};
+use crate::lanes::{WIDTH, Wide, set_lanes};
 
-/// Factor on the far distance of a slab: the rounding of a difference, a reciprocal and a product, twice
-/// over.
-const SLAB_MARGIN: f32 = 1.0 + 8.0 * f32::EPSILON;
-
-/// A node with aligned vectors: a slab test is a handful of vector instructions.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    min: Vec3A,
-    max: Vec3A,
-    /// First primitive of a leaf, first of two children otherwise.
-    first: u32,
-    /// Number of primitives; zero for an inner node.
-    count: u32,
+/// Kind of the primitives in a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    Quad,
+    Box,
+    Sphere,
+    Triangle,
 }
 
-/// A binary hierarchy of boxes.
+/// What is below a place in the hierarchy: a node, or a block with a number of primitives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Child(u32);
+
+/// Nodes, and blocks of each kind, that can be indexed.
+pub(super) const MAX_INDEX: usize = 1 << Child::INDEX_BITS;
+
+impl Child {
+    const INDEX_BITS: u32 = 26;
+    const INDEX: u32 = (1 << Self::INDEX_BITS) - 1;
+    const BLOCK: u32 = 1 << 31;
+
+    pub(super) fn node(index: usize) -> Self {
+        Self(index as u32 & Self::INDEX)
+    }
+
+    /// `count` is at least one.
+    pub(super) fn block(kind: Kind, index: usize, count: usize) -> Self {
+        let (kind, count) = (kind as u32, count as u32 - 1);
+        Self(Self::BLOCK | kind << 29 | count << Self::INDEX_BITS | (index as u32 & Self::INDEX))
+    }
+
+    #[inline(always)]
+    const fn index(self) -> usize {
+        (self.0 & Self::INDEX) as usize
+    }
+
+    #[inline(always)]
+    const fn is_block(self) -> bool {
+        self.0 >= Self::BLOCK
+    }
+}
+
+/// A run of up to eight primitives of a kind.
+#[derive(Clone, Copy)]
+pub(super) struct BlockRef {
+    pub(super) kind: Kind,
+    pub(super) index: usize,
+    /// One bit for each primitive.
+    pub(super) used: u32,
+}
+
+impl Child {
+    #[inline(always)]
+    fn as_block(self) -> BlockRef {
+        let kind = match self.0 >> 29 & 3 {
+            0 => Kind::Quad,
+            1 => Kind::Box,
+            2 => Kind::Sphere,
+            _ => Kind::Triangle,
+        };
+        let last = self.0 >> Self::INDEX_BITS & 7;
+        BlockRef { kind, index: self.index(), used: (2 << last) - 1 }
+    }
+}
+
+/// A node with its children's boxes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    pub(super) boxes: Planes,
+    pub(super) children: [Child; WIDTH],
+    /// One bit for each child.
+    pub(super) existing: u32,
+}
+
+impl Node {
+    /// The node above up to eight children with their boxes.
+    pub(super) fn new(below: &[(Child, (Vec3, Vec3))]) -> Self {
+        let mut node = Self {
+            boxes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3],
+            children: [Child::node(0); WIDTH],
+            existing: (1 << below.len()) - 1,
+        };
+        for (lane, &(child, (min, max))) in below.iter().enumerate() {
+            node.children[lane] = child;
+            for axis in 0..3 {
+                (node.boxes[axis][0][lane], node.boxes[axis][1][lane]) = (min[axis], max[axis]);
+            }
+        }
+        node
+    }
+}
+
+/// A hierarchy of boxes with eight children to a node.
 #[derive(Clone, Debug)]
 pub(super) struct Hierarchy {
-    /// Root first; empty without primitives.
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
+    /// Where rays start: the root, or all blocks of a small scene.
+    pub(super) roots: Vec<Child>,
 }
 
-/// Primitives that share a centre: one leaf entry for the builder.
-struct Group {
-    bounds: Aabb,
-    members: Range<usize>,
-}
-
-impl Boundable for Group {
-    fn aabb(&self) -> Aabb {
-        self.bounds
-    }
+/// A test of blocks of primitives. Compiled into the traversal, for the instruction set at hand.
+pub(super) trait Visitor {
+    /// Tests the primitives of a block; may lower the far end of the ray.
+    fn visit<W: Wide>(&mut self, wide: W, ray: &LaneRay<W>, block: BlockRef, t_max: &mut f32) -> ControlFlow<()>;
 }
 
 impl Hierarchy {
-    /// Builds over boxes; also returns the order of the boxes in the leaves.
-    pub(super) fn build(boxes: &[(Vec3, Vec3)]) -> (Self, Vec<u32>) {
-        if boxes.is_empty() {
-            return (Self { nodes: Vec::new() }, Vec::new());
-        }
-        let (members, groups) = group_by_centre(boxes);
-        let built = build_bvh2(&groups, BvhBuildParams::medium_build(), &mut Duration::default());
-        let mut order = Vec::with_capacity(boxes.len());
-        let nodes = built
-            .nodes
-            .iter()
-            .map(|node| {
-                let aabb = node.aabb();
-                let (min, max) = (aabb.min, aabb.max);
-                if !node.is_leaf() {
-                    return Node { min, first: node.first_index, max, count: 0 };
-                }
-                let first = order.len() as u32;
-                let entries = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-                for &group in &built.primitive_indices[entries] {
-                    order.extend_from_slice(&members[groups[group as usize].members.clone()]);
-                }
-                Node { min, first, max, count: order.len() as u32 - first }
-            })
-            .collect();
-        debug_assert_eq!(order.len(), boxes.len());
-        (Self { nodes }, order)
-    }
-
-    /// Calls `leaf` with the ranges of primitives that `ray` may meet, the nearer child of each node first.
-    ///
-    /// The second argument of `leaf` is the far end of the ray, which it may lower.
-    pub(super) fn traverse(
+    /// Shows `visitor` the blocks that `ray` may meet before `t_max`. With `IN_ORDER` the nearer child of each
+    /// node comes first.
+    #[inline(always)]
+    pub(super) fn traverse<const IN_ORDER: bool, W: Wide>(
         &self,
-        ray: &Ray,
-        mut leaf: impl FnMut(Range<usize>, &mut f32) -> ControlFlow<()>,
+        wide: W,
+        ray: &LaneRay<W>,
+        mut t_max: f32,
+        mut visitor: impl Visitor,
     ) {
-        let mut t_max = ray.t_max;
-        let slabs = Slabs::new(ray);
-        let Some(root) = self.nodes.first() else { return };
-        let Some(mut entry) = slabs.entry(root, t_max) else { return };
-        let mut node = root;
+        let mut roots = self.roots.iter();
         let mut stack = Stack::new();
         loop {
-            if entry <= t_max {
-                if node.count > 0 {
-                    let first = node.first as usize;
-                    if leaf(first..first + node.count as usize, &mut t_max).is_break() {
-                        return;
-                    }
+            let next = match stack.pop() {
+                Some(entry) if IN_ORDER && entry.distance() > t_max => continue,
+                Some(entry) => entry.child(),
+                None => match roots.next() {
+                    Some(&root) => root,
+                    None => return,
+                },
+            };
+            if next.is_block() {
+                if visitor.visit(wide, ray, next.as_block(), &mut t_max).is_break() {
+                    return;
+                }
+                continue;
+            }
+            let node = &self.nodes[next.index()];
+            let [near, far] = ray.slabs(wide, &node.boxes, ray.t_min, wide.splat(t_max));
+            let far = wide.mul(far, wide.splat(1.0 + SLAB_ROUNDING));
+            let far = wide.add(far, wide.splat(f32::MIN_POSITIVE));
+            let met = wide.less_equal(near, far) & node.existing;
+            let near = wide.store(near);
+            let first = stack.length;
+            for lane in set_lanes(met) {
+                let entry = Entry::new(near[lane & 7], node.children[lane & 7]);
+                if IN_ORDER {
+                    stack.push_sorted(first, entry);
                 } else {
-                    let (left, right) =
-                        (&self.nodes[node.first as usize], &self.nodes[node.first as usize + 1]);
-                    match (slabs.entry(left, t_max), slabs.entry(right, t_max)) {
-                        (Some(near), Some(far)) if near <= far => {
-                            stack.push((node.first + 1, far));
-                            (node, entry) = (left, near);
-                            continue;
-                        }
-                        (Some(far), Some(near)) => {
-                            stack.push((node.first, far));
-                            (node, entry) = (right, near);
-                            continue;
-                        }
-                        (Some(near), None) => {
-                            (node, entry) = (left, near);
-                            continue;
-                        }
-                        (None, Some(near)) => {
-                            (node, entry) = (right, near);
-                            continue;
-                        }
-                        (None, None) => {}
-                    }
+                    stack.push(entry);
                 }
             }
-            let Some((index, distance)) = stack.pop() else { return };
-            (node, entry) = (&self.nodes[index as usize], distance);
         }
     }
 }
 
-/// Sorts primitives by the centres of their boxes, and groups those with the same centre.
-fn group_by_centre(boxes: &[(Vec3, Vec3)]) -> (Vec<u32>, Vec<Group>) {
-    let centre = |index: u32| {
-        let (min, max) = boxes[index as usize];
-        (min * 0.5 + max * 0.5).to_array().map(f32::to_bits)
-    };
-    let mut members: Vec<u32> = (0..boxes.len() as u32).collect();
-    members.sort_by_cached_key(|&index| centre(index));
-    let mut groups: Vec<Group> = Vec::with_capacity(boxes.len());
-    for (place, &index) in members.iter().enumerate() {
-        let (min, max) = boxes[index as usize];
-        let bounds = Aabb::new(Vec3A::from(min), Vec3A::from(max));
-        match groups.last_mut() {
-            Some(group) if centre(members[group.members.start]) == centre(index) => {
-                group.bounds = group.bounds.union(&bounds);
-                group.members.end = place + 1;
-            }
-            _ => groups.push(Group { bounds, members: place..place + 1 }),
-        }
-    }
-    (members, groups)
-}
+/// A child that waits, and the distance at which the ray enters it: ordered by the distance, as long as that
+/// is not negative.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Entry(u64);
 
-/// A ray, prepared for tests against boxes.
-struct Slabs {
-    origin: Vec3A,
-    inverse: Vec3A,
-    /// Axes along which the direction is negative.
-    negative: BVec3A,
-    t_min: f32,
-}
-
-impl Slabs {
-    fn new(ray: &Ray) -> Self {
-        let inverse = Vec3A::from(ray.direction).recip();
-        let negative = BVec3A::from_array(inverse.to_array().map(f32::is_sign_negative));
-        Self { origin: ray.origin.into(), inverse, negative, t_min: ray.t_min }
+impl Entry {
+    #[inline(always)]
+    fn new(distance: f32, child: Child) -> Self {
+        Self(u64::from(distance.to_bits()) << 32 | u64::from(child.0))
     }
 
-    /// The distance at which the ray enters the box, if that is before `t_max`.
-    ///
-    /// A zero component of the direction gives infinite distances to both planes of its axis, or NaN for a
-    /// plane that holds the origin. The comparisons are written so that a NaN does not constrain: a ray that
-    /// lies in a face, or in a box without thickness, meets it.
-    #[inline]
-    fn entry(&self, node: &Node, t_max: f32) -> Option<f32> {
-        let (near, far) = (Vec3A::splat(self.t_min), Vec3A::splat(t_max));
-        let enter = (Vec3A::select(self.negative, node.max, node.min) - self.origin) * self.inverse;
-        let exit = (Vec3A::select(self.negative, node.min, node.max) - self.origin) * self.inverse;
-        let exit = exit * SLAB_MARGIN;
-        let near = Vec3A::select(enter.cmpgt(near), enter, near).max_element();
-        let far = Vec3A::select(exit.cmplt(far), exit, far).min_element();
-        (near <= far).then_some(near)
+    #[inline(always)]
+    const fn distance(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    #[inline(always)]
+    const fn child(self) -> Child {
+        Child(self.0 as u32)
     }
 }
 
 /// A stack that lives in an array and moves to the heap when a hierarchy is deeper than usual.
-///
-/// Short, because every ray clears it: depth grows with the logarithm of the number of primitives.
 struct Stack {
-    array: [(u32, f32); 24],
+    array: [Entry; Self::SIZE],
     length: usize,
-    spilled: Vec<(u32, f32)>,
+    spilled: Vec<Entry>,
 }
 
 impl Stack {
+    const SIZE: usize = 64;
+
+    #[inline(always)]
     fn new() -> Self {
-        Self { array: [(0, 0.0); 24], length: 0, spilled: Vec::new() }
+        Self { array: [Entry(0); Self::SIZE], length: 0, spilled: Vec::new() }
     }
 
-    #[inline]
-    fn push(&mut self, entry: (u32, f32)) {
-        if self.length < self.array.len() {
-            self.array[self.length] = entry;
+    #[inline(always)]
+    fn push(&mut self, entry: Entry) {
+        if let Some(place) = self.array.get_mut(self.length) {
+            *place = entry;
             self.length += 1;
         } else {
             self.spilled.push(entry);
         }
     }
 
-    #[inline]
-    fn pop(&mut self) -> Option<(u32, f32)> {
+    /// Adds an entry to those from `first`, of which the last is the nearest.
+    #[inline(always)]
+    fn push_sorted(&mut self, first: usize, entry: Entry) {
+        if self.length >= Self::SIZE {
+            self.spilled.push(entry);
+            return;
+        }
+        let mut place = self.length;
+        while place > first && self.array[place - 1] < entry {
+            self.array[place] = self.array[place - 1];
+            place -= 1;
+        }
+        self.array[place] = entry;
+        self.length += 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<Entry> {
         if let Some(entry) = self.spilled.pop() {
             return Some(entry);
         }
         self.length = self.length.checked_sub(1)?;
-        Some(self.array[self.length])
+        Some(self.array[self.length & (Self::SIZE - 1)])
     }
 }

@@ -1,9 +1,14 @@
 //! Surfaces: shapes, meshes, and the hierarchy by which rays find them.
 
+#![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
+
 mod axis_box;
+mod block;
+mod build;
 mod error;
 mod hierarchy;
 mod hit;
+mod lane_ray;
 mod mesh;
 mod primitive;
 mod quad;

@@ -1,121 +1,221 @@
-//! The primitives under the leaves of the hierarchy, and a ray's test against one.
+//! The primitives under the leaves of the hierarchy, and a ray's exact test against one.
 
 use std::ops::ControlFlow;
 
-use glam::Vec3;
-
 use super::axis_box::AxisBox;
+use super::block::{AxisBoxes, Block, Quads, Spheres, TriangleRay, Triangles};
+use super::build::Boxed;
+use super::hierarchy::{BlockRef, Child, Kind};
 use super::hit::{Candidate, ShapeId};
+use super::lane_ray::LaneRay;
 use super::quad::Quad;
 use super::shape::Shape;
 use super::sphere::Sphere;
-use super::triangle::RayShear;
+use crate::lanes::{WIDTH, Wide, set_lanes};
 use crate::ray::Ray;
 
-/// A primitive together with the geometry for its test, so that a leaf is read in one go.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Item {
-    shape: ShapeId,
-    primitive: u32,
-    geometry: Geometry,
+/// The name of a primitive: a shape, and its triangle.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Name {
+    pub(super) shape: u32,
+    pub(super) triangle: u32,
 }
 
-#[derive(Clone, Copy, Debug)]
-enum Geometry {
-    Sphere(Sphere),
-    Quad(Quad),
-    Box(AxisBox),
-    Triangle([Vec3; 3]),
-}
+impl Name {
+    /// All primitives of a list of shapes, in its order.
+    pub(super) fn all(shapes: &[Shape]) -> Vec<Self> {
+        let triangles = |shape: &Shape| if let Shape::Mesh(mesh) = shape { mesh.triangles().len() } else { 1 };
+        let mut names = Vec::with_capacity(shapes.iter().map(triangles).sum());
+        for (shape, index) in shapes.iter().zip(0..) {
+            names.extend((0..triangles(shape) as u32).map(|triangle| Self { shape: index, triangle }));
+        }
+        names
+    }
 
-/// All primitives of a list of shapes, in its order.
-pub(super) fn collect(shapes: &[Shape]) -> Vec<Item> {
-    let mut items = Vec::new();
-    for (index, shape) in shapes.iter().enumerate() {
-        let id = ShapeId(index as u32);
-        let mut push = |primitive, geometry| items.push(Item { shape: id, primitive, geometry });
-        match shape {
-            Shape::Sphere(sphere) => push(0, Geometry::Sphere(*sphere)),
-            Shape::Quad(quad) => push(0, Geometry::Quad(*quad)),
-            Shape::Box(axis_box) => push(0, Geometry::Box(*axis_box)),
+    /// Kind and box of the primitive.
+    pub(super) fn boxed(self, shapes: &[Shape]) -> Boxed {
+        let shape = &shapes[self.shape as usize];
+        let (kind, (min, max)) = match shape {
+            Shape::Sphere(sphere) => (Kind::Sphere, sphere.aabb()),
+            Shape::Quad(quad) => (Kind::Quad, quad.aabb()),
+            Shape::Box(axis_box) => (Kind::Box, axis_box.aabb()),
             Shape::Mesh(mesh) => {
-                for triangle in 0..mesh.triangles().len() as u32 {
-                    push(triangle, Geometry::Triangle(mesh.corners(triangle)));
-                }
+                let [a, b, c] = mesh.corners(self.triangle);
+                (Kind::Triangle, (a.min(b).min(c), a.max(b).max(c)))
             }
-        }
-    }
-    items
-}
-
-impl Item {
-    /// The least and the greatest coordinates.
-    pub(super) fn aabb(&self) -> (Vec3, Vec3) {
-        match &self.geometry {
-            Geometry::Sphere(sphere) => sphere.aabb(),
-            Geometry::Quad(quad) => quad.aabb(),
-            Geometry::Box(axis_box) => axis_box.aabb(),
-            Geometry::Triangle([a, b, c]) => (a.min(*b).min(*c), a.max(*b).max(*c)),
-        }
+        };
+        Boxed { min, max, kind }
     }
 }
 
-/// A ray, prepared for tests against primitives.
-pub(super) struct Probe {
-    origin: Vec3,
-    direction: Vec3,
+/// Blocks of a kind with the names of their primitives.
+#[derive(Clone, Debug)]
+struct Blocks<B> {
+    blocks: Vec<B>,
+    names: Vec<[Name; WIDTH]>,
+}
+
+impl<B: Block> Blocks<B> {
+    const EMPTY: Self = Self { blocks: Vec::new(), names: Vec::new() };
+
+    /// Adds a block of up to eight primitives, returns its place.
+    fn push(&mut self, primitives: impl Iterator<Item = (Name, B::Primitive)>) -> usize {
+        let (mut block, mut names) = (B::EMPTY, [Name::default(); WIDTH]);
+        for (lane, (name, primitive)) in primitives.enumerate() {
+            block.set(lane, primitive);
+            names[lane] = name;
+        }
+        self.blocks.push(block);
+        self.names.push(names);
+        self.blocks.len() - 1
+    }
+}
+
+/// The primitives of a scene, in blocks.
+#[derive(Clone, Debug)]
+pub(super) struct Primitives {
+    triangles: Blocks<Triangles>,
+    quads: Blocks<Quads>,
+    spheres: Blocks<Spheres>,
+    boxes: Blocks<AxisBoxes>,
+}
+
+impl Primitives {
+    pub(super) const EMPTY: Self = Self {
+        triangles: Blocks::EMPTY,
+        quads: Blocks::EMPTY,
+        spheres: Blocks::EMPTY,
+        boxes: Blocks::EMPTY,
+    };
+
+    /// Makes a block of up to eight primitives of a kind.
+    pub(super) fn pack(&mut self, shapes: &[Shape], kind: Kind, names: impl ExactSizeIterator<Item = Name>) -> Child {
+        let count = names.len();
+        let shape = |name: Name| &shapes[name.shape as usize];
+        let index = match kind {
+            Kind::Triangle => self.triangles.push(names.filter_map(|name| match shape(name) {
+                Shape::Mesh(mesh) => Some((name, mesh.corners(name.triangle))),
+                _ => None,
+            })),
+            Kind::Quad => self.quads.push(names.filter_map(|name| match shape(name) {
+                Shape::Quad(quad) => Some((name, *quad)),
+                _ => None,
+            })),
+            Kind::Sphere => self.spheres.push(names.filter_map(|name| match shape(name) {
+                Shape::Sphere(sphere) => Some((name, *sphere)),
+                _ => None,
+            })),
+            Kind::Box => self.boxes.push(names.filter_map(|name| match shape(name) {
+                Shape::Box(axis_box) => Some((name, *axis_box)),
+                _ => None,
+            })),
+        };
+        Child::block(kind, index, count)
+    }
+
+    /// Memory in use, bytes.
+    pub(super) fn memory_bytes(&self) -> usize {
+        fn of<B>(blocks: &Blocks<B>) -> usize {
+            blocks.blocks.capacity() * size_of::<B>() + blocks.names.capacity() * size_of::<[Name; WIDTH]>()
+        }
+        of(&self.triangles) + of(&self.quads) + of(&self.spheres) + of(&self.boxes)
+    }
+}
+
+/// A ray in the forms that the tests of primitives ask for.
+pub(super) struct Probe<'a> {
+    shapes: &'a [Shape],
+    primitives: &'a Primitives,
+    ray: Ray,
     /// `None` in a scene without triangles.
-    shear: Option<RayShear>,
+    triangle_ray: Option<TriangleRay>,
 }
 
-impl Probe {
-    pub(super) fn new(ray: &Ray, triangles: bool) -> Self {
-        let shear = triangles.then(|| RayShear::new(ray.origin, ray.direction));
-        Self { origin: ray.origin, direction: ray.direction, shear }
+impl<'a> Probe<'a> {
+    /// `extent`: the greatest sum of coordinate differences between the ray's origin and any triangle.
+    #[inline(always)]
+    pub(super) fn new(shapes: &'a [Shape], primitives: &'a Primitives, ray: &Ray, extent: f32) -> Self {
+        let triangles = !primitives.triangles.blocks.is_empty();
+        let triangle_ray = triangles.then(|| TriangleRay::new(ray.origin, ray.direction, extent));
+        Self { shapes, primitives, ray: *ray, triangle_ray }
     }
 
-    /// Calls `found` with the intersections of the line and the primitive that lie in the open interval
-    /// `(t_min, t_max)`, where `found` may lower `t_max`.
-    #[inline]
-    pub(super) fn intersect(
+    /// Calls `found` with the intersections of the line and the primitives of a block that lie in the open
+    /// interval `(t_min, t_max)`, where `found` may lower `t_max`.
+    #[inline(always)]
+    pub(super) fn intersect<W: Wide>(
         &self,
-        item: &Item,
-        t_min: f32,
+        wide: W,
+        lanes: &LaneRay<W>,
+        block: BlockRef,
         t_max: &mut f32,
         mut found: impl FnMut(&Candidate, &mut f32) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let mut at = |t: f64, primitive: u32, uv: [f32; 2]| {
+        let Ray { origin, direction, t_min, .. } = self.ray;
+        let mut at = |t: f64, name: Name, primitive: u32, uv: [f32; 2], t_max: &mut f32| {
             let t = t as f32;
             if t > t_min && t < *t_max {
-                found(&Candidate { t, shape: item.shape, primitive, uv }, t_max)
+                found(&Candidate { t, shape: ShapeId(name.shape), primitive, uv }, t_max)
             } else {
                 ControlFlow::Continue(())
             }
         };
-        match &item.geometry {
-            Geometry::Triangle(corners) => {
-                if let Some(hit) = self.shear.as_ref().and_then(|shear| shear.intersect(*corners)) {
-                    at(hit.t, item.primitive, hit.weights)?;
+        let index = block.index;
+        match block.kind {
+            Kind::Triangle => {
+                let Some(ray) = &self.triangle_ray else { return ControlFlow::Continue(()) };
+                let triangles = &self.primitives.triangles.blocks[index];
+                for lane in set_lanes(triangles.may_meet(wide, lanes, ray, *t_max) & block.used) {
+                    if let Some(hit) = ray.shear.intersect(triangles.corners(lane)) {
+                        let name = self.primitives.triangles.names[index][lane];
+                        at(hit.t, name, name.triangle, hit.weights, t_max)?;
+                    }
                 }
             }
-            Geometry::Quad(quad) => {
-                if let Some((t, uv)) = quad.intersect(self.origin, self.direction) {
-                    at(t, 0, uv)?;
+            Kind::Quad => {
+                let quads = &self.primitives.quads;
+                for lane in set_lanes(quads.blocks[index].may_meet(wide, lanes, &(), *t_max) & block.used) {
+                    let name = quads.names[index][lane];
+                    if let Some((t, uv)) = self.quad(name).and_then(|quad| quad.intersect(origin, direction)) {
+                        at(t, name, 0, uv, t_max)?;
+                    }
                 }
             }
-            Geometry::Sphere(sphere) => {
-                if let Some([entry, exit]) = sphere.intersect(self.origin, self.direction) {
-                    at(entry, 0, [0.0; 2])?;
-                    at(exit, 1, [0.0; 2])?;
+            Kind::Sphere => {
+                let spheres = &self.primitives.spheres;
+                for lane in set_lanes(spheres.blocks[index].may_meet(wide, lanes, &(), *t_max) & block.used) {
+                    let name = spheres.names[index][lane];
+                    let sphere = self.sphere(name);
+                    if let Some([entry, exit]) = sphere.and_then(|sphere| sphere.intersect(origin, direction)) {
+                        at(entry, name, 0, [0.0; 2], t_max)?;
+                        at(exit, name, 1, [0.0; 2], t_max)?;
+                    }
                 }
             }
-            Geometry::Box(axis_box) => {
-                if let Some([entry, exit]) = axis_box.intersect(self.origin, self.direction) {
-                    at(entry.0, entry.1, [0.0; 2])?;
-                    at(exit.0, exit.1, [0.0; 2])?;
+            Kind::Box => {
+                let boxes = &self.primitives.boxes;
+                for lane in set_lanes(boxes.blocks[index].may_meet(wide, lanes, &(), *t_max) & block.used) {
+                    let name = boxes.names[index][lane];
+                    let axis_box = self.axis_box(name);
+                    if let Some([entry, exit]) = axis_box.and_then(|b| b.intersect(origin, direction)) {
+                        at(entry.0, name, entry.1, [0.0; 2], t_max)?;
+                        at(exit.0, name, exit.1, [0.0; 2], t_max)?;
+                    }
                 }
             }
         }
         ControlFlow::Continue(())
+    }
+
+    fn quad(&self, name: Name) -> Option<&Quad> {
+        if let Shape::Quad(quad) = &self.shapes[name.shape as usize] { Some(quad) } else { None }
+    }
+
+    fn sphere(&self, name: Name) -> Option<&Sphere> {
+        if let Shape::Sphere(sphere) = &self.shapes[name.shape as usize] { Some(sphere) } else { None }
+    }
+
+    fn axis_box(&self, name: Name) -> Option<&AxisBox> {
+        if let Shape::Box(axis_box) = &self.shapes[name.shape as usize] { Some(axis_box) } else { None }
     }
 }

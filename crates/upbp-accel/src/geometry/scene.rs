@@ -3,46 +3,50 @@
 use std::ops::ControlFlow;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::axis_box::AxisBox;
 use super::error::GeometryError;
-use super::hierarchy::Hierarchy;
+use super::build::build;
+use super::hierarchy::{BlockRef, Hierarchy, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, SurfacePoint, Visit};
-use super::primitive::{self, Item};
+use super::lane_ray::LaneRay;
+use super::primitive::{Name, Primitives, Probe};
 use super::shape::Shape;
 use super::sphere::Sphere;
+use crate::lanes::{Task, Wide, run};
 use crate::ray::Ray;
 
 /// The shapes of a scene, ready for rays.
 #[derive(Clone, Debug)]
 pub struct SceneGeometry {
     shapes: Vec<Shape>,
+    bounds: (Vec3, Vec3),
     hierarchy: Hierarchy,
-    /// Primitives in the order of the hierarchy's leaves.
-    items: Vec<Item>,
-    /// Whether there is any mesh: a ray is prepared for triangles only then.
-    triangles: bool,
+    primitives: Primitives,
 }
 
 impl SceneGeometry {
     /// Builds the hierarchy over all primitives. No shapes at all are allowed.
     pub fn build(shapes: Vec<Shape>) -> Result<Self, GeometryError> {
-        let items = primitive::collect(&shapes);
-        if u32::try_from(items.len()).is_err() || u32::try_from(shapes.len()).is_err() {
-            return Err(GeometryError::TooManyPrimitives { count: items.len().max(shapes.len()) });
+        let names = Name::all(&shapes);
+        if names.len() > MAX_INDEX {
+            return Err(GeometryError::TooManyPrimitives { count: names.len() });
         }
-        let boxes: Vec<(Vec3, Vec3)> = items.iter().map(Item::aabb).collect();
-        let (hierarchy, order) = Hierarchy::build(&boxes);
-        let items = order.iter().map(|&index| items[index as usize]).collect();
-        let triangles = shapes.iter().any(|shape| matches!(shape, Shape::Mesh(_)));
-        Ok(Self { shapes, hierarchy, items, triangles })
+        let boxes: Vec<_> = names.par_iter().with_min_len(1024).map(|name| name.boxed(&shapes)).collect();
+        let mut primitives = Primitives::EMPTY;
+        let hierarchy = build(&boxes, |kind, members| {
+            primitives.pack(&shapes, kind, members.iter().map(|&index| names[index as usize]))
+        });
+        let each = shapes.iter().map(Shape::aabb);
+        let bounds = each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((Vec3::ZERO, Vec3::ZERO));
+        Ok(Self { shapes, bounds, hierarchy, primitives })
     }
 
     /// The least and the greatest coordinates; both zero for an empty scene.
     #[must_use]
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let each = self.shapes.iter().map(Shape::aabb);
-        each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((Vec3::ZERO, Vec3::ZERO))
+        self.bounds
     }
 
     /// A shape.
@@ -65,30 +69,21 @@ impl SceneGeometry {
     ///
     /// Spheres and boxes report where the line enters and where it leaves. The visitor may shorten the ray
     /// or stop.
-    pub fn for_each_hit(&self, ray: Ray, mut visit: impl FnMut(&Candidate) -> Visit) {
-        let probe = primitive::Probe::new(&ray, self.triangles);
-        self.hierarchy.traverse(&ray, |range, t_max| {
-            for item in &self.items[range] {
-                probe.intersect(item, ray.t_min, t_max, |candidate, t_max| {
-                    match visit(candidate) {
-                        Visit::Continue => {}
-                        Visit::ShrinkTo(t) => *t_max = t_max.min(t),
-                        Visit::Stop => return ControlFlow::Break(()),
-                    }
-                    ControlFlow::Continue(())
-                })?;
-            }
-            ControlFlow::Continue(())
-        });
+    pub fn for_each_hit(&self, ray: Ray, visit: impl FnMut(&Candidate) -> Visit) {
+        run(Search::<_, true> { scene: self, ray, visit });
     }
 
-    /// The nearest intersection in `(t_min, t_max)`.
+    /// The nearest intersection in `(t_min, t_max)`; of several at the same distance, that of the earliest
+    /// shape.
     #[must_use]
     pub fn closest(&self, ray: Ray) -> Option<Candidate> {
-        let mut nearest = None;
+        let mut nearest: Option<Candidate> = None;
         self.for_each_hit(ray, |candidate| {
-            nearest = Some(*candidate);
-            Visit::ShrinkTo(candidate.t)
+            let key = |candidate: &Candidate| (candidate.t, candidate.shape, candidate.primitive);
+            if nearest.is_none_or(|nearest| key(candidate) < key(&nearest)) {
+                nearest = Some(*candidate);
+            }
+            Visit::ShrinkTo(candidate.t.next_up())
         });
         nearest
     }
@@ -97,10 +92,11 @@ impl SceneGeometry {
     #[must_use]
     pub fn any(&self, ray: Ray) -> bool {
         let mut found = false;
-        self.for_each_hit(ray, |_| {
+        let visit = |_: &Candidate| {
             found = true;
             Visit::Stop
-        });
+        };
+        run(Search::<_, false> { scene: self, ray, visit });
         found
     }
 
@@ -164,6 +160,44 @@ impl SceneGeometry {
             Shape::Box(axis_box) => axis_box.uv(candidate.primitive, point.position),
             Shape::Quad(_) | Shape::Mesh(_) => candidate.uv,
         }
+    }
+}
+
+/// A walk of a ray through a scene, with the nearer boxes first or in any order.
+struct Search<'a, V, const IN_ORDER: bool> {
+    scene: &'a SceneGeometry,
+    ray: Ray,
+    visit: V,
+}
+
+impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Task for Search<'_, V, IN_ORDER> {
+    #[inline(always)]
+    fn run(self, wide: impl Wide) {
+        let Self { scene, ray, visit } = self;
+        let extent = (scene.bounds.0 - ray.origin).abs().max((scene.bounds.1 - ray.origin).abs()).element_sum();
+        let probe = Probe::new(&scene.shapes, &scene.primitives, &ray, extent);
+        let lanes = LaneRay::new(wide, &ray);
+        scene.hierarchy.traverse::<IN_ORDER, _>(wide, &lanes, ray.t_max, Blocks { probe, visit });
+    }
+}
+
+struct Blocks<'a, V> {
+    probe: Probe<'a>,
+    visit: V,
+}
+
+impl<V: FnMut(&Candidate) -> Visit> Visitor for Blocks<'_, V> {
+    #[inline(always)]
+    fn visit<W: Wide>(&mut self, wide: W, ray: &LaneRay<W>, block: BlockRef, t_max: &mut f32) -> ControlFlow<()> {
+        let Self { probe, visit } = self;
+        probe.intersect(wide, ray, block, t_max, |candidate, t_max| {
+            match visit(candidate) {
+                Visit::Continue => {}
+                Visit::ShrinkTo(t) => *t_max = t_max.min(t),
+                Visit::Stop => return ControlFlow::Break(()),
+            }
+            ControlFlow::Continue(())
+        })
     }
 }
 

@@ -25,6 +25,16 @@ pub(super) struct TriangleHit {
 }
 
 impl RayShear {
+    /// The axes of the sheared space; the last is the one along which the direction is longest.
+    pub(super) fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// Shift of the first two axes per unit along the last.
+    pub(super) fn slope(&self) -> Vec2 {
+        self.slope
+    }
+
     pub(super) fn new(origin: Vec3, direction: Vec3) -> Self {
         let size = direction.abs();
         let z = if size.x > size.y && size.x > size.z {

@@ -8,7 +8,6 @@
 
 mod approach;
 mod boxes;
-mod lanes;
 mod point_tree;
 mod query;
 mod region;

@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::boxes::Rounded;
-use super::lanes::{WIDTH, Wide};
+use crate::lanes::{WIDTH, Wide};
 use super::query::Query;
 use super::region::{Ball, ThickRay};
 use super::sort::Item;

@@ -5,7 +5,7 @@
 //! fetched at the same time.
 
 use super::boxes::Boxes;
-use super::lanes::{Task, WIDTH, Wide, run, set_lanes};
+use crate::lanes::{Task, WIDTH, Wide, run, set_lanes};
 use super::region::Region;
 use super::tree::{MAX_LEVELS, PackedTree};
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::boxes::Boxes;
-use super::lanes::Wide;
+use crate::lanes::Wide;
 use crate::ray::Ray;
 
 /// Rounding of the tests on items, as a multiple of the greatest distance in their computation: an item that

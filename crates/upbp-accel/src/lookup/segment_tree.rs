@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::approach::{ClosestApproach, Segment, closest_approach};
 use super::boxes::Exact;
-use super::lanes::{WIDTH, Wide};
+use crate::lanes::{WIDTH, Wide};
 use super::query::Query;
 use super::region::{Ball, ThickRay};
 use super::sort::Item;

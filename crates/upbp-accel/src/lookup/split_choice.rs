@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use super::approach::Segment;
 use super::boxes::Boxes;
-use super::lanes::Wide;
+use crate::lanes::Wide;
 use super::query::Query;
 use super::region::{Region, ThickRay};
 use super::segment_tree::{Block, SegmentTree};

@@ -9,7 +9,7 @@ use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
 use super::boxes::{Bounds, Boxes, Exact, union};
-use super::lanes::WIDTH;
+use crate::lanes::WIDTH;
 use super::sort::{Buckets, Item, split, split_few};
 
 /// Items of a leaf, of all its blocks.

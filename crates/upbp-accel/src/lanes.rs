@@ -7,15 +7,15 @@
 use pulp::Arch;
 
 /// Numbers in a vector, thus items in a block and children of a node.
-pub(super) const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
 /// Adding this to a number from 0 to itself rounds to a whole one, which the last bits of the sum hold: from
 /// here to twice as much, neighbouring numbers have a distance of one.
-pub(super) const TO_WHOLE: f32 = (1 << 23) as f32;
+pub(crate) const TO_WHOLE: f32 = (1 << 23) as f32;
 
 /// The lanes whose bit is set, in ascending order.
 #[inline(always)]
-pub(super) fn set_lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+pub(crate) fn set_lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
         bits &= bits - 1;
@@ -24,7 +24,7 @@ pub(super) fn set_lanes(mut bits: u32) -> impl Iterator<Item = usize> {
 }
 
 /// The operations on eight numbers. Masks have one bit per lane.
-pub(super) trait Wide: Copy {
+pub(crate) trait Wide: Copy {
     /// Eight numbers.
     type F: Copy;
 
@@ -35,6 +35,10 @@ pub(super) trait Wide: Copy {
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn abs(self, a: Self::F) -> Self::F;
+    fn sqrt(self, a: Self::F) -> Self::F;
+    /// `a`, negated where the sign bit of `by` is set.
+    fn flip_sign(self, a: Self::F, by: Self::F) -> Self::F;
     /// `a > b ? a : b`, thus `b` if either is NaN.
     fn greater_of(self, a: Self::F, b: Self::F) -> Self::F;
     /// `a < b ? a : b`, thus `b` if either is NaN.
@@ -88,13 +92,13 @@ pub(super) trait Wide: Copy {
 }
 
 /// Work that any kind of [`Wide`] can do.
-pub(super) trait Task {
+pub(crate) trait Task {
     fn run(self, wide: impl Wide);
 }
 
 /// Runs a task with the best instructions that this processor has.
 #[inline]
-pub(super) fn run(task: impl Task) {
+pub(crate) fn run(task: impl Task) {
     match Arch::new() {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         Arch::V3(simd) => simd.vectorize(avx2::Vectorised { task, simd }),
@@ -159,6 +163,21 @@ impl Wide for Plain {
     }
 
     #[inline(always)]
+    fn abs(self, a: Self::F) -> Self::F {
+        each(|i| a[i].abs())
+    }
+
+    #[inline(always)]
+    fn sqrt(self, a: Self::F) -> Self::F {
+        each(|i| a[i].sqrt())
+    }
+
+    #[inline(always)]
+    fn flip_sign(self, a: Self::F, by: Self::F) -> Self::F {
+        each(|i| if by[i].is_sign_negative() { -a[i] } else { a[i] })
+    }
+
+    #[inline(always)]
     fn greater_of(self, a: Self::F, b: Self::F) -> Self::F {
         each(|i| if a[i] > b[i] { a[i] } else { b[i] })
     }
@@ -187,9 +206,9 @@ mod avx2 {
     use super::{Task, WIDTH, Wide};
 
     /// A task for AVX2.
-    pub(super) struct Vectorised<T> {
-        pub(super) task: T,
-        pub(super) simd: V3,
+    pub(crate) struct Vectorised<T> {
+        pub(crate) task: T,
+        pub(crate) simd: V3,
     }
 
     impl<T: Task> NullaryFnOnce for Vectorised<T> {
@@ -241,6 +260,22 @@ mod avx2 {
         }
 
         #[inline(always)]
+        fn abs(self, a: f32x8) -> f32x8 {
+            self.abs_f32x8(a)
+        }
+
+        #[inline(always)]
+        fn sqrt(self, a: f32x8) -> f32x8 {
+            self.sqrt_f32x8(a)
+        }
+
+        #[inline(always)]
+        fn flip_sign(self, a: f32x8, by: f32x8) -> f32x8 {
+            let sign = self.avx._mm256_and_ps(cast(by), cast(self.splat_f32x8(-0.0)));
+            cast(self.avx._mm256_xor_ps(cast(a), sign))
+        }
+
+        #[inline(always)]
         fn greater_of(self, a: f32x8, b: f32x8) -> f32x8 {
             self.max_f32x8(a, b)
         }
@@ -284,6 +319,9 @@ mod tests {
                     wide.add(a, b),
                     wide.sub(a, b),
                     wide.mul(a, b),
+                    wide.abs(a),
+                    wide.sqrt(a),
+                    wide.flip_sign(a, b),
                     wide.greater_of(a, b),
                     wide.less_of(a, b),
                 ]

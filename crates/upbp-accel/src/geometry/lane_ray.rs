@@ -1,0 +1,57 @@
+//! A ray, prepared for tests against eight boxes or primitives at once.
+
+use crate::lanes::Wide;
+use crate::ray::Ray;
+
+/// Rounding errors that the tests of primitives allow for, as a multiple of the greatest magnitude in a
+/// computation: three to four times what sums of products of vectors can lose.
+pub(super) const ROUNDING: f32 = 64.0 * f32::EPSILON;
+
+/// Relative error of a slab's distance, twice over: the rounding of a difference, a reciprocal and a product.
+pub(super) const SLAB_ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// A ray in every lane.
+pub(super) struct LaneRay<W: Wide> {
+    pub(super) origin: [W::F; 3],
+    pub(super) direction: [W::F; 3],
+    pub(super) t_min: W::F,
+    inverse: [W::F; 3],
+    /// Axes along which the direction is negative, as 0 or 1.
+    negative: [usize; 3],
+}
+
+/// The least and the greatest coordinates of eight boxes, by axis.
+pub(super) type Planes = [[[f32; crate::lanes::WIDTH]; 2]; 3];
+
+impl<W: Wide> LaneRay<W> {
+    #[inline(always)]
+    pub(super) fn new(wide: W, ray: &Ray) -> Self {
+        let inverse = ray.direction.recip().to_array();
+        Self {
+            origin: wide.splat3(ray.origin.to_array()),
+            direction: wide.splat3(ray.direction.to_array()),
+            t_min: wide.splat(ray.t_min),
+            inverse: wide.splat3(inverse),
+            negative: [inverse[0], inverse[1], inverse[2]].map(|x| usize::from(x.is_sign_negative())),
+        }
+    }
+
+    /// The distances at which the ray enters and leaves each box, or its ends where they are nearer, each with
+    /// an error of [`SLAB_ROUNDING`].
+    ///
+    /// A zero component of the direction gives infinite distances to both planes of its axis, or NaN for a
+    /// plane that holds the origin. The comparisons are written so that a NaN does not constrain: a ray that
+    /// lies in a face, or in a box without thickness, meets it.
+    #[inline(always)]
+    pub(super) fn slabs(&self, wide: W, planes: &Planes, t_min: W::F, t_max: W::F) -> [W::F; 2] {
+        let (mut near, mut far) = (t_min, t_max);
+        for (axis, planes) in planes.iter().enumerate() {
+            let negative = self.negative[axis] & 1;
+            let enter = wide.sub(wide.load(&planes[negative]), self.origin[axis]);
+            let exit = wide.sub(wide.load(&planes[1 - negative]), self.origin[axis]);
+            near = wide.greater_of(wide.mul(enter, self.inverse[axis]), near);
+            far = wide.less_of(wide.mul(exit, self.inverse[axis]), far);
+        }
+        [near, far]
+    }
+}
