@@ -127,35 +127,58 @@ impl Hierarchy {
     ) {
         let mut roots = self.roots.iter();
         let mut stack = Stack::new();
+        let mut next = None;
         loop {
-            let next = match stack.pop() {
-                Some(entry) if IN_ORDER && entry.distance() > t_max => continue,
+            let child = match next.take().or_else(|| stack.pop()) {
+                Some(entry) if entry.distance() > t_max => continue,
                 Some(entry) => entry.child(),
                 None => match roots.next() {
                     Some(&root) => root,
                     None => return,
                 },
             };
-            if next.is_block() {
-                if visitor.visit(wide, ray, next.as_block(), &mut t_max).is_break() {
+            if child.is_block() {
+                if visitor.visit(wide, ray, child.as_block(), &mut t_max).is_break() {
                     return;
                 }
                 continue;
             }
-            let node = &self.nodes[next.index()];
+            let node = &self.nodes[child.index()];
             let [near, far] = ray.slabs(wide, &node.boxes, ray.t_min, wide.splat(t_max));
             let far = wide.mul(far, wide.splat(1.0 + SLAB_ROUNDING));
             let far = wide.add(far, wide.splat(f32::MIN_POSITIVE));
             let met = wide.less_equal(near, far) & node.existing;
             let near = wide.store(near);
-            let first = stack.length;
-            for lane in set_lanes(met) {
-                let entry = Entry::new(near[lane & 7], node.children[lane & 7]);
-                if IN_ORDER {
-                    stack.push_sorted(first, entry);
-                } else {
-                    stack.push(entry);
+            let entry = |lane: usize| Entry::new(near[lane & 7], node.children[lane & 7]);
+            // The nearest one goes on without the stack, and mostly there are no more than two.
+            let rest = met & met.wrapping_sub(1);
+            if met == 0 {
+                continue;
+            }
+            let first = entry(met.trailing_zeros() as usize);
+            if rest == 0 {
+                next = Some(first);
+                continue;
+            }
+            let second = entry(rest.trailing_zeros() as usize);
+            let (nearest, other) = (first.min(second), first.max(second));
+            let rest = rest & (rest - 1);
+            let bottom = stack.length;
+            stack.push(other);
+            next = Some(nearest);
+            if rest != 0 {
+                let mut nearest = nearest;
+                for lane in set_lanes(rest) {
+                    let entry = entry(lane);
+                    let farther = entry.max(nearest);
+                    nearest = entry.min(nearest);
+                    if IN_ORDER {
+                        stack.push_sorted(bottom, farther);
+                    } else {
+                        stack.push(farther);
+                    }
                 }
+                next = Some(nearest);
             }
         }
     }

@@ -50,6 +50,7 @@ impl RayShear {
     }
 
     /// Projects a vertex, relative to the origin, along the ray.
+    #[inline]
     fn project(&self, from_origin: Vec3) -> Vec2 {
         let [x, y, z] = self.axes;
         Vec2::new(from_origin[x], from_origin[y]) - self.slope * from_origin[z]
@@ -58,7 +59,9 @@ impl RayShear {
     /// Finds the point in which the line meets the triangle, from either side.
     #[inline]
     pub(super) fn intersect(&self, corners: [Vec3; 3]) -> Option<TriangleHit> {
-        let [a, b, c] = corners.map(|corner| self.project(corner - self.origin));
+        let [a, b, c] = corners;
+        let (a, b, c) =
+            (self.project(a - self.origin), self.project(b - self.origin), self.project(c - self.origin));
         // Rounding is monotonic: a product of two differences can come out as zero, but not with the
         // wrong sign. So mixed signs are certain already in single precision.
         let (u, v, w) = (c.perp_dot(b), a.perp_dot(c), b.perp_dot(a));
@@ -70,7 +73,8 @@ impl RayShear {
 
     /// Decides in double precision, where signs are exact, what single precision did not exclude.
     fn confirm(&self, corners: [Vec3; 3], projected: [Vec2; 3]) -> Option<TriangleHit> {
-        let [a, b, c] = projected.map(Vec2::as_dvec2);
+        let [a, b, c] = projected;
+        let (a, b, c) = (a.as_dvec2(), b.as_dvec2(), c.as_dvec2());
         let (u, v, w) = (c.perp_dot(b), a.perp_dot(c), b.perp_dot(a));
         let side = is_positive(u, c, b);
         if is_positive(v, a, c) != side || is_positive(w, b, a) != side {
@@ -81,7 +85,8 @@ impl RayShear {
         // The distance from the plane rather than from the sheared depths: its sign tells reliably on which
         // side the origin is, however slanted the triangle.
         let origin = self.origin.as_dvec3();
-        let [p, q, r] = corners.map(|corner| corner.as_dvec3() - origin);
+        let [p, q, r] = corners;
+        let (p, q, r) = (p.as_dvec3() - origin, q.as_dvec3() - origin, r.as_dvec3() - origin);
         let normal = (q - p).cross(r - p);
         let height = p.dot(normal);
         let cosine = self.direction.dot(normal);
@@ -90,9 +95,10 @@ impl RayShear {
             return None;
         }
         // Seen edge-on the quotient may leave the triangle.
-        let along = [p, q, r].map(|corner| corner.dot(self.direction) / self.direction.length_squared());
-        let nearest = along[0].min(along[1]).min(along[2]);
-        let farthest = along[0].max(along[1]).max(along[2]);
+        let length2 = self.direction.length_squared();
+        let (p, q, r) = (p.dot(self.direction), q.dot(self.direction), r.dot(self.direction));
+        let nearest = p.min(q).min(r) / length2;
+        let farthest = p.max(q).max(r) / length2;
         let t = (height / cosine).clamp(nearest, farthest);
         Some(TriangleHit { t, weights: [(v / sum) as f32, (w / sum) as f32] })
     }
