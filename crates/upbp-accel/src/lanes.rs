@@ -108,7 +108,7 @@ pub(crate) fn run(task: impl Task) {
 
 /// Loops; on most processors the compiler vectorises them more or less.
 #[derive(Clone, Copy)]
-struct Plain;
+pub(crate) struct Plain;
 
 #[inline(always)]
 fn each<T: Copy + Default>(f: impl Fn(usize) -> T) -> [T; WIDTH] {

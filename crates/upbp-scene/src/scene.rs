@@ -197,15 +197,11 @@ impl Scene for ReadyScene {
     }
 
     fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
-        let mut clear = true;
-        self.geometry.for_each_hit(*ray, |candidate| {
+        let clear = !self.geometry.any_where(*ray, |candidate| {
             let record = self.record(candidate);
-            let Some(interior) = record.interior else {
-                clear = false;
-                return Visit::Stop;
-            };
+            let Some(interior) = record.interior else { return true };
             crossings.push(self.crossing(ray, candidate, interior, record.bsdf.is_some()));
-            Visit::Continue
+            false
         });
         if clear {
             sort(crossings);

@@ -82,7 +82,8 @@ impl Block for Triangles {
         let from_a = wide.sub3(load(wide, &self.0[0], axes), origin);
         let from_b = wide.sub3(load(wide, &self.0[1], axes), origin);
         let from_c = wide.sub3(load(wide, &self.0[2], axes), origin);
-        let (a, b, c) = (project(wide, from_a, slope), project(wide, from_b, slope), project(wide, from_c, slope));
+        let (a, b, c) =
+            (project(wide, from_a, slope), project(wide, from_b, slope), project(wide, from_c, slope));
         let (u, v, w) = (perp_dot(wide, c, b), perp_dot(wide, a, c), perp_dot(wide, b, a));
         let zero = wide.splat(0.0);
         let outside = wide.less(wide.less_of(u, wide.less_of(v, w)), zero)
@@ -91,7 +92,8 @@ impl Block for Triangles {
             return 0;
         }
         let direction = reorder(ray.direction, axes);
-        let (a, b, c) = (wide.dot(from_a, direction), wide.dot(from_b, direction), wide.dot(from_c, direction));
+        let (a, b, c) =
+            (wide.dot(from_a, direction), wide.dot(from_b, direction), wide.dot(from_c, direction));
         let margin = wide.splat(prepared.margin);
         let nearest = wide.sub(wide.less_of(a, wide.less_of(b, c)), margin);
         let farthest = wide.add(wide.greater_of(a, wide.greater_of(b, c)), margin);
@@ -169,7 +171,8 @@ impl Block for Quads {
             put(&mut self.to_uv[i], to_uv[i]);
             // Denormal components have lost their digits.
             let size = to_uv[i].abs().element_sum();
-            self.size[i][lane] = if (1e-30..1e30).contains(&size) { 2.0 * size as f32 } else { f32::INFINITY };
+            self.size[i][lane] =
+                if (1e-30..1e30).contains(&size) { 2.0 * size as f32 } else { f32::INFINITY };
         }
         self.diameter[lane] = 2.0 * (edge_u.abs() + edge_v.abs()).element_sum() as f32;
     }
@@ -191,7 +194,8 @@ impl Block for Quads {
         let margin = wide.add(wide.mul(farthest, rounding), tiny);
         let last = wide.mul(wide.less_of(wide.splat(t_max), farthest), cosine);
         let first = wide.mul(ray.t_min, cosine);
-        let mut beyond = wide.less(wide.add(height, margin), first) | wide.less(last, wide.sub(height, margin));
+        let mut beyond =
+            wide.less(wide.add(height, margin), first) | wide.less(last, wide.sub(height, margin));
         for i in 0..2 {
             let to_uv = wide.load3(&self.to_uv[i]);
             let along = wide.mul(wide.dot(to_uv, ray.direction), height);
@@ -251,8 +255,10 @@ impl Block for Spheres {
         let least = wide.sub(half_chord(wide, inner2, distance2), margin);
         let t_max = wide.splat(t_max);
         // Where the ray enters: before its start, or behind its end. So where it leaves.
-        let no_entry = wide.less(wide.sub(middle, least), ray.t_min) | wide.less(t_max, wide.sub(middle, most));
-        let no_exit = wide.less(wide.add(middle, most), ray.t_min) | wide.less(t_max, wide.add(middle, least));
+        let no_entry =
+            wide.less(wide.sub(middle, least), ray.t_min) | wide.less(t_max, wide.sub(middle, most));
+        let no_exit =
+            wide.less(wide.add(middle, most), ray.t_min) | wide.less(t_max, wide.add(middle, least));
         !(missed | (no_entry & no_exit))
     }
 }
@@ -288,8 +294,10 @@ impl Block for AxisBoxes {
         let (less, more) = (wide.splat(1.0 - SLAB_ROUNDING), wide.splat(1.0 + SLAB_ROUNDING));
         let (tiny, t_max) = (wide.splat(f32::MIN_POSITIVE), wide.splat(t_max));
         // Least and greatest distances, for such as are not negative.
-        let (entry_low, entry_high) = (wide.sub(wide.mul(entry, less), tiny), wide.add(wide.mul(entry, more), tiny));
-        let (exit_low, exit_high) = (wide.sub(wide.mul(exit, less), tiny), wide.add(wide.mul(exit, more), tiny));
+        let (entry_low, entry_high) =
+            (wide.sub(wide.mul(entry, less), tiny), wide.add(wide.mul(entry, more), tiny));
+        let (exit_low, exit_high) =
+            (wide.sub(wide.mul(exit, less), tiny), wide.add(wide.mul(exit, more), tiny));
         let no_entry = wide.less(entry_high, ray.t_min) | wide.less(t_max, entry_low);
         let no_exit = wide.less(exit_high, ray.t_min) | wide.less(t_max, exit_low);
         !(wide.less(exit_high, entry_low) | (no_entry & no_exit))

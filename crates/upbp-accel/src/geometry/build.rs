@@ -58,7 +58,8 @@ pub(super) fn build(boxes: &[Boxed], mut pack: impl FnMut(Kind, &[u32]) -> Child
         ..BvhBuildParams::medium_build()
     };
     let binary = build_bvh2(&groups, params, &mut Duration::default());
-    let mut collapse = Collapse { boxes, members, groups, subtrees: Vec::new(), binary, nodes: Vec::new(), pack };
+    let mut collapse =
+        Collapse { boxes, members, groups, subtrees: Vec::new(), binary, nodes: Vec::new(), pack };
     collapse.weigh();
     let roots = vec![collapse.emit()];
     Hierarchy { nodes: collapse.nodes, roots }
@@ -80,7 +81,8 @@ fn group_by_centre(boxes: &[Boxed]) -> (Vec<u32>, Vec<Group>) {
         let Boxed { min, max, .. } = boxes[index];
         (min * 0.5 + max * 0.5).to_array().map(f32::to_bits)
     };
-    let mut members: Vec<_> = (0..boxes.len()).into_par_iter().map(|index| (centre(index), index as u32)).collect();
+    let mut members: Vec<_> =
+        (0..boxes.len()).into_par_iter().map(|index| (centre(index), index as u32)).collect();
     members.par_sort_unstable();
     let mut groups: Vec<Group> = Vec::with_capacity(boxes.len());
     for (place, &(centre, index)) in members.iter().enumerate() {
@@ -189,7 +191,11 @@ impl<P: FnMut(Kind, &[u32]) -> Child> Collapse<'_, P> {
     /// Binary nodes that become the children of a wide node, if this one may take up `room` of them.
     fn gather(&self, index: u32, room: u8, found: &mut Vec<u32>) {
         let node = &self.binary.nodes[index as usize];
-        let left = if room < 2 || node.is_leaf() { 0 } else { self.subtrees[index as usize].left[room as usize - 2] };
+        let left = if room < 2 || node.is_leaf() {
+            0
+        } else {
+            self.subtrees[index as usize].left[room as usize - 2]
+        };
         if left > 0 {
             self.gather(node.first_index, left, found);
             self.gather(node.first_index + 1, room - left, found);
@@ -226,7 +232,8 @@ impl<P: FnMut(Kind, &[u32]) -> Child> Collapse<'_, P> {
         let mut level = Vec::new();
         by_kind(self.boxes, members, |kind, members| {
             let around = members.iter().map(|&index| &self.boxes[index as usize]);
-            let bounds = around.map(|boxed| (boxed.min, boxed.max)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+            let bounds =
+                around.map(|boxed| (boxed.min, boxed.max)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
             level.push(((self.pack)(kind, members), bounds.unwrap_or_default()));
         });
         while level.len() > 1 {

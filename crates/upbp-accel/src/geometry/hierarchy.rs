@@ -111,7 +111,13 @@ pub(super) struct Hierarchy {
 /// A test of blocks of primitives. Compiled into the traversal, for the instruction set at hand.
 pub(super) trait Visitor {
     /// Tests the primitives of a block; may lower the far end of the ray.
-    fn visit<W: Wide>(&mut self, wide: W, ray: &LaneRay<W>, block: BlockRef, t_max: &mut f32) -> ControlFlow<()>;
+    fn visit<W: Wide>(
+        &mut self,
+        wide: W,
+        ray: &LaneRay<W>,
+        block: BlockRef,
+        t_max: &mut f32,
+    ) -> ControlFlow<()>;
 }
 
 impl Hierarchy {
@@ -214,7 +220,7 @@ struct Stack {
 }
 
 impl Stack {
-    const SIZE: usize = 64;
+    const SIZE: usize = 32;
 
     #[inline(always)]
     fn new() -> Self {

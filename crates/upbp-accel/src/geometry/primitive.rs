@@ -24,7 +24,8 @@ pub(super) struct Name {
 impl Name {
     /// All primitives of a list of shapes, in its order.
     pub(super) fn all(shapes: &[Shape]) -> Vec<Self> {
-        let triangles = |shape: &Shape| if let Shape::Mesh(mesh) = shape { mesh.triangles().len() } else { 1 };
+        let triangles =
+            |shape: &Shape| if let Shape::Mesh(mesh) = shape { mesh.triangles().len() } else { 1 };
         let mut names = Vec::with_capacity(shapes.iter().map(triangles).sum());
         for (shape, index) in shapes.iter().zip(0..) {
             names.extend((0..triangles(shape) as u32).map(|triangle| Self { shape: index, triangle }));
@@ -81,15 +82,16 @@ pub(super) struct Primitives {
 }
 
 impl Primitives {
-    pub(super) const EMPTY: Self = Self {
-        triangles: Blocks::EMPTY,
-        quads: Blocks::EMPTY,
-        spheres: Blocks::EMPTY,
-        boxes: Blocks::EMPTY,
-    };
+    pub(super) const EMPTY: Self =
+        Self { triangles: Blocks::EMPTY, quads: Blocks::EMPTY, spheres: Blocks::EMPTY, boxes: Blocks::EMPTY };
 
     /// Makes a block of up to eight primitives of a kind.
-    pub(super) fn pack(&mut self, shapes: &[Shape], kind: Kind, names: impl ExactSizeIterator<Item = Name>) -> Child {
+    pub(super) fn pack(
+        &mut self,
+        shapes: &[Shape],
+        kind: Kind,
+        names: impl ExactSizeIterator<Item = Name>,
+    ) -> Child {
         let count = names.len();
         let shape = |name: Name| &shapes[name.shape as usize];
         let index = match kind {
@@ -111,14 +113,6 @@ impl Primitives {
             })),
         };
         Child::block(kind, index, count)
-    }
-
-    /// Memory in use, bytes.
-    pub(super) fn memory_bytes(&self) -> usize {
-        fn of<B>(blocks: &Blocks<B>) -> usize {
-            blocks.blocks.capacity() * size_of::<B>() + blocks.names.capacity() * size_of::<[Name; WIDTH]>()
-        }
-        of(&self.triangles) + of(&self.quads) + of(&self.spheres) + of(&self.boxes)
     }
 }
 
@@ -176,7 +170,8 @@ impl<'a> Probe<'a> {
                 let quads = &self.primitives.quads;
                 for lane in set_lanes(quads.blocks[index].may_meet(wide, lanes, &(), *t_max) & block.used) {
                     let name = quads.names[index][lane];
-                    if let Some((t, uv)) = self.quad(name).and_then(|quad| quad.intersect(origin, direction)) {
+                    if let Some((t, uv)) = self.quad(name).and_then(|quad| quad.intersect(origin, direction))
+                    {
                         at(t, name, 0, uv, t_max)?;
                     }
                 }
@@ -186,7 +181,8 @@ impl<'a> Probe<'a> {
                 for lane in set_lanes(spheres.blocks[index].may_meet(wide, lanes, &(), *t_max) & block.used) {
                     let name = spheres.names[index][lane];
                     let sphere = self.sphere(name);
-                    if let Some([entry, exit]) = sphere.and_then(|sphere| sphere.intersect(origin, direction)) {
+                    if let Some([entry, exit]) = sphere.and_then(|sphere| sphere.intersect(origin, direction))
+                    {
                         at(entry, name, 0, [0.0; 2], t_max)?;
                         at(exit, name, 1, [0.0; 2], t_max)?;
                     }

@@ -6,8 +6,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::axis_box::AxisBox;
-use super::error::GeometryError;
 use super::build::build;
+use super::error::GeometryError;
 use super::hierarchy::{BlockRef, Hierarchy, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, SurfacePoint, Visit};
 use super::lane_ray::LaneRay;
@@ -91,10 +91,18 @@ impl SceneGeometry {
     /// Whether there is any intersection in `(t_min, t_max)`.
     #[must_use]
     pub fn any(&self, ray: Ray) -> bool {
+        self.any_where(ray, |_| true)
+    }
+
+    /// Whether `accept` takes any intersection in `(t_min, t_max)`; it is asked until it does, in no particular
+    /// but always the same order.
+    ///
+    /// Cheaper than [`for_each_hit`](Self::for_each_hit) where the nearest intersection is of no interest.
+    pub fn any_where(&self, ray: Ray, mut accept: impl FnMut(&Candidate) -> bool) -> bool {
         let mut found = false;
-        let visit = |_: &Candidate| {
-            found = true;
-            Visit::Stop
+        let visit = |candidate: &Candidate| {
+            found = accept(candidate);
+            if found { Visit::Stop } else { Visit::Continue }
         };
         run(Search::<_, false> { scene: self, ray, visit });
         found
@@ -174,7 +182,8 @@ impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Task for Search<'_, V,
     #[inline(always)]
     fn run(self, wide: impl Wide) {
         let Self { scene, ray, visit } = self;
-        let extent = (scene.bounds.0 - ray.origin).abs().max((scene.bounds.1 - ray.origin).abs()).element_sum();
+        let extent =
+            (scene.bounds.0 - ray.origin).abs().max((scene.bounds.1 - ray.origin).abs()).element_sum();
         let probe = Probe::new(&scene.shapes, &scene.primitives, &ray, extent);
         let lanes = LaneRay::new(wide, &ray);
         scene.hierarchy.traverse::<IN_ORDER, _>(wide, &lanes, ray.t_max, Blocks { probe, visit });
@@ -188,7 +197,13 @@ struct Blocks<'a, V> {
 
 impl<V: FnMut(&Candidate) -> Visit> Visitor for Blocks<'_, V> {
     #[inline(always)]
-    fn visit<W: Wide>(&mut self, wide: W, ray: &LaneRay<W>, block: BlockRef, t_max: &mut f32) -> ControlFlow<()> {
+    fn visit<W: Wide>(
+        &mut self,
+        wide: W,
+        ray: &LaneRay<W>,
+        block: BlockRef,
+        t_max: &mut f32,
+    ) -> ControlFlow<()> {
         let Self { probe, visit } = self;
         probe.intersect(wide, ray, block, t_max, |candidate, t_max| {
             match visit(candidate) {
@@ -205,3 +220,6 @@ impl<V: FnMut(&Candidate) -> Visit> Visitor for Blocks<'_, V> {
 fn flat(position: Vec3, normal: Vec3) -> SurfacePoint {
     SurfacePoint { position, geometric_normal: normal, shading_normal: normal }
 }
+
+#[cfg(test)]
+mod tests;

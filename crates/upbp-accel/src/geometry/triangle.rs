@@ -94,12 +94,12 @@ impl RayShear {
         if sum == 0.0 || cosine == 0.0 || height * height <= zero {
             return None;
         }
-        // Seen edge-on the quotient may leave the triangle.
+        // Seen edge-on the quotient may leave the triangle. Not `clamp`, which panics on NaN.
         let length2 = self.direction.length_squared();
         let (p, q, r) = (p.dot(self.direction), q.dot(self.direction), r.dot(self.direction));
         let nearest = p.min(q).min(r) / length2;
         let farthest = p.max(q).max(r) / length2;
-        let t = (height / cosine).clamp(nearest, farthest);
+        let t = (height / cosine).max(nearest).min(farthest);
         Some(TriangleHit { t, weights: [(v / sum) as f32, (w / sum) as f32] })
     }
 }

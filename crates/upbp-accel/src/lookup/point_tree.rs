@@ -4,11 +4,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::boxes::Rounded;
-use crate::lanes::{WIDTH, Wide};
 use super::query::Query;
 use super::region::{Ball, ThickRay};
 use super::sort::Item;
 use super::tree::PackedTree;
+use crate::lanes::{WIDTH, Wide};
 use crate::ray::Ray;
 
 /// Eight points: two cache lines if payloads are small. An unused lane is NaN, which no comparison accepts.

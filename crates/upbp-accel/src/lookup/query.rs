@@ -5,9 +5,9 @@
 //! fetched at the same time.
 
 use super::boxes::Boxes;
-use crate::lanes::{Task, WIDTH, Wide, run, set_lanes};
 use super::region::Region;
 use super::tree::{MAX_LEVELS, PackedTree};
+use crate::lanes::{Task, WIDTH, Wide, run, set_lanes};
 
 /// The greatest number of blocks or leaves that wait to be looked at.
 const WAITING: usize = 24;

@@ -5,12 +5,12 @@ use rayon::prelude::*;
 
 use super::approach::{ClosestApproach, Segment, closest_approach};
 use super::boxes::Exact;
-use crate::lanes::{WIDTH, Wide};
 use super::query::Query;
 use super::region::{Ball, ThickRay};
 use super::sort::Item;
 use super::split::{Piece, SplitParams, split};
 use super::tree::PackedTree;
+use crate::lanes::{WIDTH, Wide};
 use crate::ray::Ray;
 
 /// Eight pieces. The data by which most pieces fail is in the first three cache lines. An unused lane is NaN,

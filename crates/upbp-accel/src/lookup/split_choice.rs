@@ -4,11 +4,11 @@ use std::cell::Cell;
 
 use super::approach::Segment;
 use super::boxes::Boxes;
-use crate::lanes::Wide;
 use super::query::Query;
 use super::region::{Region, ThickRay};
 use super::segment_tree::{Block, SegmentTree};
 use super::split::SplitParams;
+use crate::lanes::Wide;
 use crate::ray::Ray;
 
 impl SplitParams {

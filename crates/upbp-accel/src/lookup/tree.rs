@@ -9,8 +9,8 @@ use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
 use super::boxes::{Bounds, Boxes, Exact, union};
-use crate::lanes::WIDTH;
 use super::sort::{Buckets, Item, split, split_few};
+use crate::lanes::WIDTH;
 
 /// Items of a leaf, of all its blocks.
 const LEAF: usize = WIDTH * WIDTH;
