@@ -4,6 +4,8 @@
 //! order to build the mask of the result. So the operations are named. Each rounds as the scalar one does and
 //! none is fused, so that results do not depend on the instruction set.
 
+#![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
+
 use pulp::Arch;
 
 /// Numbers in a vector, thus items in a block and children of a node.

@@ -37,6 +37,6 @@ pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTec
 pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic};
 pub use upbp_estimators::{
-    BodyId, Counters, EmitterChoice, FootprintField, Interior, IterationPlan, Layer, MediumId, MediumStack, MergePeriods,
-    RadiusField, Ray, Roulette, Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
+    BodyId, Counters, EmitterChoice, FootprintField, Interior, IterationPlan, Layer, MediumId, MediumStack,
+    MergePeriods, RadiusField, Ray, Roulette, Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
 };

@@ -169,6 +169,8 @@ impl<'de> Deserialize<'de> for Plan {
 mod tests {
     use std::num::NonZeroU32;
 
+    use upbp_estimators::RadiusField;
+
     use super::*;
 
     fn plan() -> Plan {

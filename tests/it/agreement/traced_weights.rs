@@ -15,8 +15,8 @@ use upbp_estimators::scene::{EmitterId, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, EmissionGuide, EmissionSample, EmitterChoice, EmitterSample, FootprintField, IterationChoices,
-    IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths, PreparedScene, RadiusField, Roulette,
-    Stream, StreamKind, Technique, TechniqueSet,
+    IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths, PreparedScene, RadiusField,
+    Roulette, Stream, StreamKind, Technique, TechniqueSet,
 };
 
 use super::rebuild::{Trace, Vertex};

@@ -9,8 +9,8 @@ use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
-    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, RadiusField, Roulette,
-    StreamKind,
+    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, RadiusField,
+    Roulette, StreamKind,
 };
 
 use upbp_testing::Estimate;

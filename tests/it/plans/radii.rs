@@ -1,7 +1,7 @@
 //! Kernel radii that are a function of place: what the plan gives to a picture of near and far things.
 
 use upbp_core::glam::Vec3;
-use upbp_core::{FrozenPlan, Plan, Radii, RadiusField, Radius, Settings, State, StateError};
+use upbp_core::{FrozenPlan, Plan, Radii, Radius, RadiusField, Settings, State, StateError};
 use upbp_scene::ReadyScene;
 use upbp_testing::renderer;
 
@@ -93,7 +93,9 @@ fn a_field_is_part_of_plans_and_states() {
     let mut other = state.identity().clone();
     other.plan.radii.field = RadiusField::Uniform;
     let different = other.check_same(state.identity());
-    assert!(matches!(&different, Err(StateError::Different { differences }) if differences[0].contains("radii.field")));
+    assert!(
+        matches!(&different, Err(StateError::Different { differences }) if differences[0].contains("radii.field"))
+    );
 
     let mut steep = frozen;
     steep.plan.radii.surf = 1.001 * steep.plan.radii.field.largest_radius();

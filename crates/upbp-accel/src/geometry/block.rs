@@ -136,10 +136,10 @@ pub(super) struct Quads {
     corner: [[f32; WIDTH]; 3],
     normal: [[f32; WIDTH]; 3],
     to_uv: [[[f32; WIDTH]; 3]; 2],
-    /// Sum of the components of `to_uv`, per scene unit. Infinite for a quad that single precision cannot
-    /// tell of.
+    /// Twice the sum of the components of `to_uv`, per scene unit. Infinite for a quad that single precision
+    /// cannot tell of.
     size: [[f32; WIDTH]; 2],
-    /// Sum of the components of both edges, scene units.
+    /// Twice the sum of the components of both edges, scene units.
     diameter: [f32; WIDTH],
 }
 
@@ -167,12 +167,12 @@ impl Block for Quads {
         };
         put(&mut self.corner, quad.origin().as_dvec3());
         put(&mut self.normal, normal * scale.sqrt());
-        for i in 0..2 {
-            put(&mut self.to_uv[i], to_uv[i]);
+        for (i, row) in to_uv.into_iter().enumerate() {
+            put(&mut self.to_uv[i], row);
             // Denormal components have lost their digits.
-            let size = to_uv[i].abs().element_sum();
-            self.size[i][lane] =
-                if (1e-30..1e30).contains(&size) { 2.0 * size as f32 } else { f32::INFINITY };
+            let size = row.abs().element_sum();
+            let known = (1e-30..1e30).contains(&size);
+            self.size[i][lane] = if known { 2.0 * size as f32 } else { f32::INFINITY };
         }
         self.diameter[lane] = 2.0 * (edge_u.abs() + edge_v.abs()).element_sum() as f32;
     }

@@ -20,7 +20,7 @@ pub(super) enum Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Child(u32);
 
-/// Nodes, and blocks of each kind, that can be indexed.
+/// The number of nodes, and of blocks of each kind, that can be indexed.
 pub(super) const MAX_INDEX: usize = 1 << Child::INDEX_BITS;
 
 impl Child {
@@ -121,8 +121,8 @@ pub(super) trait Visitor {
 }
 
 impl Hierarchy {
-    /// Shows `visitor` the blocks that `ray` may meet before `t_max`. With `IN_ORDER` the nearer child of each
-    /// node comes first.
+    /// Shows `visitor` the blocks that `ray` may meet before `t_max`. With `IN_ORDER` the nearer child of
+    /// each node comes first.
     #[inline(always)]
     pub(super) fn traverse<const IN_ORDER: bool, W: Wide>(
         &self,
@@ -136,7 +136,7 @@ impl Hierarchy {
         let mut next = None;
         loop {
             let child = match next.take().or_else(|| stack.pop()) {
-                Some(entry) if entry.distance() > t_max => continue,
+                Some(entry) if entry.distance() * (1.0 - SLAB_ROUNDING) > t_max => continue,
                 Some(entry) => entry.child(),
                 None => match roots.next() {
                     Some(&root) => root,

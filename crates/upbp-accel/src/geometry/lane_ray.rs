@@ -36,8 +36,8 @@ impl<W: Wide> LaneRay<W> {
         }
     }
 
-    /// The distances at which the ray enters and leaves each box, or its ends where they are nearer, each with
-    /// an error of [`SLAB_ROUNDING`].
+    /// The distances at which the ray enters and leaves each box, or its ends where they are nearer, each
+    /// with an error of [`SLAB_ROUNDING`].
     ///
     /// A zero component of the direction gives infinite distances to both planes of its axis, or NaN for a
     /// plane that holds the origin. The comparisons are written so that a NaN does not constrain: a ray that

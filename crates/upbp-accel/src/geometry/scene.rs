@@ -94,8 +94,8 @@ impl SceneGeometry {
         self.any_where(ray, |_| true)
     }
 
-    /// Whether `accept` takes any intersection in `(t_min, t_max)`; it is asked until it does, in no particular
-    /// but always the same order.
+    /// Whether `accept` takes any intersection in `(t_min, t_max)`; it is asked until it does, in no
+    /// particular but always the same order.
     ///
     /// Cheaper than [`for_each_hit`](Self::for_each_hit) where the nearest intersection is of no interest.
     pub fn any_where(&self, ray: Ray, mut accept: impl FnMut(&Candidate) -> bool) -> bool {

@@ -55,8 +55,7 @@ impl Candidates {
             if is_fixed { vec![full] } else { parts.iter().map(count).collect() }
         };
         let usual = full.radii.surf;
-        let widest =
-            if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };
+        let widest = if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };
         let mut candidates = Self {
             full: Plan { roulette: settings.roulette.unwrap_or(roulette::OF_PILOT), ..full },
             always: if support.needs_merges { finds_all(full.techniques) } else { TechniqueSet::EMPTY },

@@ -62,11 +62,11 @@ impl Nearest {
             for radius in radii().map(|r| r * self.scale).chain([ANYWHERE]) {
                 found.clear();
                 // What is beyond may be found or not.
-            around(query, radius, &mut |distance| {
-                if distance < radius {
-                    found.push(distance);
-                }
-            });
+                around(query, radius, &mut |distance| {
+                    if distance < radius {
+                        found.push(distance);
+                    }
+                });
                 if found.len() >= rank {
                     return Some(*found.select_nth_unstable_by(rank - 1, f32::total_cmp).1);
                 }

@@ -69,7 +69,11 @@ fn emission_at<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let light = edge_trace.stack_in(span, t).top().and_then(|top| prepared.volume_emitter(top.body));
     let seen = light.and_then(|emitter| {
         let light = &prepared.scene.emitters()[emitter.0 as usize];
-        Some((emitter, light.pdf_passage(&point), light.hit(prepared.emission_bounds(), &point, direction, receiver)?))
+        Some((
+            emitter,
+            light.pdf_passage(&point),
+            light.hit(prepared.emission_bounds(), &point, direction, receiver)?,
+        ))
     });
     let Some((emitter, passage, densities)) = seen else {
         record_hit(edge, Completion::Emission, Weight::alone(Technique::Hit), value, out);

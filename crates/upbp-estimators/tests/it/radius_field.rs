@@ -12,7 +12,8 @@ fn place() -> impl Strategy<Value = Vec3> {
 }
 
 fn direction() -> impl Strategy<Value = Vec3> {
-    prop_oneof![3 => place(), 1 => Just(Vec3::X), 1 => Just(Vec3::NEG_Z)].prop_map(|v| v.normalize_or(Vec3::Y))
+    prop_oneof![3 => place(), 1 => Just(Vec3::X), 1 => Just(Vec3::NEG_Z)]
+        .prop_map(|v| v.normalize_or(Vec3::Y))
 }
 
 fn field() -> impl Strategy<Value = RadiusField> {
@@ -30,9 +31,8 @@ fn field() -> impl Strategy<Value = RadiusField> {
 fn ray() -> impl Strategy<Value = Ray> {
     let range = prop_oneof![Just((0.0, f32::INFINITY)), (0.0..1.0_f32, 1.0..3.0_f32)];
     let origin = prop_oneof![3 => place(), 1 => Just(Vec3::ZERO)];
-    (origin, direction(), range).prop_map(|(origin, direction, (t_min, t_max))| {
-        Ray::new(origin, direction).with_range(t_min, t_max)
-    })
+    (origin, direction(), range)
+        .prop_map(|(origin, direction, (t_min, t_max))| Ray::new(origin, direction).with_range(t_min, t_max))
 }
 
 fn sorted(mut hits: Vec<(u32, u32)>) -> Vec<(u32, u32)> {

@@ -164,8 +164,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
         let (light, camera) = (&self.light[i], &self.camera[i]);
         let (factor, merges) = if let VertexKind::Medium(medium) = vertex.kind {
             let (c_light, c_camera) = (light.distance_factor, camera.distance_factor);
-            let factors =
-                self.plan.volume_factors(medium, c_light, c_camera, vertex.sin_theta, vertex.scale);
+            let factors = self.plan.volume_factors(medium, c_light, c_camera, vertex.sin_theta, vertex.scale);
             (factor(&factors), factors.sum())
         } else {
             let factor = self.plan.surface_factor(vertex.scale);
