@@ -21,7 +21,7 @@ const CELL: f64 = 0.0055;
 
 /// Middle of the letters, and of the hole for the ball of glass, in cells above the axis of the lamp.
 const LETTERS_AT: i32 = 6;
-const HOLE_AT: i32 = -11;
+const HOLE_AT: i32 = -8;
 
 /// The slide: a sheet with openings in the plane z = 0; the lamp is at +z, and its axis is the z axis.
 fn slide() -> Mesh {
@@ -61,7 +61,16 @@ fn chairs() -> Mesh {
 }
 
 pub(crate) fn bed() -> Bed {
-    let pedestal = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.05], [0.11, 0.09], [0.09, 0.8], [0.14, 0.86], [0.14, 0.9], [0.0, 0.9]];
+    let pedestal = [
+        [0.0, 0.0],
+        [0.2, 0.0],
+        [0.2, 0.05],
+        [0.11, 0.09],
+        [0.09, 0.8],
+        [0.14, 0.86],
+        [0.14, 0.9],
+        [0.0, 0.9],
+    ];
     let curtain = |x: f64, mirrored: f64| {
         Mesh::sheet([160, 2], move |u, v| {
             let fold = 0.09 * (u * 52.0).sin() + 0.03 * (u * 117.0).sin();
@@ -69,9 +78,14 @@ pub(crate) fn bed() -> Bed {
         })
     };
     let stand = [-1.0, 1.0].into_iter().fold(Mesh::default(), |all, side| {
-        all.and(Mesh::tube(&[dvec3(0.28 * side, 0.0, 0.2), dvec3(0.2 * side, 0.8, 0.1), dvec3(0.1 * side, 1.5, 0.0)], 0.018, 12))
+        all.and(Mesh::tube(
+            &[dvec3(0.28 * side, 0.0, 0.2), dvec3(0.2 * side, 0.8, 0.1), dvec3(0.1 * side, 1.5, 0.0)],
+            0.018,
+            12,
+        ))
     });
-    let third = Mesh::tube(&[dvec3(0.0, 0.0, -0.35), dvec3(0.0, 0.8, -0.15), dvec3(0.0, 1.5, 0.0)], 0.018, 12);
+    let third =
+        Mesh::tube(&[dvec3(0.0, 0.0, -0.35), dvec3(0.0, 0.8, -0.15), dvec3(0.0, 1.5, 0.0)], 0.018, 12);
     Bed {
         name: "hall",
         scene: include_str!("../scenes/beds/hall.ron"),

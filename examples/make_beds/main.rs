@@ -30,14 +30,7 @@ struct Bed {
 }
 
 fn beds() -> [Bed; 6] {
-    [
-        terrace::bed(),
-        bathroom::bed(),
-        still_life::bed(),
-        street_lamp::bed(),
-        hall::bed(),
-        milk::bed(),
-    ]
+    [terrace::bed(), bathroom::bed(), still_life::bed(), street_lamp::bed(), hall::bed(), milk::bed()]
 }
 
 /// Writes everything to a folder; meshes to a folder of the scene's name in it.

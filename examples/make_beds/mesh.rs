@@ -38,7 +38,12 @@ impl Mesh {
             let at = |(first, corners): (u32, u32), corner: u32| first + corner % corners;
             for corner in 0..segments {
                 let [below, above] = [pair[0], pair[1]];
-                mesh.quad([at(below, corner), at(above, corner), at(above, corner + 1), at(below, corner + 1)]);
+                mesh.quad([
+                    at(below, corner),
+                    at(above, corner),
+                    at(above, corner + 1),
+                    at(below, corner + 1),
+                ]);
             }
         }
         mesh
@@ -62,7 +67,12 @@ impl Mesh {
         for ring in 0..last as u32 {
             for corner in 0..sides {
                 let at = |ring: u32, corner: u32| ring * sides + corner % sides;
-                mesh.quad([at(ring, corner), at(ring, corner + 1), at(ring + 1, corner + 1), at(ring + 1, corner)]);
+                mesh.quad([
+                    at(ring, corner),
+                    at(ring, corner + 1),
+                    at(ring + 1, corner + 1),
+                    at(ring + 1, corner),
+                ]);
             }
         }
         let end = last as u32 * sides;
@@ -79,12 +89,18 @@ impl Mesh {
         let mut mesh = Self::default();
         for row in 0..=rows {
             let v = f64::from(row) / f64::from(rows);
-            mesh.positions.extend((0..=columns).map(|column| point(f64::from(column) / f64::from(columns), v)));
+            mesh.positions
+                .extend((0..=columns).map(|column| point(f64::from(column) / f64::from(columns), v)));
         }
         for row in 0..rows {
             for column in 0..columns {
                 let at = |column: u32, row: u32| row * (columns + 1) + column;
-                mesh.quad([at(column, row), at(column + 1, row), at(column + 1, row + 1), at(column, row + 1)]);
+                mesh.quad([
+                    at(column, row),
+                    at(column + 1, row),
+                    at(column + 1, row + 1),
+                    at(column, row + 1),
+                ]);
             }
         }
         mesh
@@ -105,9 +121,8 @@ impl Mesh {
         let top = mesh.triangles.clone();
         mesh.triangles.extend(top.iter().map(|&[a, b, c]| [count + a, count + c, count + b]));
         let at = |row: u32, column: u32| column * (rows + 1) + row;
-        let forward = (0..rows).flat_map(|row| {
-            [[at(row, 0), at(row + 1, 0)], [at(row + 1, columns), at(row, columns)]]
-        });
+        let forward = (0..rows)
+            .flat_map(|row| [[at(row, 0), at(row + 1, 0)], [at(row + 1, columns), at(row, columns)]]);
         let sideways = (0..columns).flat_map(|column| {
             [[at(0, column + 1), at(0, column)], [at(rows, column), at(rows, column + 1)]]
         });
@@ -217,7 +232,11 @@ impl Mesh {
                 .filter(|other| other.normalize_or_zero().dot(own.normalize_or_zero()) >= least);
             alike.sum::<DVec3>().normalize_or(own.normalize_or(DVec3::Y))
         };
-        self.triangles.iter().zip(&areas).map(|(triangle, &own)| triangle.map(|corner| normal(own, corner))).collect()
+        self.triangles
+            .iter()
+            .zip(&areas)
+            .map(|(triangle, &own)| triangle.map(|corner| normal(own, corner)))
+            .collect()
     }
 }
 
@@ -259,7 +278,9 @@ pub(crate) fn tiles(tiling: &Tiling, kinds: usize, kind: impl Fn(u32, u32) -> us
             let (near, far) = ((f64::from(row) * depth) + 0.5 * gap, f64::from(row + 1) * depth - 0.5 * gap);
             let tilted = |corner: u32| tilt * random([column, row, corner]);
             let mut mesh = Mesh::default();
-            for (inset, rise, is_tilted) in [(0.0, 0.0, 0.0), (0.0, height - bevel, 1.0), (bevel, height, 1.0)] {
+            for (inset, rise, is_tilted) in
+                [(0.0, 0.0, 0.0), (0.0, height - bevel, 1.0), (bevel, height, 1.0)]
+            {
                 let corners = [[left, near], [right, near], [right, far], [left, far]];
                 let signs = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
                 mesh.positions.extend((0..4).map(|corner| {
@@ -300,7 +321,9 @@ pub(crate) fn spline(points: &[DVec2], steps: u32) -> Vec<DVec2> {
         .flat_map(|span| (0..steps).map(move |step| (span, f64::from(step) / f64::from(steps))))
         .map(|(span, t)| {
             let [a, b, c, d] = [span - 1, span, span + 1, span + 2].map(at);
-            0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * t * t
+            0.5 * (2.0 * b
+                + (c - a) * t
+                + (2.0 * a - 5.0 * b + 4.0 * c - d) * t * t
                 + (3.0 * b - a - 3.0 * c + d) * t * t * t)
         })
         .collect();

@@ -15,7 +15,11 @@ pub(crate) fn planks(min: DVec3, max: DVec3, count: u32) -> [Mesh; 2] {
         let own = &mut tones[(random([plank, 7, 0]) * 2.0) as usize];
         let piece = Mesh::chamfered(
             dvec3(min.x - 0.01 * random([plank, 1, 0]), min.y, z + 0.0006),
-            dvec3(max.x + 0.01 * random([plank, 2, 0]), max.y - 0.0006 * random([plank, 3, 0]), z + width - 0.0006),
+            dvec3(
+                max.x + 0.01 * random([plank, 2, 0]),
+                max.y - 0.0006 * random([plank, 3, 0]),
+                z + width - 0.0006,
+            ),
             0.0025,
         );
         *own = std::mem::take(own).and(piece);
@@ -49,21 +53,35 @@ pub(crate) fn bed() -> Bed {
     let bottle = Vessel::bottle(0.045, 0.235, 0.019, 0.0028);
     let [pale, dark] = planks(dvec3(-0.75, 0.72, -0.42), dvec3(0.75, 0.75, 0.42), 7);
     let plate = [
-        [0.0, 0.0], [0.05, 0.0], [0.055, 0.004], [0.1, 0.014], [0.101, 0.0155], [0.1, 0.017], [0.056, 0.008],
-        [0.048, 0.006], [0.0, 0.006],
+        [0.0, 0.0],
+        [0.05, 0.0],
+        [0.055, 0.004],
+        [0.1, 0.014],
+        [0.101, 0.0155],
+        [0.1, 0.017],
+        [0.056, 0.008],
+        [0.048, 0.006],
+        [0.0, 0.006],
     ];
     let biscuit = spline(
-        &[dvec2(0.0, 0.0), dvec2(0.03, 0.0), dvec2(0.033, 0.004), dvec2(0.029, 0.009), dvec2(0.015, 0.0115), dvec2(0.0, 0.012)],
+        &[
+            dvec2(0.0, 0.0),
+            dvec2(0.03, 0.0),
+            dvec2(0.033, 0.004),
+            dvec2(0.029, 0.009),
+            dvec2(0.015, 0.0115),
+            dvec2(0.0, 0.012),
+        ],
         5,
     );
     let biscuits = [[0.0, 0.006, 0.012], [-0.03, 0.012, -0.025], [0.028, 0.0135, -0.02]];
-    let biscuits = biscuits.into_iter().fold(Mesh::default(), |all, at| {
-        all.and(Mesh::revolve(&biscuit, 48).moved(at.into()))
-    });
+    let biscuits = biscuits
+        .into_iter()
+        .fold(Mesh::default(), |all, at| all.and(Mesh::revolve(&biscuit, 48).moved(at.into())));
     let trees = (0..26).fold(Mesh::default(), |all, tree| {
         let [x, z, size] = [0, 1, 2].map(|part| random([tree, 40, part]));
-        let radius = dvec3(1.6 + size, 1.9 + 2.0 * size, 1.6 + size);
-        let place = dvec3(-22.0 + 1.75 * f64::from(tree), radius.y * 0.85, -16.0 - 18.0 * z + 3.0 * x);
+        let radius = dvec3(1.8 + size, 1.6 + 1.8 * size, 1.8 + size);
+        let place = dvec3(-26.0 + 2.1 * f64::from(tree), radius.y * 0.85, -34.0 - 24.0 * z + 3.0 * x);
         all.and(lump(radius, tree, 0.13).moved(place))
     });
     Bed {

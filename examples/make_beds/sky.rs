@@ -30,11 +30,8 @@ pub(crate) fn write(path: &Path) -> Result<(), exr::error::Error> {
     write_rgb_file(path, WIDTH, height, |x, y| {
         let longitude = ((x as f32 + 0.5) / WIDTH as f32 - 0.5) * std::f32::consts::TAU;
         let latitude = (0.5 - (y as f32 + 0.5) / height as f32) * std::f32::consts::PI;
-        let direction = Vec3::new(
-            latitude.cos() * longitude.sin(),
-            latitude.sin(),
-            -latitude.cos() * longitude.cos(),
-        );
+        let direction =
+            Vec3::new(latitude.cos() * longitude.sin(), latitude.sin(), -latitude.cos() * longitude.cos());
         radiance(direction).into()
     })
 }

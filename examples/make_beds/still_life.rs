@@ -11,7 +11,17 @@ use crate::vessel::Vessel;
 fn candle() -> [Mesh; 3] {
     let profile = [
         vec![dvec2(0.0, 0.0), dvec2(0.029, 0.0), dvec2(0.0305, 0.0015)],
-        spline(&[dvec2(0.0305, 0.09), dvec2(0.03, 0.0945), dvec2(0.0275, 0.096), dvec2(0.022, 0.092), dvec2(0.012, 0.0885), dvec2(0.0, 0.088)], 6),
+        spline(
+            &[
+                dvec2(0.0305, 0.09),
+                dvec2(0.03, 0.0945),
+                dvec2(0.0275, 0.096),
+                dvec2(0.022, 0.092),
+                dvec2(0.012, 0.0885),
+                dvec2(0.0, 0.088),
+            ],
+            6,
+        ),
     ]
     .concat();
     let mut wax = Mesh::revolve(&profile, 96);
@@ -19,8 +29,12 @@ fn candle() -> [Mesh; 3] {
         // The rim has melted lower on one side.
         corner.y -= 0.12 * (corner.y - 0.06).max(0.0) * (1.0 + corner.x / 0.03);
     }
-    let wick = Mesh::tube(&[dvec3(0.0, 0.08, 0.0), dvec3(0.0002, 0.09, 0.0), dvec3(0.001, 0.0985, 0.0)], 0.0009, 10);
-    let flame = spline(&[dvec2(0.0, 0.0), dvec2(0.0042, 0.004), dvec2(0.0052, 0.01), dvec2(0.0032, 0.02), dvec2(0.0, 0.031)], 8);
+    let wick =
+        Mesh::tube(&[dvec3(0.0, 0.08, 0.0), dvec3(0.0002, 0.09, 0.0), dvec3(0.001, 0.0985, 0.0)], 0.0009, 10);
+    let flame = spline(
+        &[dvec2(0.0, 0.0), dvec2(0.0042, 0.004), dvec2(0.0052, 0.01), dvec2(0.0032, 0.02), dvec2(0.0, 0.031)],
+        8,
+    );
     [wax, wick, Mesh::revolve(&flame, 32)]
 }
 
@@ -38,7 +52,11 @@ fn soap() -> Mesh {
         let ring = corner.x.hypot(corner.z);
         let (cos, sin) = if ring > 0.0 { (corner.x / ring, corner.z / ring) } else { (0.0, 0.0) };
         let wide = power(ring, 0.45);
-        *corner = dvec3(0.042 * wide * power(cos, 0.55), 0.013 * power(corner.y, 0.6), 0.028 * wide * power(sin, 0.55));
+        *corner = dvec3(
+            0.042 * wide * power(cos, 0.55),
+            0.013 * power(corner.y, 0.6),
+            0.028 * wide * power(sin, 0.55),
+        );
     }
     bar
 }
@@ -50,11 +68,27 @@ pub(crate) fn bed() -> Bed {
     let [pale, dark] = planks(dvec3(-1.0, 0.71, -0.55), dvec3(1.0, 0.75, 0.55), 8);
     let [wax, wick, flame] = candle();
     let saucer = [
-        [0.0, 0.0], [0.028, 0.0], [0.03, 0.003], [0.054, 0.011], [0.055, 0.0125], [0.054, 0.0135], [0.03, 0.006], [0.0, 0.005],
+        [0.0, 0.0],
+        [0.028, 0.0],
+        [0.03, 0.003],
+        [0.054, 0.011],
+        [0.055, 0.0125],
+        [0.054, 0.0135],
+        [0.03, 0.006],
+        [0.0, 0.005],
     ];
     let lemon = |seed: u32| {
         let outline = spline(
-            &[dvec2(0.0, -0.041), dvec2(0.006, -0.0385), dvec2(0.017, -0.028), dvec2(0.0265, 0.0), dvec2(0.019, 0.026), dvec2(0.008, 0.036), dvec2(0.005, 0.041), dvec2(0.0, 0.0425)],
+            &[
+                dvec2(0.0, -0.041),
+                dvec2(0.006, -0.0385),
+                dvec2(0.017, -0.028),
+                dvec2(0.0265, 0.0),
+                dvec2(0.019, 0.026),
+                dvec2(0.008, 0.036),
+                dvec2(0.005, 0.041),
+                dvec2(0.0, 0.0425),
+            ],
             8,
         );
         let mut lemon = Mesh::revolve(&outline, 64);

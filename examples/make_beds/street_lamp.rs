@@ -8,7 +8,12 @@ use crate::mesh::{Mesh, Tiling, random, spline, tiles};
 /// Height of the paving over the level of the puddles.
 fn unevenness(x: f64, z: f64) -> f64 {
     let wave = |kx: f64, kz: f64, phase: f64| (kx * x + kz * z + phase).sin();
-    0.006 + 0.011 * (wave(0.55, 0.3, 0.0) + wave(-0.35, 0.6, 2.0) + 0.7 * wave(0.9, -0.75, 4.0) + 0.5 * wave(1.7, 1.4, 1.0))
+    0.006
+        + 0.011
+            * (wave(0.55, 0.3, 0.0)
+                + wave(-0.35, 0.6, 2.0)
+                + 0.7 * wave(0.9, -0.75, 4.0)
+                + 0.5 * wave(1.7, 1.4, 1.0))
 }
 
 /// Setts in two tones.
@@ -35,8 +40,17 @@ fn setts() -> Vec<Mesh> {
 fn post() -> Mesh {
     let profile = spline(
         &[
-            dvec2(0.14, 0.12), dvec2(0.1, 0.3), dvec2(0.085, 0.7), dvec2(0.1, 0.82), dvec2(0.06, 0.9), dvec2(0.05, 1.6), dvec2(0.04, 3.1),
-            dvec2(0.06, 3.16), dvec2(0.045, 3.24), dvec2(0.12, 3.34), dvec2(0.14, 3.38),
+            dvec2(0.14, 0.12),
+            dvec2(0.1, 0.3),
+            dvec2(0.085, 0.7),
+            dvec2(0.1, 0.82),
+            dvec2(0.06, 0.9),
+            dvec2(0.05, 1.6),
+            dvec2(0.04, 3.1),
+            dvec2(0.06, 3.16),
+            dvec2(0.045, 3.24),
+            dvec2(0.12, 3.34),
+            dvec2(0.14, 3.38),
         ],
         5,
     );
@@ -47,7 +61,14 @@ fn post() -> Mesh {
 /// The cap over the globe, with a knob.
 fn cap() -> Mesh {
     let profile = spline(
-        &[dvec2(0.235, 0.11), dvec2(0.2, 0.19), dvec2(0.11, 0.265), dvec2(0.03, 0.3), dvec2(0.03, 0.33), dvec2(0.0, 0.36)],
+        &[
+            dvec2(0.235, 0.11),
+            dvec2(0.2, 0.19),
+            dvec2(0.11, 0.265),
+            dvec2(0.03, 0.3),
+            dvec2(0.03, 0.33),
+            dvec2(0.0, 0.36),
+        ],
         5,
     );
     let inside = vec![dvec2(0.0, 0.25), dvec2(0.1, 0.245), dvec2(0.19, 0.17), dvec2(0.225, 0.105)];
@@ -62,7 +83,11 @@ fn bench() -> Mesh {
     });
     let back = (0..3).map(|slat| {
         let y = 0.55 + 0.11 * f64::from(slat);
-        Mesh::chamfered(dvec3(-0.9, y, -0.29 - 0.02 * f64::from(slat)), dvec3(0.9, y + 0.085, -0.26 - 0.02 * f64::from(slat)), 0.005)
+        Mesh::chamfered(
+            dvec3(-0.9, y, -0.29 - 0.02 * f64::from(slat)),
+            dvec3(0.9, y + 0.085, -0.26 - 0.02 * f64::from(slat)),
+            0.005,
+        )
     });
     let stands = [-0.7, 0.7].into_iter().flat_map(|x| {
         [
@@ -102,6 +127,7 @@ pub(crate) fn bed() -> Bed {
         ("houses", walls, 0.0),
         ("panes", panes, 0.0),
     ];
-    meshes.extend(["setts_grey", "setts_dark"].into_iter().zip(setts()).map(|(name, mesh)| (name, mesh, 50.0)));
+    meshes
+        .extend(["setts_grey", "setts_dark"].into_iter().zip(setts()).map(|(name, mesh)| (name, mesh, 50.0)));
     Bed { name: "street_lamp", scene: include_str!("../scenes/beds/street_lamp.ron"), meshes }
 }

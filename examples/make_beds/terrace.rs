@@ -78,7 +78,9 @@ fn paving() -> Vec<Mesh> {
             bond: 0.0,
             tilt: 0.0015,
         };
-        for (own, mesh) in meshes.iter_mut().zip(tiles(&tiling, 2, |a, b| usize::from(random([a, b, 70 + number]) > 0.6))) {
+        for (own, mesh) in
+            meshes.iter_mut().zip(tiles(&tiling, 2, |a, b| usize::from(random([a, b, 70 + number]) > 0.6)))
+        {
             *own = std::mem::take(own).and(mesh);
         }
     }
@@ -111,15 +113,26 @@ fn ladder() -> Mesh {
             .collect();
         Mesh::tube(&path, 0.02, 20)
     };
-    let steps = [-0.25, -0.55, -0.85].map(|y| Mesh::chamfered(dvec3(-0.26, y, -0.22), dvec3(-0.18, y + 0.03, 0.22), 0.004));
+    let steps = [-0.25, -0.55, -0.85]
+        .map(|y| Mesh::chamfered(dvec3(-0.26, y, -0.22), dvec3(-0.18, y + 0.03, 0.22), 0.004));
     steps.into_iter().fold(rail(-0.22).and(rail(0.22)), Mesh::and)
 }
 
 /// A round table on one leg.
 fn table() -> Mesh {
     let profile = [
-        [0.0, 0.0], [0.2, 0.0], [0.2, 0.012], [0.03, 0.03], [0.022, 0.06], [0.022, 0.69], [0.05, 0.698], [0.335, 0.698],
-        [0.34, 0.703], [0.34, 0.715], [0.335, 0.72], [0.0, 0.72],
+        [0.0, 0.0],
+        [0.2, 0.0],
+        [0.2, 0.012],
+        [0.03, 0.03],
+        [0.022, 0.06],
+        [0.022, 0.69],
+        [0.05, 0.698],
+        [0.335, 0.698],
+        [0.34, 0.703],
+        [0.34, 0.715],
+        [0.335, 0.72],
+        [0.0, 0.72],
     ];
     Mesh::revolve(&profile.map(Into::into), 128)
 }
@@ -127,14 +140,28 @@ fn table() -> Mesh {
 pub(crate) fn bed() -> Bed {
     let [low, high] = POOL;
     let reach = dvec3(0.05, 0.0, 0.05);
-    let water = Mesh::block(low - reach - 0.05 * DVec3::Y, dvec3(high.x, -0.1, high.z) + reach, [177, 168], waves);
+    let water =
+        Mesh::block(low - reach - 0.05 * DVec3::Y, dvec3(high.x, -0.1, high.z) + reach, [177, 168], waves);
     let goblet = Vessel::goblet(0.19);
     let tumbler = Vessel::tumbler(0.03, 0.036, 0.1, 0.0025, 0.01);
     let carafe = Vessel::bottle(0.055, 0.27, 0.024, 0.003);
-    let pot = [[0.0, 0.0], [0.2, 0.0], [0.28, 0.42], [0.3, 0.43], [0.3, 0.5], [0.27, 0.5], [0.25, 0.45], [0.0, 0.45]];
+    let pot = [
+        [0.0, 0.0],
+        [0.2, 0.0],
+        [0.28, 0.42],
+        [0.3, 0.43],
+        [0.3, 0.5],
+        [0.27, 0.5],
+        [0.25, 0.45],
+        [0.0, 0.45],
+    ];
     let cypresses = (0..7).fold(Mesh::default(), |all, tree| {
         let size = 1.0 + 0.5 * random([tree, 3, 3]);
-        let place = dvec3(-16.0 + 5.0 * f64::from(tree) + 2.0 * random([tree, 4, 4]), 1.7 * size, -17.0 - 3.0 * random([tree, 5, 5]));
+        let place = dvec3(
+            -16.0 + 5.0 * f64::from(tree) + 2.0 * random([tree, 4, 4]),
+            1.7 * size,
+            -17.0 - 3.0 * random([tree, 5, 5]),
+        );
         all.and(lump(dvec3(0.75, 3.4, 0.75) * size, tree, 0.09).moved(place))
     });
     let hill = Mesh::sheet([24, 96], |u, v| {
@@ -159,7 +186,13 @@ pub(crate) fn bed() -> Bed {
         ("cypresses", cypresses, 80.0),
         ("hill", hill, 60.0),
     ];
-    meshes.extend(["mosaic_pale", "mosaic_blue", "mosaic_deep"].into_iter().zip(mosaic()).map(|(name, mesh)| (name, mesh, 0.0)));
-    meshes.extend(["slabs_pale", "slabs_warm"].into_iter().zip(paving()).map(|(name, mesh)| (name, mesh, 0.0)));
+    meshes.extend(
+        ["mosaic_pale", "mosaic_blue", "mosaic_deep"]
+            .into_iter()
+            .zip(mosaic())
+            .map(|(name, mesh)| (name, mesh, 0.0)),
+    );
+    meshes
+        .extend(["slabs_pale", "slabs_warm"].into_iter().zip(paving()).map(|(name, mesh)| (name, mesh, 0.0)));
     Bed { name: "terrace", scene: include_str!("../scenes/beds/terrace.ron"), meshes }
 }

@@ -1,7 +1,5 @@
 //! Oracles of the meshes, and the scenes as a reader finds them.
 
-use std::path::PathBuf;
-
 use glam::{DVec3, dvec3};
 use upbp_accel::TriangleMesh;
 use upbp_scene::description::{Geometry, Material};
@@ -11,13 +9,6 @@ use upbp_scene::{ReadyScene, SceneDescription};
 use crate::mesh::Mesh;
 use crate::{beds, write};
 
-/// A folder with everything written to it.
-fn written(test: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("beds-{test}"));
-    write(&beds(), &folder).unwrap();
-    folder
-}
-
 fn read(text: &str) -> TriangleMesh {
     let ObjMesh { positions, indices, normals } = ObjMesh::parse(text).unwrap();
     TriangleMesh::new(positions, indices, normals).unwrap()
@@ -25,9 +16,13 @@ fn read(text: &str) -> TriangleMesh {
 
 #[test]
 fn every_scene_loads() {
-    let folder = written("load");
-    for bed in beds() {
-        ReadyScene::load(folder.join(format!("{}.ron", bed.name))).unwrap_or_else(|error| panic!("{error}"));
+    let folder = std::env::temp_dir().join(format!("upbp-beds-{}", std::process::id()));
+    let beds = beds();
+    write(&beds, &folder).unwrap();
+    let loaded = beds.map(|bed| ReadyScene::load(folder.join(format!("{}.ron", bed.name))));
+    std::fs::remove_dir_all(&folder).unwrap();
+    for scene in loaded {
+        scene.unwrap_or_else(|error| panic!("{error}"));
     }
 }
 
@@ -43,7 +38,10 @@ fn every_mesh_is_named_by_its_scene_and_every_body_is_closed_with_normals_outwar
             let shape = shape.unwrap_or_else(|| panic!("{path} is in no scene"));
             let mesh = read(&mesh.to_obj(*crease));
             let material = scene.materials.get(&shape.material).unwrap();
-            if matches!(material, Material::Dielectric { .. } | Material::RoughDielectric { .. } | Material::Null) {
+            if matches!(
+                material,
+                Material::Dielectric { .. } | Material::RoughDielectric { .. } | Material::Null
+            ) {
                 assert!(mesh.is_closed(), "{path}");
                 assert!(mesh.signed_volume() > 0.0, "{path}");
             }

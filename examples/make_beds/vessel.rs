@@ -47,14 +47,29 @@ impl Vessel {
 
     /// A wine glass of that height: foot, stem and bowl.
     pub(crate) fn goblet(height: f64) -> Self {
-        let scaled = |points: &[[f64; 2]]| points.iter().map(|&[r, y]| dvec2(r, y) * height).collect::<Vec<_>>();
+        let scaled =
+            |points: &[[f64; 2]]| points.iter().map(|&[r, y]| dvec2(r, y) * height).collect::<Vec<_>>();
         let foot = scaled(&[[0.0, 0.0], [0.17, 0.0], [0.18, 0.006]]);
         let stem = scaled(&[
-            [0.175, 0.014], [0.09, 0.03], [0.03, 0.06], [0.02, 0.14], [0.019, 0.34], [0.03, 0.43], [0.11, 0.5],
-            [0.18, 0.6], [0.195, 0.7], [0.18, 0.85], [0.163, 0.995],
+            [0.175, 0.014],
+            [0.09, 0.03],
+            [0.03, 0.06],
+            [0.02, 0.14],
+            [0.019, 0.34],
+            [0.03, 0.43],
+            [0.11, 0.5],
+            [0.18, 0.6],
+            [0.195, 0.7],
+            [0.18, 0.85],
+            [0.163, 0.995],
         ]);
         let bowl = scaled(&[
-            [0.03, 0.452], [0.105, 0.515], [0.172, 0.605], [0.186, 0.7], [0.171, 0.85], [0.155, 0.995],
+            [0.03, 0.452],
+            [0.105, 0.515],
+            [0.172, 0.605],
+            [0.186, 0.7],
+            [0.171, 0.85],
+            [0.155, 0.995],
         ]);
         let outer = [foot, spline(&stem, 6), scaled(&[[0.159, 1.0]])].concat();
         let inner = [scaled(&[[0.0, 0.447]]), spline(&bowl, 6)].concat();
@@ -80,7 +95,12 @@ impl Vessel {
         let (floor, round) = (3.0 * wall, 0.1 * radius);
         let base = |inset: f64, y: f64| {
             let side = radius - inset;
-            vec![dvec2(0.0, y), dvec2(side - 2.0 * round, y), dvec2(side - 0.6 * round, y + 0.5 * round), dvec2(side, y + 2.0 * round)]
+            vec![
+                dvec2(0.0, y),
+                dvec2(side - 2.0 * round, y),
+                dvec2(side - 0.6 * round, y + 0.5 * round),
+                dvec2(side, y + 2.0 * round),
+            ]
         };
         let outer = [base(0.0, 0.0), curve(0.0), vec![dvec2(1.16 * neck - 0.5 * wall, height)]].concat();
         Self { outer, inner: [base(wall, floor), curve(wall)].concat() }
@@ -96,12 +116,19 @@ impl Vessel {
     /// the higher priority.
     pub(crate) fn filling(&self, level: f64, into: f64) -> Mesh {
         let reach = |point: DVec2| dvec2(if point.x > 0.0 { point.x + into } else { 0.0 }, point.y - into);
-        let below: Vec<DVec2> = self.inner.iter().copied().filter(|point| point.y < level - 2.0 * into).collect();
+        let below: Vec<DVec2> =
+            self.inner.iter().copied().filter(|point| point.y < level - 2.0 * into).collect();
         let next = self.inner[below.len()];
         let last = below[below.len() - 1];
         let side = last.x + (next.x - last.x) * (level - last.y) / (next.y - last.y);
         let rise = 0.04 * side;
-        let meniscus = [[into, rise], [0.0, 0.9 * rise], [-0.4 * rise, 0.45 * rise], [-rise, 0.12 * rise], [-2.0 * rise, 0.0]];
+        let meniscus = [
+            [into, rise],
+            [0.0, 0.9 * rise],
+            [-0.4 * rise, 0.45 * rise],
+            [-rise, 0.12 * rise],
+            [-2.0 * rise, 0.0],
+        ];
         let profile: Vec<DVec2> = below
             .into_iter()
             .map(reach)
