@@ -25,7 +25,7 @@ const HOLE_AT: i32 = -8;
 
 /// The slide: a sheet with openings in the plane z = 0; the lamp is at +z, and its axis is the z axis.
 fn slide() -> Mesh {
-    let columns = LETTERS[0].len() as i32;
+    let columns = LETTERS[0].len().cast_signed() as i32;
     let is_open = |column: i32, row: i32| {
         let letter = LETTERS.get((LETTERS_AT + 3 - row) as usize);
         let letter = letter.and_then(|line| line.as_bytes().get((column + columns / 2) as usize));

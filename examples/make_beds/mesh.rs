@@ -222,7 +222,9 @@ impl Mesh {
             .collect();
         let mut around = vec![Vec::new(); self.positions.len()];
         for (index, triangle) in self.triangles.iter().enumerate() {
-            triangle.iter().for_each(|&corner| around[corner as usize].push(index));
+            for &corner in triangle {
+                around[corner as usize].push(index);
+            }
         }
         let least = crease.to_radians().cos();
         let normal = |own: DVec3, corner: u32| {
@@ -315,8 +317,8 @@ pub(crate) fn random(key: [u32; 3]) -> f64 {
 
 /// Points on smooth curves through those given (Catmull–Rom), `steps` to each span, the ends included.
 pub(crate) fn spline(points: &[DVec2], steps: u32) -> Vec<DVec2> {
-    let at = |index: isize| points[index.clamp(0, points.len() as isize - 1) as usize];
-    let spans = points.len() as isize - 1;
+    let at = |index: isize| points[index.clamp(0, points.len().cast_signed() - 1) as usize];
+    let spans = points.len().cast_signed() - 1;
     let mut curve: Vec<DVec2> = (0..spans)
         .flat_map(|span| (0..steps).map(move |step| (span, f64::from(step) / f64::from(steps))))
         .map(|(span, t)| {

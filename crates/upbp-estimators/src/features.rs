@@ -55,5 +55,5 @@ impl Features {
 
 /// In `[0, 1]`, and zero for what is not a number.
 fn bounded(spectrum: Spectrum) -> Spectrum {
-    spectrum.map(|value| value.max(0.0).min(1.0))
+    spectrum.map(|value| if value > 0.0 { value.min(1.0) } else { 0.0 })
 }

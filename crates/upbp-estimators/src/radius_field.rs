@@ -141,7 +141,7 @@ impl Along {
         let FootprintField { offset, slope, least, most, .. } = self.field;
         let mut cuts = [f32::INFINITY; 2 * LEVELS + 1];
         for level in 0..LEVELS {
-            let factor = least * STEP.powi(level as i32);
+            let factor = least * STEP.powi(level.cast_signed() as i32);
             let distance = (factor.min(most) - offset) / slope;
             let half = (distance * distance - self.height2).max(0.0).sqrt();
             let half = if distance > 0.0 { half } else { 0.0 };

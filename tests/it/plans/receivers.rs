@@ -1,5 +1,7 @@
 //! Many lamps in many rooms: next events choose those that arrive.
 
+use std::fmt::Write as _;
+
 use upbp_core::{FrozenPlan, Settings, Start, TechniqueSet, Techniques};
 use upbp_scene::ReadyScene;
 use upbp_testing::{Estimate, assert_same, channels, renderer};
@@ -13,7 +15,8 @@ fn cells(side: u32) -> ReadyScene {
         for (u, edge) in
             [(0.98, "(0, 0.5, 0), edge_v: (0, 0, 0.96)"), (0.02, "(0, 0, 0.96), edge_v: (0, 0.5, 0)")]
         {
-            shapes += &format!(
+            let _ = write!(
+                shapes,
                 "(material: \"grey\", geometry: Quad(origin: ({}, 0, {}), edge_u: {edge})),",
                 x + u,
                 z + 0.02
@@ -22,14 +25,16 @@ fn cells(side: u32) -> ReadyScene {
         for (w, edge) in
             [(0.98, "(0.96, 0, 0), edge_v: (0, 0.5, 0)"), (0.02, "(0, 0.5, 0), edge_v: (0.96, 0, 0)")]
         {
-            shapes += &format!(
+            let _ = write!(
+                shapes,
                 "(material: \"grey\", geometry: Quad(origin: ({}, 0, {}), edge_u: {edge})),",
                 x + 0.02,
                 z + w
             );
         }
         for lamp in [0.2, 0.8] {
-            shapes += &format!(
+            let _ = write!(
+                shapes,
                 "(material: \"black\", emission: 40, geometry: Sphere(centre: ({}, 0.2, {}), radius: 0.02)),",
                 x + lamp,
                 z + 0.3 * lamp + 0.1

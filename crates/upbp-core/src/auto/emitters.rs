@@ -4,9 +4,9 @@
 //! them are lost: the light goes past the scene, or emission hits find it anyway. So a small run counts the
 //! weighted contributions that come from each emitter, by next events and by light sub-paths, as far as no
 //! other technique would find them, and emitters are then chosen in proportion (`docs/theory.md`, section
-//! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image. Next events
-//! choose by the place of the receiver where that pays. Further rounds learn where on the emitters light
-//! sub-paths should start ([`guides`]).
+//! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image. Next
+//! events choose by the place of the receiver where that pays. Further rounds learn where on the emitters
+//! light sub-paths should start ([`guides`]).
 
 use glam::Vec3;
 use upbp_estimators::observer::{

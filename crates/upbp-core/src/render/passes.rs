@@ -101,6 +101,9 @@ pub(crate) struct Buffers<'b> {
     pub(crate) features: &'b mut [Features],
 }
 
+/// The number of a chunk, its pixels, and their features if they are kept.
+type CameraChunk<'a> = (usize, (&'a mut [Pixel], &'a mut [Features]));
+
 /// Traces one camera sub-path for each pixel of `rect` that belongs to one of `sets`, and adds it to
 /// the buffers. `None` if it was halted: then the pixels of these sets mean nothing.
 pub(crate) fn camera_pass<S: Scene>(
@@ -115,8 +118,7 @@ pub(crate) fn camera_pass<S: Scene>(
     // None of them if there is no room for any.
     let mut chunks: Vec<_> = features.chunks_mut(CAMERA_CHUNK).collect();
     chunks.resize_with(pixels.len().div_ceil(CAMERA_CHUNK), Default::default);
-    type Piece<'p> = (usize, (&'p mut [Pixel], &'p mut [Features]));
-    let trace = |scratch: &mut Scratch<S::Bsdf>, (chunk, (pixels, features)): Piece<'_>| {
+    let trace = |scratch: &mut Scratch<S::Bsdf>, (chunk, (pixels, features)): CameraChunk<'_>| {
         let mut counters = Counters::default();
         for (i, pixel) in pixels.iter_mut().enumerate() {
             let place = chunk * CAMERA_CHUNK + i;

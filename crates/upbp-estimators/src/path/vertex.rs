@@ -193,8 +193,8 @@ pub(crate) struct CameraEdge<D> {
 }
 
 impl<D: Densities> CameraEdge<D> {
-    /// The vertex at distance `t` along the edge, in a medium, where kernel radii have some scale; `None` where
-    /// no walk can stop.
+    /// The vertex at distance `t` along the edge, in a medium, where kernel radii have some scale; `None`
+    /// where no walk can stop.
     pub(crate) fn vertex_at<S: Scene>(
         &self,
         context: &Context<'_, S>,

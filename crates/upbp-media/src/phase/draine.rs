@@ -1,6 +1,6 @@
 //! The phase function of Draine: that of Henyey and Greenstein times `1 + α cos² θ`.
 //!
-//! Source: Draine, "Scattering by interstellar dust grains", ApJ 598, 2003; its parameters for water
+//! Source: Draine, "Scattering by interstellar dust grains", `ApJ` 598, 2003; its parameters for water
 //! droplets: Jendersie and d'Eon, "An approximate Mie scattering function for fog and cloud rendering",
 //! SIGGRAPH Talks 2023. The inversion: `docs/theory.md`, section 7. Oracle: `tests` of the parent module.
 
