@@ -53,7 +53,7 @@ fn wrong_values_have_a_line_and_a_column() {
         ),
         (
             "(version: 1, media: { \"a\": Homogeneous(sigmas: 1) })",
-            "1:40: Unexpected field named `sigmas` in `Homogeneous`, expected one of `sigma_a`, `sigma_s`, `phase`, or `emission` instead",
+            "1:40: Unexpected field named `sigmas` in `Homogeneous`, expected one of `sigma_a`, `sigma_s`, `phase`, `emission`, or `glow` instead",
         ),
         (
             "(version: 1, media: { \"a\": Homogeneous(), \"a\": Homogeneous() })",
