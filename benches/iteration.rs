@@ -14,7 +14,8 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use upbp_core::{MediumId, Settings, TechniqueSet};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy, VertexKind};
 use upbp_estimators::mis::{
-    BeamExtent, Edge, EdgeMis, EdgeStart, Heuristic, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
+    BeamExtent, DistanceDensity, Edge, EdgeMis, EdgeStart, Heuristic, MergeKind, MisPlan, VertexMis,
+    VolumeMerges, Weight,
 };
 use upbp_estimators::scene::Walk;
 use upbp_scene::ReadyScene;
@@ -101,6 +102,7 @@ fn plan() -> MisPlan {
         width: Vec::new(),
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
+        lanes: [0.0; 3],
     }
 }
 
@@ -145,14 +147,14 @@ impl<'a> Ends<'a> {
         let mut light = [edge_mis; 2];
         for (i, vertex) in v.iter().enumerate().take(middle).skip(1) {
             let vertex_mis = Self::arrive(plan, path, Walk::Light, &edge_mis, i);
-            let before = vertex_mis.before(plan, vertex.rho_camera);
+            let before = vertex_mis.before(plan, vertex.rho_camera, &());
             edge_mis = Self::scatter(vertex, &vertex_mis, before, vertex.rho_light, vertex.cos_camera);
             light = [edge_mis, light[0]];
         }
-        let mut camera = EdgeMis::at_camera(v[length].rho_camera);
+        let mut camera = EdgeMis::at_camera(plan, v[length].rho_camera);
         for i in (middle + 1..length).rev() {
             let vertex_mis = Self::arrive(plan, path, Walk::Camera, &camera, i);
-            let before = vertex_mis.before(plan, v[i].rho_light);
+            let before = vertex_mis.before(plan, v[i].rho_light, &());
             camera = Self::scatter(&v[i], &vertex_mis, before, v[i].rho_camera, v[i].cos_light);
         }
         Self { plan, path, middle, light, camera }
@@ -165,6 +167,7 @@ impl<'a> Ends<'a> {
             cos_out,
             kind: kind(vertex),
             distance_factor: vertex_mis.distance_factor,
+            shares: (),
             connectible: true,
             start: if in_medium(vertex) { EdgeStart::Medium } else { EdgeStart::Surface },
         }
@@ -202,10 +205,10 @@ impl<'a> Ends<'a> {
         let vertex = &path.vertices[middle];
         let light = Self::arrive(plan, path, Walk::Light, &self.light[0], middle);
         let camera = Self::arrive(plan, path, Walk::Camera, &self.camera, middle);
-        let (c_light, c_camera) = (light.distance_factor, camera.distance_factor);
-        let factors = plan.volume_factors(MediumId(0), c_light, c_camera, vertex.sin_theta, vertex.scale);
+        let [own, other] = [light.distance_factor, camera.distance_factor].map(DistanceDensity::at_stop);
+        let factors = plan.volume_factors(MediumId(0), own, other, vertex.sin_theta, vertex.scale);
         let (before_light, before_camera) =
-            (light.before(plan, vertex.rho_camera), camera.before(plan, vertex.rho_light));
+            (light.before(plan, vertex.rho_camera, &()), camera.before(plan, vertex.rho_light, &()));
         Weight::of_merge(factors.bb1d, factors.sum::<f64>(), before_light, before_camera).value()
     }
 
@@ -217,15 +220,15 @@ impl<'a> Ends<'a> {
         let light = Self::arrive(plan, path, Walk::Light, &self.light[1], middle - 1);
         let camera = Self::arrive(plan, path, Walk::Camera, &self.camera, middle);
         let square = edge.distance * edge.distance;
-        let opposite =
-            |walk, vertex, t| plan.distance_factor(walk, in_medium(vertex), edge.pass_probability, t);
-        let light_end =
-            light.end(plan, Walk::Light, kind(a), opposite(Walk::Camera, a, edge.t_camera), a.rho_camera);
-        let camera_end =
-            camera.end(plan, Walk::Camera, kind(b), opposite(Walk::Light, b, edge.t_light), b.rho_light);
-        let light_density = b.rho_camera * a.cos_camera / square * edge.t_camera;
-        let camera_density = a.rho_light * b.cos_light / square * edge.t_light;
-        plan.connect_weight(light_end, light_density, camera_end, camera_density).value()
+        let other =
+            |walk, vertex, t: f64| plan.other_walk(walk, in_medium(vertex), edge.pass_probability, t, &());
+        let light_density = b.rho_camera * a.cos_camera / square;
+        let camera_density = a.rho_light * b.cos_light / square;
+        let by_camera = other(Walk::Camera, a, edge.t_camera);
+        let by_light = other(Walk::Light, b, edge.t_light);
+        let light_end = light.end(plan, Walk::Light, kind(a), &by_camera, a.rho_camera, light_density);
+        let camera_end = camera.end(plan, Walk::Camera, kind(b), &by_light, b.rho_light, camera_density);
+        plan.connect_weight(light_end, camera_end).value()
     }
 }
 

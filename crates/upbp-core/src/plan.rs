@@ -38,6 +38,10 @@ pub struct Plan {
     pub vertices_per_light_path: f64,
     /// First radii and how they shrink.
     pub radii: RadiusSchedule,
+    /// The probability of each lane to be the one that a sub-path draws all its distances from
+    /// (`docs/theory.md`, section 6.13); they sum to one. `None` if every segment draws from its medium's own
+    /// distribution.
+    pub lanes: Option<[f64; 3]>,
 }
 
 impl Plan {
@@ -90,10 +94,18 @@ impl Plan {
                 FootprintField::RANGE,
                 radii.field
             ))
+        } else if !self.lanes.is_none_or(is_distribution) {
+            Err(format!("lanes: expected None, or probabilities that sum to one, found {:?}", self.lanes))
         } else {
             Ok(())
         }
     }
+}
+
+/// Whether these are probabilities of all there is.
+fn is_distribution(probabilities: [f64; 3]) -> bool {
+    probabilities.iter().all(|p| (0.0..=1.0).contains(p))
+        && (probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-9
 }
 
 /// A plan with the emitters that its sub-paths begin at: all that is decided before the first iteration.
@@ -142,6 +154,9 @@ impl fmt::Display for Plan {
         match self.roulette {
             Roulette::Off => write!(f, ", no roulette")?,
             Roulette::Below(least) => write!(f, ", roulette below {least}")?,
+        }
+        if self.lanes.is_some() {
+            write!(f, ", distances by channel")?;
         }
         for technique in self.techniques.iter().filter(|technique| self.periods.period(*technique) > 1) {
             write!(f, ", {} in one of {} iterations", technique.name(), self.periods.period(technique))?;
@@ -193,6 +208,7 @@ mod tests {
                 progressive: true,
                 floor: 1e-6,
             },
+            lanes: Some([0.25, 0.75, 0.0]),
         }
     }
 
@@ -204,7 +220,7 @@ mod tests {
         assert_eq!(FrozenPlan::from_ron(&text), Ok(frozen));
         assert_eq!(
             plan().to_string(),
-            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, surf in one of 4 iterations"
+            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, distances by channel, surf in one of 4 iterations"
         );
     }
 
@@ -220,6 +236,7 @@ mod tests {
         assert!(wrong(|p| p.light_paths = 0).contains("light_paths"));
         assert!(wrong(|p| p.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|p| p.radii.pb2d = f32::NAN).contains("radii"));
+        assert!(wrong(|p| p.lanes = Some([0.5; 3])).contains("lanes"));
         // This one cannot even be spelled.
         let without = Plan { techniques: TechniqueSet::EMPTY, ..plan() };
         assert!(without.validate().unwrap_err().contains("techniques"));

@@ -112,6 +112,8 @@ pub struct IterationChoices {
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,
+    /// The probability of each lane to be the hero of a sub-path, if walks run in lanes; they sum to one.
+    pub lanes: Option<[f64; 3]>,
 }
 
 /// `(r/ℓ)⁴` of a kernel in a medium, `w` of the factor `1 / (1 + w)` of its merges (`docs/theory.md`, section
@@ -178,6 +180,7 @@ impl IterationPlan {
             width: scene.media().iter().map(widths).collect(),
             photon_beams: choices.photon_beams,
             query_beams: choices.query_beams,
+            lanes: choices.lanes.unwrap_or_default(),
         };
         Self {
             seed: choices.seed,

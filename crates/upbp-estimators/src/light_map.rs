@@ -1,6 +1,7 @@
 //! Light vertices and photon beams of an iteration, in trees for the queries of camera sub-paths.
 
 use upbp_accel::{PointTree, SegmentTree, SplitParams};
+use upbp_media::Lanes;
 
 use crate::iteration::IterationPlan;
 use crate::mis::Densities;
@@ -8,11 +9,11 @@ use crate::path::{Interaction, LightVertex, PhotonBeam};
 use crate::technique::Technique;
 
 /// Light vertices and photon beams of an iteration, with the trees that camera sub-paths query.
-pub struct LightMap<B, D = f64> {
+pub struct LightMap<B, D: Densities = f64, L: Lanes = f64> {
     /// All vertices that can be connected or merged.
-    pub vertices: Vec<LightVertex<B, D>>,
+    pub vertices: Vec<LightVertex<B, D, L>>,
     /// All photon beams.
-    pub beams: Vec<PhotonBeam<D>>,
+    pub beams: Vec<PhotonBeam<D, L>>,
     /// Surface photons; the payload is an index into `vertices`.
     pub(crate) surface: PointTree<u32>,
     /// Photons in media.
@@ -21,10 +22,14 @@ pub struct LightMap<B, D = f64> {
     pub(crate) beam_tree: SegmentTree<u32>,
 }
 
-impl<B: Copy + Send + Sync, D: Densities> LightMap<B, D> {
+impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
     /// Builds the structures that the plan queries, and no others.
     #[must_use]
-    pub fn build(plan: &IterationPlan, vertices: Vec<LightVertex<B, D>>, beams: Vec<PhotonBeam<D>>) -> Self {
+    pub fn build(
+        plan: &IterationPlan,
+        vertices: Vec<LightVertex<B, D, L>>,
+        beams: Vec<PhotonBeam<D, L>>,
+    ) -> Self {
         let photons = |on: bool, keep: fn(&Interaction<B>) -> bool| {
             let chosen = vertices.iter().enumerate().filter(|(_, v)| on && keep(&v.interaction));
             PointTree::build(chosen.map(|(i, v)| (v.position, i as u32)).collect())
@@ -56,8 +61,8 @@ impl<B: Copy + Send + Sync, D: Densities> LightMap<B, D> {
     /// Bytes that the map occupies.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
-        self.vertices.capacity() * size_of::<LightVertex<B, D>>()
-            + self.beams.capacity() * size_of::<PhotonBeam<D>>()
+        self.vertices.capacity() * size_of::<LightVertex<B, D, L>>()
+            + self.beams.capacity() * size_of::<PhotonBeam<D, L>>()
             + self.surface.memory_bytes()
             + self.medium.memory_bytes()
             + self.beam_tree.memory_bytes()

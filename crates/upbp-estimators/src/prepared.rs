@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use upbp_media::{BodyId, Medium, MediumStack, RaySegment, SegmentDensity};
+use upbp_media::{BodyId, Lanes, Medium, MediumStack, RaySegment, SegmentDensity};
 
 use crate::emission_guide::EmissionGuide;
 use crate::emitter_choice::{EmitterChoice, EmitterSample, EmitterShares, Selection};
@@ -26,7 +26,6 @@ pub struct PreparedScene<'a, S: Scene> {
     environments: Vec<EmitterId>,
     /// Bodies whose volume emits and where sub-paths begin, in order.
     volumes: Vec<(BodyId, EmitterId)>,
-    passes_from_infinity: f64,
     camera_stack: Option<MediumStack>,
     emitting_media: bool,
     dense_media: bool,
@@ -57,11 +56,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {
             return Err(PrepareError::Crop { width, height });
         }
-        let everything =
-            RaySegment { origin: bounds.centre, direction: glam::Vec3::Z, start: 0.0, end: f32::INFINITY };
-        let from_infinity = scene
-            .outside()
-            .map_or(SegmentDensity::VACUUM, |medium| scene.media()[medium.0 as usize].segment(&everything));
+        let from_infinity = from_infinity::<S, f64>(scene, &bounds);
         // No light from infinity gets through: such emitters are never chosen.
         let closed = from_infinity.transmittance.is_black();
         let mut powers = Vec::with_capacity(scene.emitters().len());
@@ -118,7 +113,6 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             emission_bounds: bounds,
             environments,
             volumes,
-            passes_from_infinity: from_infinity.pass_probability,
             camera_stack,
             emitting_media,
             dense_media,
@@ -367,8 +361,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 
     /// The probability that a walk passes an infinite length of the medium around everything.
     #[must_use]
-    pub(crate) const fn passes_from_infinity(&self) -> f64 {
-        self.passes_from_infinity
+    pub(crate) fn passes_from_infinity<L: Lanes>(&self) -> L {
+        from_infinity(self.scene, &self.bounds).pass_probability
     }
 
     /// Whether any medium emits light.
@@ -390,6 +384,14 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     pub fn stack_at_camera(&self, lens: glam::Vec3) -> MediumStack {
         self.camera_stack.clone().unwrap_or_else(|| self.scene.stack_at(lens))
     }
+}
+
+/// An infinite length of the medium around everything.
+fn from_infinity<S: Scene, L: Lanes>(scene: &S, bounds: &BoundingSphere) -> SegmentDensity<L> {
+    let everything =
+        RaySegment { origin: bounds.centre, direction: glam::Vec3::Z, start: 0.0, end: f32::INFINITY };
+    let medium = scene.outside().map(|medium| &scene.media()[medium.0 as usize]);
+    medium.map_or(SegmentDensity::VACUUM, |medium| L::segment(medium, &everything))
 }
 
 /// Media whose mean free path is a smaller part of the scene's radius are dense: of their vertices next to a

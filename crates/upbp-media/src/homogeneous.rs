@@ -28,8 +28,13 @@ enum Sampling {
     Never,
     /// All channels have the same extinction: one exponential, the same densities as the mixture of three.
     Grey,
-    /// The mixture of the channels, each with its probability.
-    Chromatic([f64; 3]),
+    /// The mixture of the channels, each with its probability, and the lane of each channel.
+    Chromatic {
+        /// Probabilities of the channels.
+        alpha: [f64; 3],
+        /// Extinctions of the lanes, in inverse scene units.
+        lanes: Spectrum,
+    },
 }
 
 /// A medium with the same coefficients everywhere.
@@ -61,7 +66,10 @@ impl Homogeneous {
         } else if sigma_t == Spectrum::splat(sigma_t.r()) {
             Sampling::Grey
         } else {
-            Sampling::Chromatic(channel_probabilities(sigma_s, sigma_t))
+            Sampling::Chromatic {
+                alpha: channel_probabilities(sigma_s, sigma_t),
+                lanes: lane_extinctions(sigma_s, sigma_t),
+            }
         };
         Ok(Self {
             sigma_a,
@@ -181,6 +189,38 @@ fn chromatic_density(alpha: &[f64; 3], sigma: Spectrum, length: f64) -> SegmentD
     SegmentDensity::symmetric(to_spectrum(channels), passes, stops)
 }
 
+/// The extinction of each channel's lane. The lane of a channel that only absorbs need not stop: it is that
+/// of the channel that gets farthest of those that scatter, or else one that always passes.
+fn lane_extinctions(sigma_s: Spectrum, sigma_t: Spectrum) -> Spectrum {
+    let farthest = (0..3).filter(|&c| sigma_s[c] > 0.0).map(|c| sigma_t[c]).fold(f32::INFINITY, f32::min);
+    Spectrum::from_array([0, 1, 2].map(|c| {
+        if sigma_s[c] > 0.0 {
+            sigma_t[c]
+        } else if farthest <= sigma_t[c] {
+            farthest
+        } else {
+            0.0
+        }
+    }))
+}
+
+/// Draws a distance in `segment` from the exponential with extinction `sigma`. Random numbers are multiples
+/// of 2⁻²⁴: in a medium of optical thickness 10⁻⁸, zero alone would make six times the right number of
+/// collisions. So `rest`, another one, goes below the last bit.
+#[inline]
+fn sample_exponential(segment: &RaySegment, sigma: f32, u_distance: f32, rest: f64) -> Option<f32> {
+    let u_distance = f64::from(u_distance) + rest * LAST_BIT;
+    // 1 − u is in (0, 1], so that the logarithm is finite. A channel without extinction gives ∞, or 0/0 for u
+    // = 0: both fail the comparison and pass.
+    let free_path = -f64::ln_1p(-u_distance) / f64::from(sigma);
+    (free_path < segment.length_f64()).then(|| {
+        // Whether the walk stops is decided above, in double precision, as `segment` reports it; the rounding
+        // of the position must not undo it on a short segment far from the origin.
+        let distance = (f64::from(segment.start) + free_path) as f32;
+        distance.min(segment.end.next_down())
+    })
+}
+
 impl Medium for Homogeneous {
     #[inline]
     fn scatters(&self) -> bool {
@@ -193,7 +233,7 @@ impl Medium for Homogeneous {
         match self.sampling {
             Sampling::Never => SegmentDensity::passing(to_spectrum(attenuation(self.sigma_t, length))),
             Sampling::Grey => grey_density(f64::from(self.sigma_t.r()), length),
-            Sampling::Chromatic(alpha) => chromatic_density(&alpha, self.sigma_t, length),
+            Sampling::Chromatic { alpha, .. } => chromatic_density(&alpha, self.sigma_t, length),
         }
     }
 
@@ -204,7 +244,7 @@ impl Medium for Homogeneous {
         let (sigma, rest) = match self.sampling {
             Sampling::Never => return None,
             Sampling::Grey => (self.sigma_t.r(), u_channel),
-            Sampling::Chromatic([r, g, b]) => {
+            Sampling::Chromatic { alpha: [r, g, b], .. } => {
                 if u_channel < r {
                     (self.sigma_t.r(), u_channel / r)
                 } else if u_channel < r + g {
@@ -214,20 +254,42 @@ impl Medium for Homogeneous {
                 }
             }
         };
-        // Random numbers are multiples of 2⁻²⁴: in a medium of optical thickness 10⁻⁸, zero alone would make
-        // six times the right number of collisions. The rest goes below the last bit.
-        let u_distance = f64::from(u_distance) + rest * LAST_BIT;
-        // 1 − u is in (0, 1], so that the logarithm is finite. A channel without extinction gives ∞, or 0/0
-        // for u = 0: both fail the comparison and pass.
-        let free_path = -f64::ln_1p(-u_distance) / f64::from(sigma);
-        if free_path < segment.length_f64() {
-            // Whether the walk stops is decided above, in double precision, as `segment` reports it; the
-            // rounding of the position must not undo it on a short segment far from the origin.
-            let distance = (f64::from(segment.start) + free_path) as f32;
-            Some(distance.min(segment.end.next_down()))
-        } else {
-            None
+        sample_exponential(segment, sigma, u_distance, rest)
+    }
+
+    fn lane_extinctions(&self) -> Option<Spectrum> {
+        match self.sampling {
+            Sampling::Chromatic { lanes, .. } => Some(lanes),
+            Sampling::Never | Sampling::Grey => None,
         }
+    }
+
+    #[inline]
+    fn segment_lanes(&self, segment: &RaySegment) -> SegmentDensity<[f64; 3]> {
+        let length = finite_length(segment);
+        let transmittance = attenuation(self.sigma_t, length);
+        match self.sampling {
+            Sampling::Never => SegmentDensity::passing(to_spectrum(transmittance)),
+            Sampling::Grey => {
+                let stops = f64::from(self.sigma_t.r()) * transmittance[0];
+                SegmentDensity::symmetric(to_spectrum(transmittance), [transmittance[0]; 3], [stops; 3])
+            }
+            Sampling::Chromatic { lanes, .. } => {
+                let passes = if lanes == self.sigma_t { transmittance } else { attenuation(lanes, length) };
+                let stops = [0, 1, 2].map(|lane| f64::from(lanes[lane]) * passes[lane]);
+                SegmentDensity::symmetric(to_spectrum(transmittance), passes, stops)
+            }
+        }
+    }
+
+    #[inline]
+    fn sample_lane(&self, segment: &RaySegment, lane: usize, [u_rest, u_distance]: [f32; 2]) -> Option<f32> {
+        let sigma = match self.sampling {
+            Sampling::Never => return None,
+            Sampling::Grey => self.sigma_t.r(),
+            Sampling::Chromatic { lanes, .. } => lanes[lane],
+        };
+        sample_exponential(segment, sigma, u_distance, f64::from(u_rest))
     }
 
     #[inline]

@@ -3,6 +3,7 @@
 mod basis;
 mod error;
 mod homogeneous;
+mod lanes;
 mod medium;
 mod mixture;
 mod nested_bodies;
@@ -18,6 +19,7 @@ pub use glam;
 pub use self::basis::orthonormal_basis;
 pub use self::error::MediaError;
 pub use self::homogeneous::Homogeneous;
+pub use self::lanes::{Lanes, lane_probabilities};
 pub use self::medium::Medium;
 pub use self::nested_bodies::{BodyId, Crossing, Interior, MediumId, MediumStack};
 pub use self::phase::{

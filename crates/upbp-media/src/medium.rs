@@ -24,11 +24,13 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 ///
 /// # Path-level lanes
 ///
-/// `sample_distance` takes the number that picks the channel apart from the number that picks the
-/// distance, and in a medium whose channels are exponentials the densities of one channel's lane are at
-/// hand: `S_c` is `transmittance[c]` and `p_c` is `sigma_t[c] · transmittance[c]`. The path-level mixture
-/// (policy C of `docs/theory.md`, section 1.4) therefore needs a method that returns the three lanes of a
-/// segment in double precision, with no change to those here.
+/// A walk through strongly chromatic media draws all its distances from the lane of one channel
+/// (`docs/theory.md`, section 6.13). A medium offers lanes by [`lane_extinctions`](Self::lane_extinctions),
+/// [`segment_lanes`](Self::segment_lanes) and [`sample_lane`](Self::sample_lane). The lane of channel `c`
+/// should pass at least the light that the channel passes, `S_c ≥ T_c`, and stop at least where it scatters,
+/// `p_c ≥ σ_s,c T_c`: with the exponential of the channel, `S_c = T_c` and `p_c = σ_t,c T_c`. That holds
+/// along any ray if the extinction varies in space, as long as distances are sampled without bias. In a
+/// medium that says nothing, all three lanes are the distribution of `segment` and `sample_distance`.
 ///
 /// # Example
 ///
@@ -136,6 +138,36 @@ pub trait Medium: Send + Sync {
     /// where the body ends. Up to rounding the distance must not depend on the end, but for the `None` of one
     /// that is not reached.
     fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32>;
+
+    /// The extinction with which the lane of each channel draws distances, in inverse scene units, 0 for a
+    /// lane that always passes; where it varies in space, its largest value. `None` if the medium has no
+    /// lanes of its own.
+    ///
+    /// Tells which lanes are equal, and how much they differ: it steers the choice of lanes and nothing else.
+    fn lane_extinctions(&self) -> Option<Spectrum> {
+        None
+    }
+
+    /// As [`segment`](Self::segment), with the densities of walks in each lane.
+    fn segment_lanes(&self, segment: &RaySegment) -> SegmentDensity<[f64; 3]> {
+        let SegmentDensity { transmittance, pass_probability, stop_at_end, stop_at_start } =
+            self.segment(segment);
+        SegmentDensity {
+            transmittance,
+            pass_probability: [pass_probability; 3],
+            stop_at_end: [stop_at_end; 3],
+            stop_at_start: [stop_at_start; 3],
+        }
+    }
+
+    /// As [`sample_distance`](Self::sample_distance), for a walk in a lane.
+    ///
+    /// `u` are two uniform numbers in `[0, 1)`; the second decides, the first is there for media that need
+    /// another, or more digits.
+    fn sample_lane(&self, segment: &RaySegment, lane: usize, u: [f32; 2]) -> Option<f32> {
+        let _ = lane;
+        self.sample_distance(segment, u[0], u[1])
+    }
 
     /// Scattering coefficient at `position`, in inverse scene units.
     fn sigma_s(&self, position: Vec3) -> Spectrum;

@@ -8,7 +8,7 @@
 
 use glam::Vec3;
 
-use crate::Spectrum;
+use crate::{Lanes, Spectrum};
 
 /// The half-open interval `[start, end)` of a ray that lies inside one medium.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -49,22 +49,23 @@ impl RaySegment {
     }
 }
 
-/// Transmittance and sampling densities of one segment, for both directions of walking.
+/// Transmittance and sampling densities of one segment, for both directions of walking; densities in each of
+/// the [`Lanes`] `L`.
 #[derive(Copy, Clone, Debug, PartialEq)]
-pub struct SegmentDensity {
+pub struct SegmentDensity<L = f64> {
     /// Transmittance `T` of the segment per channel, in `[0, 1]`.
     pub transmittance: Spectrum,
     /// Probability `S(ℓ)` that a walk passes the segment, in `[0, 1]`. The same in both directions.
-    pub pass_probability: f64,
+    pub pass_probability: L,
     /// Density, per length, that a walk from start to end stops exactly at the end; zero in a medium that
     /// does not scatter.
-    pub stop_at_end: f64,
+    pub stop_at_end: L,
     /// Density, per length, that a walk from end to start stops exactly at the start; zero in a medium that
     /// does not scatter.
-    pub stop_at_start: f64,
+    pub stop_at_start: L,
 }
 
-impl SegmentDensity {
+impl<L: Lanes> SegmentDensity<L> {
     /// A segment of vacuum: everything passes.
     pub const VACUUM: Self = Self::passing(Spectrum::ONE);
 
@@ -72,14 +73,14 @@ impl SegmentDensity {
     #[inline]
     #[must_use]
     pub const fn passing(transmittance: Spectrum) -> Self {
-        Self::symmetric(transmittance, 1.0, 0.0)
+        Self::symmetric(transmittance, L::ONE, L::ZERO)
     }
 
     /// A segment that looks the same from both ends: a walk passes it with the probability
     /// `pass_probability`, and stops at its far end with the density `stop`, per length.
     #[inline]
     #[must_use]
-    pub const fn symmetric(transmittance: Spectrum, pass_probability: f64, stop: f64) -> Self {
+    pub const fn symmetric(transmittance: Spectrum, pass_probability: L, stop: L) -> Self {
         Self { transmittance, pass_probability, stop_at_end: stop, stop_at_start: stop }
     }
 }
@@ -90,36 +91,39 @@ impl SegmentDensity {
 /// With segments 1..m: `T = Π T_j`, `R = Π S_j`, `stop_at_end = (Π_{j<m} S_j) · p_m` and
 /// `stop_at_start = p_1 · Π_{j>1} S_j` (`docs/theory.md`, section 1.3).
 #[derive(Copy, Clone, Debug, PartialEq)]
-pub struct EdgeDensity {
+pub struct EdgeDensity<L = f64> {
     /// Transmittance of the edge per channel, in `[0, 1]`.
     pub transmittance: Spectrum,
     /// Probability `R` that a walk passes the whole edge, in `[0, 1]`. The same in both directions.
-    pub pass_probability: f64,
+    pub pass_probability: L,
     /// Density, per length, that the forward walk stops exactly at the end.
-    pub stop_at_end: f64,
+    pub stop_at_end: L,
     /// Density, per length, that the backward walk stops exactly at the start.
-    pub stop_at_start: f64,
+    pub stop_at_start: L,
     /// Whether a segment was pushed: only the first sets `stop_at_start`.
     started: bool,
 }
 
-impl EdgeDensity {
+impl<L: Lanes> EdgeDensity<L> {
     /// An edge without segments: everything passes, nothing stops.
     pub const EMPTY: Self = Self {
         transmittance: Spectrum::ONE,
-        pass_probability: 1.0,
-        stop_at_end: 0.0,
-        stop_at_start: 0.0,
+        pass_probability: L::ONE,
+        stop_at_end: L::ZERO,
+        stop_at_start: L::ZERO,
         started: false,
     };
 
     /// Appends the next segment of the forward walk.
     #[inline]
-    pub fn push(&mut self, segment: &SegmentDensity) {
-        self.stop_at_end = self.pass_probability * segment.stop_at_end;
-        self.stop_at_start =
-            if self.started { self.stop_at_start * segment.pass_probability } else { segment.stop_at_start };
-        self.pass_probability *= segment.pass_probability;
+    pub fn push(&mut self, segment: &SegmentDensity<L>) {
+        self.stop_at_end = self.pass_probability.times(segment.stop_at_end);
+        self.stop_at_start = if self.started {
+            self.stop_at_start.times(segment.pass_probability)
+        } else {
+            segment.stop_at_start
+        };
+        self.pass_probability = self.pass_probability.times(segment.pass_probability);
         self.transmittance *= segment.transmittance;
         self.started = true;
     }
@@ -130,7 +134,7 @@ impl EdgeDensity {
     /// inside a medium, and the densities of stopping there are zero.
     #[inline]
     pub fn push_vacuum(&mut self) {
-        self.stop_at_end = 0.0;
+        self.stop_at_end = L::ZERO;
         // The start keeps its density: the stretch is passed with probability one, and as the first
         // segment it finds the zero of an empty edge.
         self.started = true;
@@ -139,7 +143,7 @@ impl EdgeDensity {
     /// The edge with one more segment at its end.
     #[inline]
     #[must_use]
-    pub fn with(mut self, segment: &SegmentDensity) -> Self {
+    pub fn with(mut self, segment: &SegmentDensity<L>) -> Self {
         self.push(segment);
         self
     }
@@ -155,7 +159,7 @@ impl EdgeDensity {
     /// then scatters), the probability to pass if it is on a surface.
     #[inline]
     #[must_use]
-    pub const fn forward(&self, end_in_medium: bool) -> f64 {
+    pub const fn forward(&self, end_in_medium: bool) -> L {
         if end_in_medium { self.stop_at_end } else { self.pass_probability }
     }
 
@@ -163,12 +167,12 @@ impl EdgeDensity {
     /// then scatters), the probability to pass if it is on a surface.
     #[inline]
     #[must_use]
-    pub const fn backward(&self, start_in_medium: bool) -> f64 {
+    pub const fn backward(&self, start_in_medium: bool) -> L {
         if start_in_medium { self.stop_at_start } else { self.pass_probability }
     }
 }
 
-impl Default for EdgeDensity {
+impl<L: Lanes> Default for EdgeDensity<L> {
     fn default() -> Self {
         Self::EMPTY
     }
@@ -283,7 +287,7 @@ mod tests {
 
     #[test]
     fn an_edge_without_segments_passes() {
-        let edge = EdgeDensity::default();
+        let edge = EdgeDensity::<f64>::default();
         assert!(edge.is_empty());
         assert_eq!((edge.pass_probability, edge.transmittance), (1.0, Spectrum::ONE));
         assert_eq!((edge.forward(true), edge.backward(true)), (0.0, 0.0));

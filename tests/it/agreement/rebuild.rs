@@ -57,26 +57,31 @@ pub(crate) enum Doubt {
 
 /// Density of a walk's distances: probability to pass, and to stop at either end.
 struct Passed {
-    pass_probability: f64,
-    stop_at_end: f64,
-    stop_at_start: f64,
+    pass_probability: [f64; 3],
+    stop_at_end: [f64; 3],
+    stop_at_start: [f64; 3],
     first: Option<MediumId>,
     last: Option<MediumId>,
 }
 
-/// The mixture of the channels over a stretch: probability to pass and density to stop.
-fn stretch(medium: &Fog, length: f64) -> (f64, f64) {
+/// A stretch by lane: probability to pass and density to stop. Without lanes they are those of the mixture of
+/// the channels.
+fn stretch(medium: &Fog, length: f64, in_lanes: bool) -> ([f64; 3], [f64; 3]) {
     if medium.sigma_s == [0.0; 3] {
-        return (1.0, 0.0);
+        return ([1.0; 3], [0.0; 3]);
+    }
+    if in_lanes {
+        let sigma = medium.extinction();
+        return (sigma.map(|s| (-s * length).exp()), sigma.map(|s| s * (-s * length).exp()));
     }
     let mean = |f: &dyn Fn(f64) -> f64| -> f64 {
         medium.extinction().into_iter().zip(Fog::ALPHA).map(|(sigma, alpha)| alpha * f(sigma)).sum()
     };
-    (mean(&|s| (-s * length).exp()), mean(&|s| s * (-s * length).exp()))
+    ([mean(&|s| (-s * length).exp()); 3], [mean(&|s| s * (-s * length).exp()); 3])
 }
 
 /// Density of passing from one point to another: the media by containment at the middle of each stretch.
-fn pass(scene: &ClosedForm, from: DVec3, to: DVec3) -> Result<Passed, Doubt> {
+fn pass(scene: &ClosedForm, from: DVec3, to: DVec3, in_lanes: bool) -> Result<Passed, Doubt> {
     let length = (to - from).length();
     if length < TINY {
         return Err(Doubt::Coincident);
@@ -99,14 +104,15 @@ fn pass(scene: &ClosedForm, from: DVec3, to: DVec3) -> Result<Passed, Doubt> {
         }
     }
     let of = |(medium, length): &(Option<MediumId>, f64)| {
-        medium.map_or((1.0, 0.0), |id| stretch(&scene.media[id.0 as usize], *length))
+        medium.map_or(([1.0; 3], [0.0; 3]), |id| stretch(&scene.media[id.0 as usize], *length, in_lanes))
     };
-    let pass_probability = |stretches: &[_]| stretches.iter().map(|s| of(s).0).product::<f64>();
+    let times = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|lane| a[lane] * b[lane]);
+    let pass_probability = |stretches: &[_]| stretches.iter().map(|s| of(s).0).fold([1.0; 3], times);
     let (first, last) = (stretches[0], stretches[stretches.len() - 1]);
     Ok(Passed {
         pass_probability: pass_probability(&stretches),
-        stop_at_end: pass_probability(&stretches[..stretches.len() - 1]) * of(&last).1,
-        stop_at_start: of(&first).1 * pass_probability(&stretches[1..]),
+        stop_at_end: times(pass_probability(&stretches[..stretches.len() - 1]), of(&last).1),
+        stop_at_start: times(of(&first).1, pass_probability(&stretches[1..])),
         first: first.0,
         last: last.0,
     })
@@ -210,7 +216,8 @@ impl Trace {
         &self,
         scene: &ClosedForm,
         plan: &IterationPlan,
-        weight: impl Fn(&Path) -> f64,
+        in_lanes: bool,
+        weight: impl Fn(&Path<[f64; 3]>) -> f64,
         expected: f64,
     ) -> f64 {
         // Vertices may be off their surfaces by no more than rounding, so the step is smaller and the result
@@ -222,7 +229,7 @@ impl Trace {
                 let mut moved = self.clone();
                 moved.interior[i].light += STEP * axis;
                 moved.interior[i].camera += STEP * axis;
-                if let Ok(path) = moved.rebuild(scene, plan) {
+                if let Ok(path) = moved.rebuild(scene, plan, in_lanes) {
                     sum += (weight(&path) / expected - 1.0).abs();
                 }
             }
@@ -263,8 +270,13 @@ impl Trace {
         Some(f64::from(world.next_event_probability(receiver.as_vec3(), self.light.emitter)))
     }
 
-    /// All densities of the path.
-    pub(crate) fn rebuild(&self, scene: &ClosedForm, plan: &IterationPlan) -> Result<Path, Doubt> {
+    /// All densities of the path, in lanes that may be all the same.
+    pub(crate) fn rebuild(
+        &self,
+        scene: &ClosedForm,
+        plan: &IterationPlan,
+        in_lanes: bool,
+    ) -> Result<Path<[f64; 3]>, Doubt> {
         let roulette = plan.roulette;
         let k = self.length();
         let lens = self.lens.as_dvec3();
@@ -279,7 +291,7 @@ impl Trace {
         let start = starts[0];
         let mut passed = Vec::with_capacity(k);
         for (a, b) in starts.iter().zip(&ends) {
-            passed.push(pass(scene, *a, *b)?);
+            passed.push(pass(scene, *a, *b, in_lanes)?);
         }
         let direction = |i: usize| (ends[i] - starts[i]).normalize();
 
@@ -338,7 +350,7 @@ impl Trace {
             distance: if infinite && i == 0 { f64::INFINITY } else { (ends[i] - starts[i]).length() },
             t_light: if stops(i + 1) { passed.stop_at_end } else { passed.pass_probability },
             t_camera: match i {
-                0 if is_volume => Source::pdf_passage(start),
+                0 if is_volume => [Source::pdf_passage(start); 3],
                 _ if stops(i) => passed.stop_at_start,
                 _ => passed.pass_probability,
             },

@@ -16,6 +16,7 @@ use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
     PreparedScene, RadiusField, Roulette, Spectrum, StreamKind, Technique,
 };
+use upbp_media::Lanes;
 
 use upbp_testing::closed_form::scene::ClosedForm;
 
@@ -48,16 +49,25 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoice
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
+        lanes: None,
     }
 }
 
 /// Mean of the film in one iteration.
 fn iteration<S: Scene>(scene: &S, choices: &IterationChoices) -> f64 {
+    if choices.lanes.is_some() {
+        iteration_in::<_, [f64; 3]>(scene, choices)
+    } else {
+        iteration_in::<_, f64>(scene, choices)
+    }
+}
+
+fn iteration_in<S: Scene, L: Lanes>(scene: &S, choices: &IterationChoices) -> f64 {
     let world = PreparedScene::new(scene).expect("the scene is in order");
     let plan = IterationPlan::new(scene, choices);
     let context = Context { prepared: &world, plan: &plan };
     let mut scratch = Scratch::default();
-    let mut chunk = LightChunk::default();
+    let mut chunk = LightChunk::<_, f64, L>::default();
     let nobody = &mut NoObserver;
     if plan.needs_light_paths() {
         for index in 0..plan.light_paths {
@@ -158,7 +168,7 @@ fn light_is_seen_up_to_the_first_vertex_that_scatters() {
     let world = PreparedScene::new(&scene).expect("the scene is in order");
     let plan = IterationPlan::new(&scene, &choices("hit+nee", PathLengths { min: 1, max: 6 }, 7));
     let context = Context { prepared: &world, plan: &plan };
-    let map = LightMap::build(&plan, Vec::new(), Vec::new());
+    let map = LightMap::<_, f64, f64>::build(&plan, Vec::new(), Vec::new());
     let (mut scratch, mut counters) = (Scratch::default(), Counters::default());
     let (mut deepest, mut less_than_all) = (0, 0);
     for index in 0..SIZE * SIZE {
@@ -239,6 +249,25 @@ fn seldom_look_ups_and_other_counts() {
     println!("{found:.5} ± {error:.5}, expected {expected:.5} ± {expected_error:.5}");
     assert!((found - expected).abs() < 4.0 * sigma, "{found}, expected {expected} ± {sigma}");
     assert!(sigma < 0.02 * expected, "too noisy to tell: {sigma} of {expected}");
+}
+
+#[test]
+fn lanes_and_mixtures() {
+    // Glowing bodies, which sub-paths in lanes start at, meet on their way, and look for.
+    let mut scene = ClosedForm::glowing(IN_FOG, SIZE);
+    scene.lights[..5].iter_mut().for_each(|light| light.power = 0.0);
+    scene.objects.iter_mut().for_each(|object| object.emitter = None);
+    let lengths = PathLengths { min: 2, max: 6 };
+    let (expected, expected_error) = mean(&scene, &choices("hit+nee", lengths, 300));
+    for (seed, set) in (301..).zip(["hit", "hit+nee", "bpt", "all"]) {
+        let lanes = Some([0.5, 0.2, 0.3]);
+        let (found, error) = mean(&scene, &IterationChoices { lanes, ..choices(set, lengths, seed) });
+        let sigma = error.hypot(expected_error);
+        println!("{set}: {found:.5} ± {error:.5}, expected {expected:.5} ± {expected_error:.5}");
+        let tolerance = 4.0 * sigma + 0.005 * expected;
+        assert!((found - expected).abs() < tolerance, "{set}: {found}, expected {expected} ± {sigma}");
+        assert!(sigma < 0.04 * expected, "{set}: too noisy to tell, {sigma} of {expected}");
+    }
 }
 
 #[test]

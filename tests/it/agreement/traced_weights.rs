@@ -19,7 +19,10 @@ use upbp_estimators::{
     Roulette, Stream, StreamKind, Technique, TechniqueSet,
 };
 
+use upbp_media::Lanes;
+
 use super::rebuild::{Trace, Vertex};
+use upbp_testing::closed_form::fog::Fog;
 use upbp_testing::closed_form::material::Material;
 use upbp_testing::closed_form::scene::ClosedForm;
 
@@ -151,12 +154,16 @@ impl<'a> Auditor<'a> {
         }
         let (trace, strategy) = self.trace(sample);
         assert!(self.plan.lengths.contain(trace.length() as u32), "{sample:?}");
-        let Ok(path) = trace.rebuild(self.scene, self.plan) else {
+        let in_lanes = plan_in_lanes(self.plan);
+        let Ok(path) = trace.rebuild(self.scene, self.plan, in_lanes) else {
             self.comparisons[technique].doubtful += 1;
             return;
         };
-        let weight = |path: &Path| {
-            let weights = path.weights(&self.plan.mis);
+        // Of lanes that are all the same, any one will do.
+        let lanes = if in_lanes { self.plan.mis.lanes } else { [1.0, 0.0, 0.0] };
+        let mis = MisPlan { lanes, ..self.plan.mis.clone() };
+        let weight = |path: &Path<[f64; 3]>| {
+            let weights = path.weights(&mis);
             let sum: f64 = weights.iter().map(|w| w.1).sum();
             assert!((sum - 1.0).abs() < 1e-12, "{sum}");
             weights.iter().find(|(other, _)| *other == strategy).map_or(0.0, |w| w.1)
@@ -168,7 +175,7 @@ impl<'a> Auditor<'a> {
         let difference = (found / expected - 1.0).abs();
         let mut excess = difference / TOLERANCE;
         if excess > 1.0 {
-            let rounding = trace.sensitivity(self.scene, self.plan, weight, expected);
+            let rounding = trace.sensitivity(self.scene, self.plan, in_lanes, weight, expected);
             excess = difference / (TOLERANCE + rounding);
         }
         let comparison = &mut self.comparisons[technique];
@@ -237,6 +244,7 @@ fn choices() -> IterationChoices {
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
+        lanes: None,
     }
 }
 
@@ -261,27 +269,11 @@ fn audit_scene(name: &str, scene: &ClosedForm, choices: &IterationChoices, at_le
     let plan = IterationPlan::new(scene, choices);
     let context = Context { prepared: &world, plan: &plan };
     let mut auditor = Auditor::new(scene, &plan);
-    let mut scratch = Scratch::default();
-    let mut chunk = LightChunk::default();
-    for index in 0..plan.light_paths {
-        trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, &mut auditor);
-    }
-    let LightChunk { vertices, beams, counters: light_counters, .. } = chunk;
-    let map = LightMap::build(&plan, vertices, beams);
-    let mut counters = Counters::default();
-    for pixel in 0..size * size {
-        let _ = trace_camera_path(
-            &context,
-            &map,
-            StreamKind::Camera,
-            [pixel % size, pixel / size],
-            u64::from(pixel),
-            &mut scratch,
-            &mut counters,
-            &mut auditor,
-        );
-    }
-    counters.add(&light_counters);
+    let counters = if plan_in_lanes(&plan) {
+        run::<_, [f64; 3]>(&context, size, &mut auditor)
+    } else {
+        run::<_, f64>(&context, size, &mut auditor)
+    };
     assert_eq!(counters.dropped, 0, "{counters:?}");
     let walks = u64::from(plan.light_paths + size * size);
     assert!(counters.lost_walks * 10_000 < walks, "{counters:?}");
@@ -321,6 +313,40 @@ fn audit_scene(name: &str, scene: &ClosedForm, choices: &IterationChoices, at_le
         assert!(quantile(REGULAR) < tolerance, "{technique:?}: {:e}", quantile(REGULAR));
         assert!(excess < LARGEST_EXCESS, "{technique:?}, {excess}: {path}");
     }
+}
+
+/// Whether sub-paths draw their distances by lanes.
+fn plan_in_lanes(plan: &IterationPlan) -> bool {
+    plan.mis.lanes != [0.0; 3]
+}
+
+/// All sub-paths of an iteration, with one camera sub-path per pixel of a film of this size.
+fn run<O: Observer<Material>, L: Lanes>(
+    context: &Context<'_, ClosedForm>,
+    size: u32,
+    observer: &mut O,
+) -> Counters {
+    let mut scratch = Scratch::default();
+    let mut chunk = LightChunk::<_, O::Densities, L>::default();
+    for index in 0..context.plan.light_paths {
+        trace_light_path(context, StreamKind::Light, index, &mut scratch, &mut chunk, observer);
+    }
+    let LightChunk { vertices, beams, mut counters, .. } = chunk;
+    let map = LightMap::build(context.plan, vertices, beams);
+    for i in 0..size * size {
+        let (kind, pixel) = (StreamKind::Camera, [i % size, i / size]);
+        let _ = trace_camera_path(
+            context,
+            &map,
+            kind,
+            pixel,
+            u64::from(i),
+            &mut scratch,
+            &mut counters,
+            observer,
+        );
+    }
+    counters
 }
 
 #[test]
@@ -468,6 +494,36 @@ fn subsets_of_techniques() {
     }
 }
 
+/// The scene with stronger colours: a channel that passes one of the media unseen, one that another only
+/// absorbs.
+fn colourful(camera: Vec3, size: u32) -> ClosedForm {
+    let mut scene = ClosedForm::new(camera, size);
+    scene.media[0] = Fog::new([0.05, 0.02, 0.0], [0.4, 2.5, 0.0], 0.6);
+    scene.media[3] = Fog::new([0.3, 0.1, 1.5], [0.2, 0.8, 0.0], 0.3);
+    scene
+}
+
+#[test]
+fn sub_paths_in_lanes() {
+    let (short, long) = (BeamExtent::Short, BeamExtent::Long);
+    let lanes = Some([0.5, 0.2, 0.3]);
+    for camera in CAMERAS {
+        let choices = IterationChoices { light_paths: 12_000, beam_paths: 1000, lanes, ..choices() };
+        audit_scene("lanes", &colourful(camera, 64), &choices, 1000);
+    }
+    for (photon_beams, query_beams) in [(short, short), (long, short), (long, long)] {
+        let name = format!("lanes, {photon_beams:?} photon beams, {query_beams:?} query beams");
+        let choices = IterationChoices { photon_beams, query_beams, lanes, ..choices() };
+        audit_scene(&name, &colourful(CAMERAS[1], 48), &choices, 1000);
+    }
+    for camera in CAMERAS {
+        let choices = IterationChoices { light_paths: 16_000, beam_paths: 1000, lanes, ..choices() };
+        audit_scene("lanes, glowing bodies", &ClosedForm::glowing(camera, 64), &choices, 1000);
+    }
+    let choices = IterationChoices { lanes: Some([0.5, 0.5, 0.0]), roulette: Roulette::Off, ..choices() };
+    audit("two lanes", CAMERAS[1], 48, &choices, 500);
+}
+
 #[test]
 fn walks_without_roulette() {
     audit("no roulette", CAMERAS[0], 48, &IterationChoices { roulette: Roulette::Off, ..choices() }, 500);
@@ -489,18 +545,7 @@ fn weights<D: Densities>(plan: &IterationPlan) -> Vec<(Technique, Weight<D>)> {
     let world = PreparedScene::new(&scene).expect("the scene is in order");
     let context = Context { prepared: &world, plan };
     let mut weights = Weights(Vec::new());
-    let (mut scratch, mut chunk) = (Scratch::default(), LightChunk::default());
-    for index in 0..plan.light_paths {
-        trace_light_path(&context, StreamKind::Light, index, &mut scratch, &mut chunk, &mut weights);
-    }
-    let map = LightMap::build(plan, chunk.vertices, chunk.beams);
-    let mut counters = Counters::default();
-    for i in 0..24 * 24 {
-        let (kind, pixel) = (StreamKind::Camera, [i % 24, i / 24]);
-        let index = u64::from(i);
-        let _ =
-            trace_camera_path(&context, &map, kind, pixel, index, &mut scratch, &mut counters, &mut weights);
-    }
+    run::<_, f64>(&context, 24, &mut weights);
     weights.0
 }
 
@@ -557,7 +602,7 @@ fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
     // The fog's boundary runs through the glass, where it is hidden: it changes no medium, but what is behind
     // the glass.
     let scene = ClosedForm::new(CAMERAS[0], 1);
-    let mut edge_trace = EdgeTrace::new();
+    let mut edge_trace: EdgeTrace<Material> = EdgeTrace::new();
     let mut random = Stream::new(1, 0, StreamKind::Camera, 0);
     let mut hidden = 0;
     for _ in 0..20_000 {
@@ -565,7 +610,16 @@ fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
         let (from, towards) = (point(), point());
         let direction = (towards - from).normalize();
         let mut walk = Stream::new(2, 0, StreamKind::Camera, 0);
-        edge_trace.trace(&scene, from, direction, &scene.stack_at(from), 0.0, Extent::ToSurface, &mut walk);
+        edge_trace.trace(
+            &scene,
+            from,
+            direction,
+            &scene.stack_at(from),
+            0.0,
+            Extent::ToSurface,
+            (),
+            &mut walk,
+        );
         for span in &edge_trace.spans {
             let t = span.start + (span.end.min(10.0) - span.start) * random.uniform();
             let found = edge_trace.stack_in(span, t);

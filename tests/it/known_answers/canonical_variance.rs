@@ -264,6 +264,7 @@ impl Setup {
                 heuristic: Heuristic::Balance,
                 photon_beams: self.photon_beams,
                 query_beams: self.query_beams,
+                lanes: None,
             },
         )
     }

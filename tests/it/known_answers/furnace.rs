@@ -1,7 +1,7 @@
 //! Nothing absorbs, or what is absorbed is emitted again: every ray has radiance 1.
 
 use upbp_testing::analytic::{Case, Table, cases, scene, settings, vector};
-use upbp_testing::render;
+use upbp_testing::{render, render_channels};
 
 /// The part that merges may lose at boundaries, where a kernel sticks out of its medium; falls with the
 /// radius.
@@ -77,4 +77,46 @@ fn white_furnace() {
         }
     }
     table.finish();
+}
+
+/// A white furnace whose channels differ by `ratio`: a ball with two mean free paths per radius in the middle
+/// channel.
+fn chromatic(ratio: f64, body: &str) -> String {
+    let sigma = vector([2.0 / ratio.sqrt(), 2.0, 2.0 * ratio.sqrt()]);
+    let ball = |radius: f64, material: &str, interior: &str| {
+        format!(
+            "(geometry: Sphere(centre: (0.0, 0.0, 0.0), radius: {radius:?}), material: \"{material}\", interior: \"{interior}\"),"
+        )
+    };
+    let shapes = match body {
+        "dielectric" => ball(1.0, "glass", "m"),
+        "nested" => ball(1.0, "null", "m") + &ball(0.5, "null", "n"),
+        _ => ball(1.0, "null", "m"),
+    };
+    format!(
+        "camera: Perspective(origin: (0.0, 0.0, 3.0), target: (0.0, 0.0, 0.0), fov_degrees: 26.0),
+        film: (width: 24, height: 24),
+        media: {{\"m\": Homogeneous(sigma_a: 0.0, sigma_s: {sigma}), \"n\": Homogeneous(sigma_a: 0.0, sigma_s: (3.0, 0.0, 0.5))}},
+        materials: {{\"null\": Null, \"glass\": Dielectric(ior: 1.5)}},
+        shapes: [{shapes}], lights: [Constant(1.0)]"
+    )
+}
+
+/// Every channel is within four standard errors of one, and those are below one per cent.
+#[test]
+fn chromatic_white_furnace() {
+    for body in ["homogeneous", "dielectric", "nested"] {
+        for ratio in [3.0, 30.0, 1000.0] {
+            let scene = scene(&chromatic(ratio, body));
+            for techniques in ["pt", "bpt"] {
+                let settings = settings(techniques, None);
+                for (channel, found) in render_channels(&scene, &settings, 320).iter().enumerate() {
+                    let sigmas = (found.mean - 1.0) / found.error;
+                    let case = format!("{body}, ratio {ratio}, {techniques}, channel {channel}");
+                    println!("{case}: {:.5} ± {:.5}, {sigmas:+.2}", found.mean, found.error);
+                    assert!(sigmas.abs() < 4.0 && found.error < 0.01, "{case}: {found:?}");
+                }
+            }
+        }
+    }
 }

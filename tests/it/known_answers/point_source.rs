@@ -46,10 +46,12 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
+            lanes: None,
         },
     );
     let context = Context { prepared: &world, plan: &plan };
-    let (mut scratch, mut chunk, mut list) = (Scratch::default(), LightChunk::default(), Vec::new());
+    let (mut scratch, mut chunk, mut list) =
+        (Scratch::default(), LightChunk::<_, f64, f64>::default(), Vec::new());
     for path in 0..paths {
         trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut chunk, &mut NoObserver);
         list.extend(

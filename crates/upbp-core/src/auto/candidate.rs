@@ -220,6 +220,7 @@ mod tests {
             roulette: roulette::OF_PILOT,
             periods: MergePeriods::ONE,
             vertices_per_light_path: 1.0,
+            lanes: None,
             radii,
         };
         let candidates = Candidates {

@@ -18,6 +18,7 @@ use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, StreamKind, TechniqueSet,
 };
+use upbp_media::Lanes;
 
 use super::full_plan::{iteration_plan, plan_with};
 use super::guides::{self, Evidence, Starts};
@@ -57,10 +58,11 @@ fn enough(emitters: usize) -> f64 {
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
-pub(crate) fn choose<S: Scene>(
+pub(crate) fn choose<S: Scene, L: Lanes>(
     scene: &mut PreparedScene<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
+    lanes: Option<[f64; 3]>,
     budget: &Budget<'_>,
 ) -> Result<(), RenderError> {
     let emitters = scene.scene.emitters().len();
@@ -73,7 +75,8 @@ pub(crate) fn choose<S: Scene>(
         scene.choose_by_receiver(&[]);
     }
     let quick = budget.part(QUICK_LOOK * PART);
-    let statistics = statistics::measure(scene, settings, techniques, statistics::FEW_LIGHT_PATHS, &quick)?;
+    let statistics =
+        statistics::measure::<S, L>(scene, settings, techniques, lanes, statistics::FEW_LIGHT_PATHS, &quick)?;
     let vertices = statistics.vertices_per_path.max(1.0);
     let light_paths = (LIGHT_VERTICES / vertices).clamp(64.0, f64::from(LIGHT_PATHS));
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
@@ -87,7 +90,7 @@ pub(crate) fn choose<S: Scene>(
     for round in 0..rounds {
         // Each round has random numbers of its own.
         let plan = IterationPlan { iteration: plan.iteration + u64::from(round), ..plan.clone() };
-        let run = |part, halt: &Halt<'_>| measure(scene, &plan, paths[1], part, halt);
+        let run = |part, halt: &Halt<'_>| measure::<S, L>(scene, &plan, paths[1], part, halt);
         let seen = budget.part(part).largest(run).ok_or(RenderError::Cancelled)?;
         if emitters > 1 {
             scene.choose_emitters_by(&seen.emission, &shares(&seen.next_events, emitters));
@@ -164,7 +167,7 @@ fn second_moment<S: Scene>(scene: &PreparedScene<'_, S>, seen: &[NextEvent]) -> 
 
 /// Traces the light sub-paths of `plan` and some camera sub-paths, or a part of both. `None` if it was
 /// halted.
-fn measure<S: Scene>(
+fn measure<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
     camera_paths: u32,
@@ -187,11 +190,12 @@ fn measure<S: Scene>(
 
     let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
     let kind = StreamKind::PilotLight;
-    let pieces = in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_>, Seen)| {
-        let observer: &mut DynObserver<'_, S::Bsdf> = seen;
-        trace_light_path(&context, kind, index, scratch, out, observer);
-        true
-    })?;
+    let pieces =
+        in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_, f64, L>, Seen)| {
+            let observer: &mut DynObserver<'_, S::Bsdf> = seen;
+            trace_light_path(&context, kind, index, scratch, out, observer);
+            true
+        })?;
     let mut starts = vec![None; paths as usize];
     let (mut vertices, mut beams) = (Vec::new(), Vec::new());
     let mut seen = Seen::default();

@@ -84,6 +84,7 @@ pub(super) fn plan_with<S: Scene>(
         periods: MergePeriods::ONE,
         vertices_per_light_path: statistics.vertices_per_path,
         radii: first_radii(scene, settings, techniques, statistics, [light_paths, beam_paths]),
+        lanes: statistics.lanes,
     }
 }
 
@@ -201,6 +202,7 @@ pub(crate) fn iteration_plan<S: Scene>(
             heuristic: settings.heuristic,
             photon_beams: settings.photon_beams,
             query_beams: settings.query_beams,
+            lanes: plan.lanes,
         },
     );
     IterationPlan { features: settings.features, ..iteration_plan }

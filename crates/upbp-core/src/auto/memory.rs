@@ -115,6 +115,8 @@ pub(crate) struct LightCounts {
     pub(crate) beams: f64,
     /// The pieces that they are cut into.
     pub(crate) pieces: f64,
+    /// Whether they carry densities of three lanes.
+    pub(crate) in_lanes: bool,
 }
 
 impl LightCounts {
@@ -132,6 +134,7 @@ impl LightCounts {
             medium: paths * statistics.medium_per_path,
             beams: beam_paths * statistics.beams_per_path,
             pieces: beam_paths * statistics.pieces_per_path,
+            in_lanes: statistics.lanes.is_some(),
         }
     }
 
@@ -150,7 +153,11 @@ impl LightCounts {
         const PIECE: f64 = 12.0;
         const CENTRE: f64 = 16.0;
         const PLACED: f64 = 40.0;
-        let [vertex, beam] = [size_of::<LightVertex<B>>(), size_of::<PhotonBeam>()];
+        let [vertex, beam] = if self.in_lanes {
+            [size_of::<LightVertex<B, f64, [f64; 3]>>(), size_of::<PhotonBeam<f64, [f64; 3]>>()]
+        } else {
+            [size_of::<LightVertex<B>>(), size_of::<PhotonBeam>()]
+        };
         let held = self.vertices * vertex as f64 + self.beams * beam as f64;
         // Buckets are kept until the tree is there.
         let (building, tree) = (2.0 * POINT + POINT_BOXES, POINT + POINT_BOXES);

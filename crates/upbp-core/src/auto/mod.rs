@@ -24,6 +24,7 @@ mod emitters;
 mod footprint;
 mod full_plan;
 mod guides;
+mod lanes;
 pub(crate) mod memory;
 mod photon_distances;
 mod pieces;
@@ -38,6 +39,7 @@ mod volumes;
 use upbp_estimators::PreparedScene;
 use upbp_estimators::TechniqueSet;
 use upbp_estimators::scene::Scene;
+use upbp_media::Lanes;
 
 use crate::budget::Budget;
 use crate::error::RenderError;
@@ -78,21 +80,43 @@ pub(crate) fn choose<S: Scene>(
     given: Option<FrozenPlan>,
     budget: &mut Budget<'_>,
 ) -> Result<Choice, RenderError> {
-    let is_auto = settings.techniques == Techniques::Auto;
     budget.step("measuring lights", 0.0)?;
     match &given {
         Some(frozen) => scene.set_emitter_choice(&frozen.emitters)?,
         None => volumes::choose(scene, settings, settings.techniques.candidates(), budget)?,
     }
     let support = TechniqueSupport::of(scene, settings, given.as_ref())?;
+    let room = Room::of(scene, settings, support.techniques)?;
+    let lanes = match &given {
+        Some(frozen) => lanes::of_plan(&frozen.plan, settings)?,
+        None => lanes::choose(scene, settings),
+    };
+    if lanes.is_some() {
+        choose_in::<S, [f64; 3]>(scene, settings, given, support, room, lanes, budget)
+    } else {
+        choose_in::<S, f64>(scene, settings, given, support, room, lanes, budget)
+    }
+}
+
+/// As [`choose`], with walks in the lanes `L`.
+fn choose_in<S: Scene, L: Lanes>(
+    scene: &mut PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    given: Option<FrozenPlan>,
+    support: TechniqueSupport,
+    room: Room,
+    lanes: Option<[f64; 3]>,
+    budget: &mut Budget<'_>,
+) -> Result<Choice, RenderError> {
+    let is_auto = settings.techniques == Techniques::Auto;
     let techniques = support.techniques;
-    let room = Room::of(scene, settings, techniques)?;
     if given.is_none() {
-        emitters::choose(scene, settings, techniques, budget)?;
+        emitters::choose::<S, L>(scene, settings, techniques, lanes, budget)?;
     }
     budget.step("looking around", 0.3)?;
     let allowance = budget.part(TIME_FOR_STATISTICS);
-    let statistics = statistics::measure(scene, settings, techniques, statistics::LIGHT_PATHS, &allowance)?;
+    let most = statistics::LIGHT_PATHS;
+    let statistics = statistics::measure::<S, L>(scene, settings, techniques, lanes, most, &allowance)?;
     budget.step("choosing techniques", 0.5)?;
     let plan = if let Some(frozen) = given {
         room.fits::<S>(&frozen.plan, &statistics)?
@@ -100,11 +124,12 @@ pub(crate) fn choose<S: Scene>(
         let full = full_plan::full_plan(scene, settings, techniques, &statistics, &room, budget);
         if is_auto && full.uses_light_paths() {
             let candidates = Candidates::new(scene, settings, &support, &statistics, full);
-            let plan = best_plan(scene, settings, &candidates, budget);
+            let plan = best_plan::<S, L>(scene, settings, &candidates, budget);
             if !plan.uses_light_paths() {
                 // Next events have to find what light sub-paths would have found.
                 scene.choose_emitters_by_power();
-                emitters::choose(scene, settings, techniques.intersection(TechniqueSet::PT), budget)?;
+                let techniques = techniques.intersection(TechniqueSet::PT);
+                emitters::choose::<S, L>(scene, settings, techniques, lanes, budget)?;
             }
             plan
         } else {
@@ -120,7 +145,7 @@ pub(crate) fn choose<S: Scene>(
 
 /// The best of the candidates by a pilot render that is large enough, or by the largest that there is time
 /// for.
-fn best_plan<S: Scene>(
+fn best_plan<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
     settings: &CheckedSettings,
     candidates: &Candidates,
@@ -132,7 +157,9 @@ fn best_plan<S: Scene>(
     let mut size = if allowance.is_limited() { Size::LEAST } else { enough };
     let (mut plan, mut spent) = (None, 0.0);
     loop {
-        let Some(pilot) = PilotRender::run(scene, settings, &candidates.full, size, &allowance.halt()) else {
+        let Some(pilot) =
+            PilotRender::run::<S, L>(scene, settings, &candidates.full, size, &allowance.halt())
+        else {
             // No time, or more samples than there is room for.
             if plan.is_some() || allowance.halt().now() || size <= Size::LEAST {
                 return plan.unwrap_or(candidates.usual());

@@ -5,6 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use upbp_estimators::path::Scratch;
 use upbp_estimators::scene::PixelRect;
+use upbp_media::Lanes;
 
 use crate::budget::Halt;
 
@@ -13,14 +14,14 @@ pub(super) const PIECE: usize = 16;
 
 /// Traces sub-paths by number, with an output for each piece of [`PIECE`] sub-paths. `None` if it was halted,
 /// or if `trace` breaks off by `false`.
-pub(super) fn in_pieces<B: Copy, O: Default + Send>(
+pub(super) fn in_pieces<B: Copy, L: Lanes, O: Default + Send>(
     paths: u32,
     halt: &Halt<'_>,
-    trace: impl Fn(u32, &mut Scratch<B>, &mut O) -> bool + Sync,
+    trace: impl Fn(u32, &mut Scratch<B, L>, &mut O) -> bool + Sync,
 ) -> Option<Vec<O>> {
     let pieces: Vec<Range<u32>> =
         (0..paths).step_by(PIECE).map(|first| first..first.saturating_add(PIECE as u32).min(paths)).collect();
-    let piece = |scratch: &mut Scratch<B>, paths: Range<u32>| {
+    let piece = |scratch: &mut Scratch<B, L>, paths: Range<u32>| {
         let mut out = O::default();
         for path in paths {
             if halt.now() || !trace(path, scratch, &mut out) {

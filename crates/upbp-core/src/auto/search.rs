@@ -177,6 +177,7 @@ mod tests {
             roulette: Roulette::Off,
             periods: MergePeriods::from_fn(|_| NonZeroU32::MIN),
             vertices_per_light_path: 1.0,
+            lanes: None,
             radii,
         };
         Judged { plan, variance, cost }

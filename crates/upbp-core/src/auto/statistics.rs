@@ -11,6 +11,7 @@ use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
     PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
 };
+use upbp_media::Lanes;
 
 use super::footprint;
 use super::photon_distances::{Nearest, Neighbours, median};
@@ -38,6 +39,8 @@ const NEIGHBOURS: usize = 16384;
 /// Averages over light sub-paths, and typical distances between photons and queries.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Statistics {
+    /// The probability of each lane, if walks run in lanes.
+    pub(crate) lanes: Option<[f64; 3]>,
     /// Wall seconds per light sub-path, with all threads at work: for limits of time, which are kept by the
     /// clock.
     pub(crate) light_path_seconds: f64,
@@ -68,36 +71,37 @@ pub(crate) struct Statistics {
     pub(crate) bb1d: Option<Neighbours>,
 }
 
-/// Measures with at most `light_paths` light sub-paths; with fewer, and fewer camera sub-paths, if there is
-/// no time.
+/// Measures sub-paths in the lanes `L` with at most `light_paths` light sub-paths; with fewer, and fewer
+/// camera sub-paths, if there is no time.
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
-pub(crate) fn measure<S: Scene>(
+pub(crate) fn measure<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
+    lanes: Option<[f64; 3]>,
     light_paths: u32,
     allowance: &Allowance<'_>,
 ) -> Result<Statistics, RenderError> {
     let use_nothing = [Technique::Hit, Technique::Nee, Technique::LightTracing].into_iter().collect();
     let only_light_tracing = techniques.without(use_nothing).is_empty();
     if only_light_tracing && !(allowance.is_limited() && techniques.has(Technique::LightTracing)) {
-        return Ok(Statistics::default());
+        return Ok(Statistics { lanes, ..Statistics::default() });
     }
     let run = |part: f64, halt: &Halt<'_>| {
         let light_paths = (part * f64::from(light_paths)).ceil() as u32;
         let camera_paths = (part * f64::from(CAMERA_PATHS)).ceil() as u32;
-        let plan = |paths| nominal_plan(scene, settings, techniques, paths);
-        let light = LightPaths::trace(scene, plan, light_paths, halt)?;
+        let plan = |paths| nominal_plan(scene, settings, techniques, lanes, paths);
+        let light = LightPaths::<_, L>::trace(scene, plan, light_paths, halt)?;
         let plan = plan(light.paths);
-        let queries = Queries::trace(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?;
+        let queries = Queries::trace::<_, L>(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?;
         let field = if settings.radii.are_auto(techniques) {
             footprint::field(scene.scene.camera(), &queries.first)
         } else {
             RadiusField::Uniform
         };
-        Some(light.statistics(&plan, field, queries, scene.bounds.radius))
+        Some(Statistics { lanes, ..light.statistics(&plan, field, queries, scene.bounds.radius) })
     };
     allowance.largest(run).ok_or(RenderError::Cancelled)
 }
@@ -108,6 +112,7 @@ fn nominal_plan<S: Scene>(
     scene: &PreparedScene<'_, S>,
     settings: &CheckedSettings,
     techniques: TechniqueSet,
+    lanes: Option<[f64; 3]>,
     light_paths: u32,
 ) -> IterationPlan {
     let nominal = 1e-3 * scene.bounds.radius;
@@ -134,20 +139,21 @@ fn nominal_plan<S: Scene>(
         heuristic: Heuristic::Balance,
         photon_beams: settings.photon_beams,
         query_beams: BeamExtent::Short,
+        lanes,
     };
     IterationPlan::new(scene.scene, &choices)
 }
 
 /// Light sub-paths with all that they store.
-struct LightPaths<B> {
+struct LightPaths<B, L: Lanes> {
     paths: u32,
-    vertices: Vec<LightVertex<B>>,
-    beams: Vec<PhotonBeam>,
+    vertices: Vec<LightVertex<B, f64, L>>,
+    beams: Vec<PhotonBeam<f64, L>>,
     /// Wall seconds per light sub-path.
     seconds: f64,
 }
 
-impl<B: Copy + Send + Sync> LightPaths<B> {
+impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
     /// Traces a few first, then at most `most` if their vertices are not [enough](ENOUGH_VERTICES).
     fn trace<S: Scene<Bsdf = B>>(
         scene: &PreparedScene<'_, S>,
@@ -159,7 +165,7 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
             let mut clock = Clock::start();
             let plan = plan(paths);
             let context = Context { prepared: scene, plan: &plan };
-            let pieces = in_pieces(paths, halt, |index, scratch, out: &mut LightChunk<B>| {
+            let pieces = in_pieces(paths, halt, |index, scratch, out: &mut LightChunk<B, f64, L>| {
                 trace_light_path(&context, StreamKind::PilotLight, index, scratch, out, &mut NoObserver);
                 true
             })?;
@@ -203,6 +209,7 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
             plan.techniques.has(technique).then(found).flatten()
         };
         Statistics {
+            lanes: None,
             light_path_seconds: self.seconds,
             vertices_per_path: self.vertices.len() as f64 / paths,
             footprint: median(&mut queries.footprints).unwrap_or(0.0),
@@ -253,14 +260,20 @@ impl<B: Copy + Send + Sync> LightPaths<B> {
 }
 
 /// The vertices of the first light sub-paths, and how many sub-paths those are.
-fn first_paths<B>(vertices: &[LightVertex<B>], paths: f64) -> (&[LightVertex<B>], f64) {
+fn first_paths<B, L: Lanes>(
+    vertices: &[LightVertex<B, f64, L>],
+    paths: f64,
+) -> (&[LightVertex<B, f64, L>], f64) {
     match vertices.get(NEIGHBOURS) {
         None => (vertices, paths),
         Some(next) => (&vertices[..NEIGHBOURS], f64::from(next.path + 1)),
     }
 }
 
-fn photons<B>(vertices: &[LightVertex<B>], keep: impl Fn(&Interaction<B>) -> bool) -> PointTree<()> {
+fn photons<B, L: Lanes>(
+    vertices: &[LightVertex<B, f64, L>],
+    keep: impl Fn(&Interaction<B>) -> bool,
+) -> PointTree<()> {
     PointTree::build(vertices.iter().filter(|v| keep(&v.interaction)).map(|v| (v.position, ())).collect())
 }
 
@@ -320,9 +333,9 @@ impl<B> Observer<B> for Queries {
 
 impl Queries {
     /// The queries of camera sub-paths all over the picture.
-    fn trace<S: Scene>(context: &Context<'_, S>, paths: u32, halt: &Halt<'_>) -> Option<Self> {
+    fn trace<S: Scene, L: Lanes>(context: &Context<'_, S>, paths: u32, halt: &Halt<'_>) -> Option<Self> {
         let crop = context.prepared.scene.camera().crop();
-        let map = LightMap::empty();
+        let map = LightMap::<_, _, L>::empty();
         let pieces = in_pieces(paths, halt, |index, scratch, queries: &mut Self| {
             let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
             let observer: &mut DynObserver<'_, S::Bsdf> = queries;

@@ -88,7 +88,7 @@ fn look<S: Scene>(
     let context = Context { prepared: scene, plan };
     let (width, height) = scene.scene.camera().resolution();
     let film = PixelRect { x: 0, y: 0, width, height };
-    let map = LightMap::empty();
+    let map = LightMap::<_, f64, f64>::empty();
     let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut Vec<Seen>| {
         let mut seen = Seen::default();
         let (kind, index) = (StreamKind::PilotCamera, u64::from(index));

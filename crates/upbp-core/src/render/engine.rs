@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use upbp_estimators::path::Context;
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, StreamKind};
+use upbp_media::Lanes;
 
 use super::passes::{Buffers, Lists, add_splats, camera_pass, light_pass};
 use crate::auto;
@@ -59,15 +60,15 @@ pub(crate) struct LightDone {
     pub(crate) times: PassTimes,
 }
 
-/// The engine of a type of scenes.
-pub(crate) struct SceneEngine<'a, S: Scene> {
+/// The engine of a type of scenes, with walks in the lanes `L`.
+pub(crate) struct SceneEngine<'a, S: Scene, L: Lanes> {
     pub(crate) scene: PreparedScene<'a, S>,
     pub(crate) statistics: Statistics,
     /// Photons and beams of the iteration at hand.
-    pub(crate) map: LightMap<S::Bsdf>,
+    pub(crate) map: LightMap<S::Bsdf, f64, L>,
 }
 
-impl<S: Scene> Engine for SceneEngine<'_, S> {
+impl<S: Scene, L: Lanes> Engine for SceneEngine<'_, S, L> {
     fn iteration_plan(&self, settings: &Settings, plan: &Plan, iteration: u64) -> IterationPlan {
         auto::iteration_plan(&self.scene, settings, plan, iteration)
     }
@@ -104,14 +105,17 @@ impl<S: Scene> Engine for SceneEngine<'_, S> {
     }
 }
 
-fn trace_light<S: Scene>(
+/// Photons, and what their pass has done.
+type Photons<B, L> = (LightMap<B, f64, L>, LightDone);
+
+fn trace_light<S: Scene, L: Lanes>(
     context: &Context<'_, S>,
     statistics: &Statistics,
-    mut lists: Lists<S::Bsdf>,
+    mut lists: Lists<S::Bsdf, L>,
     rect: PixelRect,
     pixels: &mut [Pixel],
     halt: &Halt<'_>,
-) -> Option<(LightMap<S::Bsdf>, LightDone)> {
+) -> Option<Photons<S::Bsdf, L>> {
     let plan = context.plan;
     let mut times = PassTimes::default();
     let mut clock = Clock::start();

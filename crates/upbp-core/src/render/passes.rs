@@ -11,6 +11,7 @@ use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Scratc
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, Features, Layer, LightMap, StreamKind};
+use upbp_media::Lanes;
 
 use crate::auto::memory::LightCounts;
 use crate::budget::Halt;
@@ -24,20 +25,20 @@ const CAMERA_CHUNK: usize = 64;
 
 /// Lists that are used again in the next iteration: the allocator need not find a use for what was given back
 /// to it.
-pub(crate) struct Lists<B> {
-    pub(crate) vertices: Vec<LightVertex<B>>,
-    pub(crate) beams: Vec<PhotonBeam>,
+pub(crate) struct Lists<B, L: Lanes> {
+    pub(crate) vertices: Vec<LightVertex<B, f64, L>>,
+    pub(crate) beams: Vec<PhotonBeam<f64, L>>,
 }
 
-impl<B> Default for Lists<B> {
+impl<B, L: Lanes> Default for Lists<B, L> {
     fn default() -> Self {
         Self { vertices: Vec::new(), beams: Vec::new() }
     }
 }
 
-impl<B> Lists<B> {
+impl<B, L: Lanes> Lists<B, L> {
     /// The lists of a map that is no longer needed.
-    pub(crate) fn of(map: LightMap<B>) -> Self {
+    pub(crate) fn of(map: LightMap<B, f64, L>) -> Self {
         Self { vertices: map.vertices, beams: map.beams }
     }
 }
@@ -48,11 +49,11 @@ impl<B> Lists<B> {
 ///
 /// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never
 /// more than a fraction of all in two places.
-pub(crate) fn light_pass<S: Scene>(
+pub(crate) fn light_pass<S: Scene, L: Lanes>(
     context: &Context<'_, S>,
     kind: StreamKind,
     expected: &LightCounts,
-    lists: &mut Lists<S::Bsdf>,
+    lists: &mut Lists<S::Bsdf, L>,
     halt: &Halt<'_>,
     mut take_splats: impl FnMut(&[Splat]),
 ) -> Option<Counters> {
@@ -61,7 +62,7 @@ pub(crate) fn light_pass<S: Scene>(
     // Enough for each thread that none waits long for the last one.
     let threads = rayon::current_num_threads() as u32;
     let wave = (chunks / 32).clamp(16 * threads, 256 * threads);
-    let mut buffers: Vec<LightChunk<S::Bsdf>> = Vec::new();
+    let mut buffers: Vec<LightChunk<S::Bsdf, f64, L>> = Vec::new();
     buffers.resize_with(wave.min(chunks) as usize, LightChunk::default);
     let mut counters = Counters::default();
     lists.vertices.clear();
@@ -71,7 +72,8 @@ pub(crate) fn light_pass<S: Scene>(
     let _ = lists.beams.try_reserve_exact((1.05 * expected.beams) as usize);
     for start in (0..chunks).step_by(wave as usize) {
         let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
-        let trace = |scratch: &mut Scratch<S::Bsdf>, (i, out): (usize, &mut LightChunk<S::Bsdf>)| {
+        let trace = |scratch: &mut Scratch<S::Bsdf, L>,
+                     (i, out): (usize, &mut LightChunk<S::Bsdf, f64, L>)| {
             let first = (start + i as u32) * LIGHT_CHUNK;
             for index in first..first.saturating_add(LIGHT_CHUNK).min(paths) {
                 if halt.now() {
@@ -106,9 +108,9 @@ type CameraChunk<'a> = (usize, (&'a mut [Pixel], &'a mut [Features]));
 
 /// Traces one camera sub-path for each pixel of `rect` that belongs to one of `sets`, and adds it to
 /// the buffers. `None` if it was halted: then the pixels of these sets mean nothing.
-pub(crate) fn camera_pass<S: Scene>(
+pub(crate) fn camera_pass<S: Scene, L: Lanes>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf>,
+    map: &LightMap<S::Bsdf, f64, L>,
     rect: PixelRect,
     sets: &Range<u32>,
     Buffers { pixels, features }: Buffers<'_>,
@@ -118,7 +120,7 @@ pub(crate) fn camera_pass<S: Scene>(
     // None of them if there is no room for any.
     let mut chunks: Vec<_> = features.chunks_mut(CAMERA_CHUNK).collect();
     chunks.resize_with(pixels.len().div_ceil(CAMERA_CHUNK), Default::default);
-    let trace = |scratch: &mut Scratch<S::Bsdf>, (chunk, (pixels, features)): CameraChunk<'_>| {
+    let trace = |scratch: &mut Scratch<S::Bsdf, L>, (chunk, (pixels, features)): CameraChunk<'_>| {
         let mut counters = Counters::default();
         for (i, pixel) in pixels.iter_mut().enumerate() {
             let place = chunk * CAMERA_CHUNK + i;

@@ -70,6 +70,11 @@ pub(super) fn prepare<'a, S: Scene>(
     };
     let film = Film::new(rect, choice.plan.techniques);
     let film = if identity.settings.features { film.with_features() } else { film };
-    let engine = SceneEngine { scene: prepared, statistics: choice.statistics, map: LightMap::empty() };
-    Ok(Prepared { engine: Box::new(engine), canceller, state: State { identity, record, film } })
+    let statistics = choice.statistics;
+    let engine: Box<dyn Engine + 'a> = if choice.plan.lanes.is_some() {
+        Box::new(SceneEngine::<S, [f64; 3]> { scene: prepared, statistics, map: LightMap::empty() })
+    } else {
+        Box::new(SceneEngine::<S, f64> { scene: prepared, statistics, map: LightMap::empty() })
+    };
+    Ok(Prepared { engine, canceller, state: State { identity, record, film } })
 }

@@ -30,7 +30,7 @@ use crate::film::{IterationSet, MAX_ITERATIONS};
 const MAGIC: [u8; 8] = *b"UPBPSTAT";
 
 /// Version of the format.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 
 /// The longest header, bytes: room for a million ranges of iterations.
 const MAX_HEADER: u64 = 1 << 24;

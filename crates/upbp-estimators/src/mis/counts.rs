@@ -1,7 +1,7 @@
 //! The constants of one iteration that enter weights.
 
 use serde::{Deserialize, Serialize};
-use upbp_media::MediumId;
+use upbp_media::{Lanes, MediumId};
 
 use super::density_sum::Densities;
 use crate::scene::Walk;
@@ -40,6 +40,41 @@ pub struct VolumeMerges {
     pub bp2d: f64,
     /// `n V_1`, photon beams around query beams.
     pub bb1d: f64,
+}
+
+/// The density of a walk's distance at a vertex, as one of its techniques sees it (section 1.3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistanceDensity {
+    /// `t`, of a walk that stops there: per length in a medium, the probability to pass on a surface.
+    pub point: f64,
+    /// `c·t`, of a beam that runs through: the probability `R` to get there if it is short, 1 if it is long;
+    /// 0 on surfaces.
+    pub beam: f64,
+}
+
+impl DistanceDensity {
+    /// Relative to a walk that stops there: by the distance factor `c` of its last edge.
+    #[inline]
+    #[must_use]
+    pub const fn at_stop(distance_factor: f64) -> Self {
+        Self { point: 1.0, beam: distance_factor }
+    }
+
+    /// The distance factor `c`; 0 on surfaces.
+    #[inline]
+    #[must_use]
+    pub const fn factor(self) -> f64 {
+        self.beam / self.point
+    }
+}
+
+/// A walk at a vertex that another walk has made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OtherWalk<L: Lanes = f64> {
+    /// Density of its distance.
+    pub density: DistanceDensity,
+    /// Shares of its lanes if it stops there.
+    pub shares: L::Shares,
 }
 
 /// The kind of merges that are possible at a vertex.
@@ -90,6 +125,10 @@ pub struct MisPlan {
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,
+    /// The probability of each lane to be the hero of a sub-path, of either side; walks with one lane do not
+    /// ask. With more lanes there is only the balance heuristic: squares of densities have no recursion with
+    /// a value per lane.
+    pub lanes: [f64; 3],
 }
 
 impl MisPlan {
@@ -127,16 +166,41 @@ impl MisPlan {
         }
     }
 
-    /// The distance factor of a vertex, from the edge by which `walk` arrives there: `R/t` for short beams,
-    /// `1/t` for long ones, where the walk passes the edge with probability `pass_probability` and stops at
-    /// its end with density `t` (section 1.3). 0 on surfaces.
+    /// The density of the distance of `walk` at a vertex, by an edge that it passes with probability
+    /// `pass_probability` and at whose end it stops with density `t` (section 1.3).
     #[inline]
     #[must_use]
-    pub fn distance_factor(&self, walk: Walk, in_medium: bool, pass_probability: f64, t: f64) -> f64 {
-        match self.extent(walk) {
+    pub fn distance_density(
+        &self,
+        walk: Walk,
+        in_medium: bool,
+        pass_probability: f64,
+        t: f64,
+    ) -> DistanceDensity {
+        let beam = match self.extent(walk) {
             _ if !in_medium => 0.0,
-            BeamExtent::Short => pass_probability / t,
-            BeamExtent::Long => 1.0 / t,
+            BeamExtent::Short => pass_probability,
+            BeamExtent::Long => 1.0,
+        };
+        DistanceDensity { point: t, beam }
+    }
+
+    /// The walk that would arrive at a vertex, from a start where its lanes have `shares`, by an edge that it
+    /// passes with probability `pass_probability` and at whose end it stops with density `t`.
+    #[inline]
+    #[must_use]
+    pub fn other_walk<L: Lanes>(
+        &self,
+        walk: Walk,
+        in_medium: bool,
+        pass_probability: L,
+        t: L,
+        shares: &L::Shares,
+    ) -> OtherWalk<L> {
+        let mean = t.mean(shares);
+        OtherWalk {
+            density: self.distance_density(walk, in_medium, pass_probability.mean(shares), mean),
+            shares: t.given(shares, mean),
         }
     }
 
@@ -165,38 +229,45 @@ impl MisPlan {
         }
     }
 
-    /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1), from the distance
-    /// factors of the light and the camera sub-path, at a vertex with some scale of radii.
+    /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1), times the densities
+    /// of the two sub-paths' distances, at a vertex with some scale of radii.
     #[inline]
     #[must_use]
     pub fn volume_factors(
         &self,
         medium: MediumId,
-        c_light: f64,
-        c_camera: f64,
+        light: DistanceDensity,
+        camera: DistanceDensity,
         sin_theta: f64,
         scale: f64,
     ) -> VolumeMerges {
         let v = self.merges_at(medium, scale);
         let sin_theta = if sin_theta * sin_theta < PARALLEL_SIN2 { 0.0 } else { sin_theta };
         VolumeMerges {
-            pp3d: self.pow(v.pp3d),
-            pb2d: self.pow(v.pb2d * c_camera),
-            bp2d: self.pow(v.bp2d * c_light),
-            bb1d: self.pow(v.bb1d * c_light * c_camera * sin_theta),
+            pp3d: self.pow(v.pp3d * light.point * camera.point),
+            pb2d: self.pow(v.pb2d * light.point * camera.beam),
+            bp2d: self.pow(v.bp2d * light.beam * camera.point),
+            bb1d: self.pow(v.bb1d * light.beam * camera.beam * sin_theta),
         }
     }
 
-    /// `F_i`: the sum of the merge factors at a vertex, from the distance factors of the two sub-paths
-    /// (section 4.1).
+    /// `F_i`: the sum of the merge factors at a vertex (section 4.1), times the densities of the two
+    /// sub-paths' distances.
     #[inline]
     #[must_use]
-    pub fn merge_sum<D: Densities>(&self, kind: MergeKind, c_light: f64, c_camera: f64) -> D {
+    pub fn merge_sum<D: Densities>(
+        &self,
+        kind: MergeKind,
+        light: DistanceDensity,
+        camera: DistanceDensity,
+    ) -> D {
         match kind {
             MergeKind::None => D::ZERO,
-            MergeKind::Surface { scale } => D::of(Technique::Surf, self.surface_factor(scale)),
+            MergeKind::Surface { scale } => {
+                D::of(Technique::Surf, self.surface_factor(scale) * self.pow(light.point * camera.point))
+            }
             MergeKind::Medium { medium, sin_theta, scale } => {
-                self.volume_factors(medium, c_light, c_camera, sin_theta, scale).sum()
+                self.volume_factors(medium, light, camera, sin_theta, scale).sum()
             }
         }
     }

@@ -12,6 +12,8 @@ pub mod oracle;
 mod recursion;
 mod weights;
 
-pub use counts::{BeamExtent, Heuristic, MergeKind, MisPlan, PARALLEL_SIN2, VolumeMerges};
+pub use counts::{
+    BeamExtent, DistanceDensity, Heuristic, MergeKind, MisPlan, OtherWalk, PARALLEL_SIN2, VolumeMerges,
+};
 pub use density_sum::{ByTechnique, Densities, Weight};
-pub use recursion::{Edge, EdgeMis, EdgeStart, End, VertexMis};
+pub use recursion::{Edge, EdgeMis, EdgeStart, VertexMis};

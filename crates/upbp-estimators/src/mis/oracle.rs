@@ -2,10 +2,11 @@
 //! 2.1 and 3.3).
 //!
 //! A path is described whole, every density of both walks at every vertex and edge; the effective density of
-//! each technique is a product over the path, taken in logarithms. Nothing is shared with the recursion but
-//! the constants of the [`MisPlan`].
+//! each technique is a product over the path, taken in logarithms. With [lanes](Lanes) it is the sum over all
+//! pairs of heroes, of the light and of the camera sub-path, of their probabilities times these products
+//! (section 6.13). Nothing is shared with the recursion but the constants of the [`MisPlan`].
 
-use upbp_media::MediumId;
+use upbp_media::{Lanes, MediumId};
 
 use super::counts::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2};
 
@@ -47,24 +48,24 @@ pub struct PathVertex {
 
 /// The edge between vertices `i` and `i + 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PathEdge {
+pub struct PathEdge<L = f64> {
     /// Distance in scene units, infinite for an infinite emitter.
     pub distance: f64,
     /// `tL_{i+1}`: density of the light walk stopping at the camera-side vertex.
-    pub t_light: f64,
+    pub t_light: L,
     /// `tC_i`: density of the camera walk stopping at the light-side vertex.
-    pub t_camera: f64,
+    pub t_camera: L,
     /// Probability to pass the edge.
-    pub pass_probability: f64,
+    pub pass_probability: L,
 }
 
-/// A whole path with `edges.len() + 1` vertices.
+/// A whole path with `edges.len() + 1` vertices; densities of distances are those of each of the lanes `L`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Path {
+pub struct Path<L = f64> {
     /// Vertices from the light to the camera.
     pub vertices: Vec<PathVertex>,
     /// Edges from the light to the camera.
-    pub edges: Vec<PathEdge>,
+    pub edges: Vec<PathEdge<L>>,
     /// `L_0`, with the choice of the emitter.
     pub pdf_position: f64,
     /// `p_nee(x_0 | x_1)`, with the choice of the emitter.
@@ -96,43 +97,49 @@ pub enum Strategy {
     Bb1d(usize),
 }
 
-impl Path {
+/// The logarithm of a density; −∞ of zero.
+fn log(x: f64) -> f64 {
+    if x > 0.0 { x.ln() } else { f64::NEG_INFINITY }
+}
+
+impl<L: Lanes> Path<L> {
     /// Number of edges.
     #[must_use]
     pub fn length(&self) -> usize {
         self.edges.len()
     }
 
-    /// `L_i`, i ≥ 1: density of vertex `i` as the light walk makes it.
+    /// `L_i`, i ≥ 1, but for the distance: density of vertex `i` as the light walk makes it.
     fn light_density(&self, i: usize) -> f64 {
         let edge = &self.edges[i - 1];
         let d2 = if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 };
-        self.vertices[i - 1].rho_light * self.vertices[i].cos_light / d2 * edge.t_light
+        self.vertices[i - 1].rho_light * self.vertices[i].cos_light / d2
     }
 
-    /// `C_i`, i ≤ k − 1: density of vertex `i` as the camera walk makes it.
+    /// `C_i`, i ≤ k − 1, but for the distance: density of vertex `i` as the camera walk makes it.
     fn camera_density(&self, i: usize) -> f64 {
         let edge = &self.edges[i];
         let d2 = if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 };
-        self.vertices[i + 1].rho_camera * self.vertices[i].cos_camera / d2 * edge.t_camera
+        self.vertices[i + 1].rho_camera * self.vertices[i].cos_camera / d2
     }
 
-    /// The weights of all strategies that the plan runs and that can make this path; they sum to one.
-    #[must_use]
-    pub fn weights(&self, plan: &MisPlan) -> Vec<(Strategy, f64)> {
+    /// The logarithms of the effective densities, counts included, of all strategies, if the light sub-path
+    /// has the lane `hero_light` and the camera sub-path `hero_camera`.
+    fn densities(&self, plan: &MisPlan, hero_light: usize, hero_camera: usize) -> Vec<(Strategy, f64)> {
         let k = self.length();
         let ok = |i: usize| matches!(self.vertices[i].kind, VertexKind::Surface | VertexKind::Medium(_));
-        let log = |x: f64| if x > 0.0 { x.ln() } else { f64::NEG_INFINITY };
+        let t_light = |i: usize| self.edges[i - 1].t_light.get(hero_light);
+        let t_camera = |i: usize| self.edges[i].t_camera.get(hero_camera);
 
         // A[s] = Σ_{i<s} ln L_i,  B[s] = Σ_{i≥s} ln C_i; the camera end has density 1.
         let mut light = vec![0.0; k + 1];
         light[1] = log(self.pdf_position);
         for s in 2..=k {
-            light[s] = light[s - 1] + log(self.light_density(s - 1));
+            light[s] = light[s - 1] + log(self.light_density(s - 1)) + log(t_light(s - 1));
         }
         let mut camera = vec![0.0; k + 1];
         for s in (0..k).rev() {
-            camera[s] = camera[s + 1] + log(self.camera_density(s));
+            camera[s] = camera[s + 1] + log(self.camera_density(s)) + log(t_camera(s));
         }
 
         let mut densities = Vec::new();
@@ -158,24 +165,27 @@ impl Path {
             }
         }
         for i in 1..k {
-            let both = light[i] + log(self.light_density(i)) + camera[i];
+            let both = light[i] + log(self.light_density(i)) + log(self.camera_density(i)) + camera[i + 1];
             match self.vertices[i].kind {
                 VertexKind::Surface => {
+                    let both = both + log(t_light(i)) + log(t_camera(i));
                     push(Strategy::Surf(i), plan.surf * self.vertices[i].scale.powi(2), both);
                 }
                 VertexKind::Medium(medium) => {
                     let v = plan.merges_in(medium);
-                    let factor = |extent, pass_probability: f64, t: f64| match extent {
-                        BeamExtent::Short => pass_probability / t,
-                        BeamExtent::Long => 1.0 / t,
+                    let beam = |extent, passes: f64| match extent {
+                        BeamExtent::Short => log(passes),
+                        BeamExtent::Long => 0.0,
                     };
-                    let c_light = factor(
-                        plan.photon_beams,
-                        self.edges[i - 1].pass_probability,
-                        self.edges[i - 1].t_light,
-                    );
-                    let c_camera =
-                        factor(plan.query_beams, self.edges[i].pass_probability, self.edges[i].t_camera);
+                    // In another medium neither walk stops here, whatever its lane, and no beam counts.
+                    let stops =
+                        self.edges[i - 1].t_light.is_positive() && self.edges[i].t_camera.is_positive();
+                    let both = if stops { both } else { f64::NEG_INFINITY };
+                    let point = [log(t_light(i)), log(t_camera(i))];
+                    let beam = [
+                        beam(plan.photon_beams, self.edges[i - 1].pass_probability.get(hero_light)),
+                        beam(plan.query_beams, self.edges[i].pass_probability.get(hero_camera)),
+                    ];
                     let sin = self.vertices[i].sin_theta;
                     let sin = if sin * sin < PARALLEL_SIN2 { 0.0 } else { sin };
                     let width = plan.width.get(medium.0 as usize).copied().unwrap_or_default();
@@ -184,16 +194,47 @@ impl Path {
                     let here = |value: f64, dimension, width: f64| {
                         value * (1.0 + width) * scale.powi(dimension) / (1.0 + width * scale.powi(4))
                     };
-                    push(Strategy::Pp3d(i), here(v.pp3d, 3, width.pp3d), both);
-                    push(Strategy::Pb2d(i), here(v.pb2d, 2, width.pb2d), both + log(c_camera));
-                    push(Strategy::Bp2d(i), here(v.bp2d, 2, width.bp2d), both + log(c_light));
-                    let bb1d = both + log(c_light) + log(c_camera) + log(sin);
+                    push(Strategy::Pp3d(i), here(v.pp3d, 3, width.pp3d), both + point[0] + point[1]);
+                    push(Strategy::Pb2d(i), here(v.pb2d, 2, width.pb2d), both + point[0] + beam[1]);
+                    push(Strategy::Bp2d(i), here(v.bp2d, 2, width.bp2d), both + beam[0] + point[1]);
+                    let bb1d = both + beam[0] + beam[1] + log(sin);
                     push(Strategy::Bb1d(i), here(v.bb1d, 1, width.bb1d), bb1d);
                 }
                 VertexKind::End | VertexKind::Volume | VertexKind::Delta => {}
             }
         }
+        densities
+    }
 
+    /// The same for any heroes: the sum over all pairs, each with its probability.
+    fn densities_of_all_heroes(&self, plan: &MisPlan) -> Vec<(Strategy, f64)> {
+        let probability = |lane: usize| if L::COUNT == 1 { 1.0 } else { plan.lanes[lane] };
+        let mut sums: Vec<(Strategy, f64)> = Vec::new();
+        for light in 0..L::COUNT {
+            for camera in 0..L::COUNT {
+                let pair = log(probability(light)) + log(probability(camera));
+                if pair == f64::NEG_INFINITY {
+                    continue;
+                }
+                for (strategy, density) in self.densities(plan, light, camera) {
+                    let density = pair + density;
+                    match sums.iter_mut().find(|(other, _)| *other == strategy) {
+                        Some((_, sum)) => {
+                            let (small, large) = (sum.min(density), sum.max(density));
+                            *sum = large + (small - large).exp().ln_1p();
+                        }
+                        None => sums.push((strategy, density)),
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// The weights of all strategies that the plan runs and that can make this path; they sum to one.
+    #[must_use]
+    pub fn weights(&self, plan: &MisPlan) -> Vec<(Strategy, f64)> {
+        let densities = self.densities_of_all_heroes(plan);
         let exponent = match plan.heuristic {
             Heuristic::Balance => 1.0,
             Heuristic::Power => 2.0,

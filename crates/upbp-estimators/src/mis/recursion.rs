@@ -4,37 +4,51 @@
 //! path before `u_i`, relative to the density of "the sub-path ends at `u_i`". It is linear in the one
 //! unknown, the density ρ′ with which the other side's walk would scatter at `u_i`: `B_i = D_i + ρ′ E_i`. A
 //! vertex carries `D` and `E`. The same recursion serves both walks. Oracle: [`super::oracle`].
+//!
+//! With [lanes](Lanes), densities of a sub-path's own side are means over the lanes with its shares. What the
+//! other side would have done has to be kept for each of its lanes, `E` and `B`, until its shares are known
+//! (section 6.13).
 
-use upbp_media::EdgeDensity;
+use upbp_media::{EdgeDensity, Lanes};
 
-use super::counts::{BeamExtent, MergeKind, MisPlan};
+use super::counts::{BeamExtent, DistanceDensity, MergeKind, MisPlan, OtherWalk};
 use super::density_sum::Densities;
 use crate::scene::Walk;
 use crate::technique::Technique;
 
 /// Densities of all techniques that split a sub-path before a vertex, on arrival there (section 4.1).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VertexMis<D = f64> {
+#[derive(Clone, Copy, Debug)]
+pub struct VertexMis<D: Densities = f64, L: Lanes = f64> {
     /// `D_i`: connecting to this vertex from the one before.
     pub connect: D,
-    /// `E_i`: everything below the vertex before, per opposite scattering density.
-    pub below: D,
+    /// `E_i`: everything below the vertex before, per opposite scattering density; for each lane of the other
+    /// walk.
+    pub below: L::Each<D>,
     /// The distance factor of the arriving edge; 0 on surfaces.
     pub distance_factor: f64,
+    /// Shares of the sub-path's own lanes, on arrival.
+    pub shares: L::Shares,
 }
 
-impl<D: Densities> VertexMis<D> {
-    /// `B_i = D_i + ρ′ E_i` for the opposite scattering density `ρ′`, roulette included, sr⁻¹.
+impl<D: Densities, L: Lanes> VertexMis<D, L> {
+    /// `B_i = D_i + ρ′ E_i` for the opposite scattering density `ρ′`, roulette included, sr⁻¹, and the shares
+    /// with which the other walk stops at the vertex.
     #[inline]
     #[must_use]
-    pub fn before(&self, plan: &MisPlan, rho_opposite: f64) -> D {
-        // A branch instead of 0 · ∞ where the other walk cannot scatter this way.
-        if rho_opposite > 0.0 { self.connect + self.below * plan.pow(rho_opposite) } else { self.connect }
+    pub fn before(&self, plan: &MisPlan, rho_opposite: f64, opposite: &L::Shares) -> D {
+        with_below(plan, self.connect, rho_opposite, || L::blend(D::ZERO, &self.below, opposite))
     }
 
-    /// The end of the sub-path for a connection to its vertex: `kind` is the vertex with the direction of the
-    /// connection, `opposite` the distance factor of the other walk that would arrive there, `rho_opposite`
-    /// the density with which it would then scatter along this sub-path.
+    /// `B_i` for each lane of the other walk.
+    #[inline]
+    #[must_use]
+    pub fn before_each(&self, plan: &MisPlan, rho_opposite: f64) -> L::Each<D> {
+        L::each(|lane| with_below(plan, self.connect, rho_opposite, || L::pick(&self.below, lane)))
+    }
+
+    /// `F_i + B_i` times the density with which the `other` walk would make the vertex, for a connection to
+    /// it: `kind` is the vertex with the direction of the connection, `density` the other walk's, but for its
+    /// distance, and `rho_opposite` the density with which it would then scatter along this sub-path.
     #[inline]
     #[must_use]
     pub fn end(
@@ -42,35 +56,38 @@ impl<D: Densities> VertexMis<D> {
         plan: &MisPlan,
         walk: Walk,
         kind: MergeKind,
-        opposite: f64,
+        other: &OtherWalk<L>,
         rho_opposite: f64,
-    ) -> End<D> {
-        End {
-            merges: merges(plan, walk, kind, self.distance_factor, opposite),
-            before: self.before(plan, rho_opposite),
+        density: f64,
+    ) -> D {
+        let OtherWalk { density: distance, ref shares } = *other;
+        // Either may be zero (the other walk cannot get here) while B is anything.
+        if !(density > 0.0 && distance.point > 0.0) {
+            return D::ZERO;
         }
+        let merges: D = merges(plan, walk, kind, self.distance_factor, distance);
+        let before = self.before(plan, rho_opposite, shares);
+        (merges + before * plan.pow(distance.point)) * plan.pow(density)
     }
 }
 
-/// One sub-path's end, seen from the completed path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct End<D = f64> {
-    /// `F`: the sum of the merge factors at the vertex, as the heuristic takes it.
-    pub merges: D,
-    /// `B`: all techniques that split the path before the vertex.
-    pub before: D,
-}
-
-impl<D: Densities> End<D> {
-    pub(super) fn sum(self, plan: &MisPlan, density: f64) -> D {
-        // The density may be zero (the other walk cannot get here) while B is anything.
-        if density > 0.0 { (self.merges + self.before) * plan.pow(density) } else { D::ZERO }
-    }
-}
-
-/// The merges at a vertex, from the distance factors of `walk` and of the opposite one.
+/// `D + ρ′ E`, with a branch instead of 0 · ∞ where the other walk cannot scatter this way.
 #[inline]
-fn merges<D: Densities>(plan: &MisPlan, walk: Walk, kind: MergeKind, own: f64, opposite: f64) -> D {
+fn with_below<D: Densities>(plan: &MisPlan, connect: D, rho_opposite: f64, below: impl FnOnce() -> D) -> D {
+    if rho_opposite > 0.0 { connect + below() * plan.pow(rho_opposite) } else { connect }
+}
+
+/// The merges at a vertex, from the distance factor of `walk`, which stops there, and the density of the
+/// opposite one.
+#[inline]
+fn merges<D: Densities>(
+    plan: &MisPlan,
+    walk: Walk,
+    kind: MergeKind,
+    distance_factor: f64,
+    opposite: DistanceDensity,
+) -> D {
+    let own = DistanceDensity::at_stop(distance_factor);
     match walk {
         Walk::Light => plan.merge_sum(kind, own, opposite),
         Walk::Camera => plan.merge_sum(kind, opposite, own),
@@ -80,10 +97,10 @@ fn merges<D: Densities>(plan: &MisPlan, walk: Walk, kind: MergeKind, own: f64, o
 /// A vertex that has scattered: what it passes on to the next vertex, whose distance is not known yet.
 ///
 /// Kept as it is with photon and query beams, whose vertices appear anywhere along them (section 4.5).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EdgeMis<D = f64> {
-    /// `B_i`, as the heuristic takes it.
-    pub before: D,
+#[derive(Clone, Copy, Debug)]
+pub struct EdgeMis<D: Densities = f64, L: Lanes = f64> {
+    /// `B_i`, as the heuristic takes it, for each lane of the other walk.
+    pub before: L::Each<D>,
     /// Own scattering density towards the next vertex: sr⁻¹, a probability for a Dirac lobe, per area for
     /// infinite lights.
     pub rho: f64,
@@ -93,6 +110,8 @@ pub struct EdgeMis<D = f64> {
     pub kind: MergeKind,
     /// The distance factor of the edge that arrived at it.
     pub distance_factor: f64,
+    /// Shares of the sub-path's own lanes.
+    pub shares: L::Shares,
     /// Whether the vertex can be connected to the next one.
     pub connectible: bool,
     /// The way in which walks of the other side come to it.
@@ -115,16 +134,16 @@ impl EdgeStart {
     /// The density of distance of a walk of the other side that comes to the start of an edge.
     #[inline]
     #[must_use]
-    pub const fn backward(self, density: &EdgeDensity) -> f64 {
+    pub const fn backward<L: Lanes>(self, density: &EdgeDensity<L>) -> L {
         match self {
             Self::Surface => density.backward(false),
             Self::Medium => density.backward(true),
-            Self::Volume => 1.0,
+            Self::Volume => L::ONE,
         }
     }
 }
 
-impl<D: Densities> EdgeMis<D> {
+impl<D: Densities, L: Lanes> EdgeMis<D, L> {
     /// The light end of a light sub-path (section 4.2). `hit` is 0 if the emitter cannot be hit,
     /// [`pdf_passage`](crate::scene::Emitter::pdf_passage) in a volume, else 1; `pdf_position` and
     /// `pdf_direction` are `L_0` and `ρL_0`.
@@ -137,27 +156,24 @@ impl<D: Densities> EdgeMis<D> {
         pdf_position: f64,
         pdf_direction: f64,
     ) -> Self {
-        let hit = hit * plan.hit;
-        Self {
-            before: D::of(Technique::Hit, plan.pow(hit / pdf_position)),
-            rho: pdf_direction,
-            cos_out,
-            kind: MergeKind::None,
-            distance_factor: 0.0,
-            connectible: true,
-            start,
-        }
+        let hit = D::of(Technique::Hit, plan.pow(hit * plan.hit / pdf_position));
+        Self { cos_out, start, ..Self::at_end(plan, hit, pdf_direction) }
     }
 
     /// The camera end of a camera sub-path; `pdf` is the density of the camera ray, sr⁻¹ per pixel.
     #[must_use]
-    pub fn at_camera(pdf: f64) -> Self {
+    pub fn at_camera(plan: &MisPlan, pdf: f64) -> Self {
+        Self::at_end(plan, D::ZERO, pdf)
+    }
+
+    fn at_end(plan: &MisPlan, before: D, rho: f64) -> Self {
         Self {
-            before: D::ZERO,
-            rho: pdf,
+            before: L::each(|_| before),
+            rho,
             cos_out: 1.0,
             kind: MergeKind::None,
             distance_factor: 0.0,
+            shares: L::prior(&plan.lanes),
             connectible: true,
             start: EdgeStart::Surface,
         }
@@ -167,7 +183,8 @@ impl<D: Densities> EdgeMis<D> {
     #[inline]
     #[must_use]
     pub fn is_alone(&self) -> bool {
-        !self.connectible && self.kind == MergeKind::None && self.before.total() == 0.0
+        let is_made_before = |lane| L::pick(&self.before, lane).total() != 0.0;
+        !self.connectible && self.kind == MergeKind::None && !(0..L::COUNT).any(is_made_before)
     }
 
     /// One step (section 4.3): the arrival at the next vertex. `connections` is the number of samples that
@@ -176,51 +193,64 @@ impl<D: Densities> EdgeMis<D> {
     /// tracing on a camera sub-path's first edge; 0 if the new vertex cannot be connected.
     #[inline]
     #[must_use]
-    pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge, connections: D) -> VertexMis<D> {
-        let inverse = 1.0 / (self.rho * edge.cos_in * edge.forward);
-        let below = if edge.backward > 0.0 {
-            let stops = self.start == EdgeStart::Medium;
-            let opposite = plan.distance_factor(walk.other(), stops, edge.pass_probability, edge.backward);
-            let merges: D = merges(plan, walk, self.kind, self.distance_factor, opposite);
-            (merges + self.before) * plan.pow(inverse * self.cos_out * edge.backward)
+    pub fn arrive(&self, plan: &MisPlan, walk: Walk, edge: &Edge<L>, connections: D) -> VertexMis<D, L> {
+        let own = plan.distance_density(
+            walk,
+            edge.ends_in_medium,
+            edge.pass_probability.mean(&self.shares),
+            edge.forward.mean(&self.shares),
+        );
+        let inverse = 1.0 / (self.rho * edge.cos_in * own.point);
+        // Where no lane of the other walk can stop, its beams do not count either: they are in another
+        // medium.
+        let below = if edge.backward.is_positive() {
+            let scale = plan.pow(inverse * self.cos_out);
+            let in_medium = self.start == EdgeStart::Medium;
+            L::each(|lane| {
+                let (passes, stops) = (edge.pass_probability.get(lane), edge.backward.get(lane));
+                let opposite = plan.distance_density(walk.other(), in_medium, passes, stops);
+                let merges: D = merges(plan, walk, self.kind, self.distance_factor, opposite);
+                let all =
+                    if stops > 0.0 { merges + L::pick(&self.before, lane) * plan.pow(stops) } else { merges };
+                all * scale
+            })
         } else {
-            D::ZERO
+            L::each(|_| D::ZERO)
         };
         let connect = if self.connectible && connections.total() > 0.0 {
             connections * plan.pow(inverse * edge.distance_squared)
         } else {
             D::ZERO
         };
-        let distance_factor =
-            plan.distance_factor(walk, edge.ends_in_medium, edge.pass_probability, edge.forward);
-        VertexMis { connect, below, distance_factor }
+        let shares = edge.forward.given(&self.shares, own.point);
+        VertexMis { connect, below, distance_factor: own.factor(), shares }
     }
 }
 
 /// An edge between two vertices, walked from the first to the second (section 1.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub struct Edge<L = f64> {
     /// Squared distance in scene units; 1 from or to an infinite emitter, whose densities are per solid
     /// angle.
     pub distance_squared: f64,
     /// The cosine factor at the second vertex; 1 in media and towards infinity.
     pub cos_in: f64,
     /// Distance density `t` of the walk that stops at the second vertex.
-    pub forward: f64,
+    pub forward: L,
     /// Distance density `t′` of the other walk, which stops at the first.
-    pub backward: f64,
+    pub backward: L,
     /// Probability `R` that a walk passes the whole edge; the same in both directions.
-    pub pass_probability: f64,
+    pub pass_probability: L,
     /// Whether the second vertex lies in a medium.
     pub ends_in_medium: bool,
 }
 
-impl Edge {
+impl<L: Lanes> Edge<L> {
     /// An edge from what its segments accumulated.
     #[inline]
     #[must_use]
     pub fn new(
-        density: &EdgeDensity,
+        density: &EdgeDensity<L>,
         distance: f64,
         cos_in: f64,
         start: EdgeStart,

@@ -1,8 +1,10 @@
 //! Weights of completed paths from the two sub-path ends (`docs/theory.md`, section 4.4).
 
+use upbp_media::Lanes;
+
 use super::counts::MisPlan;
 use super::density_sum::{Densities, Weight};
-use super::recursion::{End, VertexMis};
+use super::recursion::VertexMis;
 use crate::technique::Technique;
 
 impl<D: Densities> Weight<D> {
@@ -16,64 +18,49 @@ impl<D: Densities> Weight<D> {
 }
 
 impl MisPlan {
-    /// A connection; `light_density` is the density `C` of the light vertex as the camera sub-path would
-    /// sample it, `camera_density` that of the camera vertex, `L`. (4.5)
+    /// A connection, from the [ends](VertexMis::end) of the two sub-paths. (4.5)
     #[inline]
     #[must_use]
-    pub fn connect_weight<D: Densities>(
-        &self,
-        light: End<D>,
-        light_density: f64,
-        camera: End<D>,
-        camera_density: f64,
-    ) -> Weight<D> {
+    pub fn connect_weight<D: Densities>(&self, light: D, camera: D) -> Weight<D> {
         let own = self.pow(self.connect);
-        let connect = D::of(Technique::Connect, own);
-        let light = light.sum(self, light_density);
-        Weight { own, all: connect + light + camera.sum(self, camera_density) }
+        Weight { own, all: D::of(Technique::Connect, own) + light + camera }
     }
 
-    /// Light tracing; `light_density` as for a connection.
+    /// Light tracing, from the [end](VertexMis::end) of the light sub-path.
     #[inline]
     #[must_use]
-    pub fn light_tracing_weight<D: Densities>(&self, light: End<D>, light_density: f64) -> Weight<D> {
+    pub fn light_tracing_weight<D: Densities>(&self, light: D) -> Weight<D> {
         let own = self.pow(self.light_tracing);
-        Weight { own, all: D::of(Technique::LightTracing, own) + light.sum(self, light_density) }
+        Weight { own, all: D::of(Technique::LightTracing, own) + light }
     }
 
-    /// Next event estimation. `pdf` is `p_nee`; `pdf_position` is `L_0`; `hit_density` is `C_0`, 0 for a
-    /// light that cannot be hit; `camera_density` is `L_1`.
+    /// Next event estimation, from the [end](VertexMis::end) of the camera sub-path, whose density is
+    /// `L_0/p_nee` times that of the light sub-path. `pdf` is `p_nee`; `hit_density` is `C_0`, 0 for a light
+    /// that cannot be hit.
     #[inline]
     #[must_use]
-    pub fn nee_weight<D: Densities>(
-        &self,
-        pdf: f64,
-        pdf_position: f64,
-        hit_density: f64,
-        camera: End<D>,
-        camera_density: f64,
-    ) -> Weight<D> {
+    pub fn nee_weight<D: Densities>(&self, pdf: f64, hit_density: f64, camera: D) -> Weight<D> {
         let own = self.pow(self.nee);
         let hit = self.pow(self.hit * hit_density / pdf);
-        let here = D::of(Technique::Nee, own) + D::of(Technique::Hit, hit);
-        Weight { own, all: here + camera.sum(self, pdf_position / pdf * camera_density) }
+        Weight { own, all: D::of(Technique::Nee, own) + D::of(Technique::Hit, hit) + camera }
     }
 
     /// A camera sub-path hit an emitter: `connect` and `below` are those on arrival at the light, with next
     /// events as connections; `pdf_incident` is `p_nee`, the others `L_0` and `ρL_0`.
     #[inline]
     #[must_use]
-    pub fn hit_weight<D: Densities>(
+    pub fn hit_weight<D: Densities, L: Lanes>(
         &self,
-        vertex: &VertexMis<D>,
+        vertex: &VertexMis<D, L>,
         pdf_incident: f64,
         pdf_position: f64,
         pdf_direction: f64,
     ) -> Weight<D> {
         let own = self.pow(self.hit);
+        let below = L::blend(D::ZERO, &vertex.below, &L::prior(&self.lanes));
         let all = D::of(Technique::Hit, own)
             + vertex.connect * self.pow(pdf_incident)
-            + vertex.below * self.pow(pdf_position * pdf_direction);
+            + below * self.pow(pdf_position * pdf_direction);
         Weight { own, all }
     }
 }

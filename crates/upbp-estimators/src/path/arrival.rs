@@ -1,7 +1,7 @@
 //! The end of an edge, the same for both walks: where it stops, what is there, what it passes on.
 
 use glam::Vec3;
-use upbp_media::EdgeDensity;
+use upbp_media::{EdgeDensity, Lanes};
 
 use super::context::Context;
 use super::edge::EdgeTrace;
@@ -10,10 +10,10 @@ use crate::mis::{Densities, EdgeMis, EdgeStart, MergeKind, VertexMis};
 use crate::scene::Scene;
 
 /// The end of an edge.
-pub(crate) struct Arrived<B> {
+pub(crate) struct Arrived<B, L> {
     pub(crate) position: Vec3,
     pub(crate) distance: f32,
-    pub(crate) density: EdgeDensity,
+    pub(crate) density: EdgeDensity<L>,
     pub(crate) interaction: Interaction<B>,
     /// The bodies around it.
     pub(crate) sides: MediumInterface,
@@ -23,9 +23,9 @@ pub(crate) struct Arrived<B> {
     clippy::large_enum_variant,
     reason = "lives on the stack for a moment, and is nearly always the large one"
 )]
-pub(crate) enum Arrival<B> {
+pub(crate) enum Arrival<B, L> {
     /// At a vertex.
-    Vertex(Arrived<B>),
+    Vertex(Arrived<B, L>),
     /// To infinity.
     Escaped,
     /// Grazing a surface.
@@ -35,7 +35,10 @@ pub(crate) enum Arrival<B> {
     Lost,
 }
 
-pub(crate) fn arrive<S: Scene>(scene: &S, edge_trace: &EdgeTrace<S::Bsdf>) -> Arrival<S::Bsdf> {
+pub(crate) fn arrive<S: Scene, L: Lanes>(
+    scene: &S,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+) -> Arrival<S::Bsdf, L> {
     if edge_trace.is_lost() {
         return Arrival::Lost;
     }
@@ -73,16 +76,16 @@ pub(crate) fn arrive<S: Scene>(scene: &S, edge_trace: &EdgeTrace<S::Bsdf>) -> Ar
 
 /// Densities for the weights of the next vertex, of a vertex that has scattered; `scale` is that of kernel
 /// radii there.
-pub(crate) fn scatter<S: Scene, D: Densities>(
+pub(crate) fn scatter<S: Scene, D: Densities, L: Lanes>(
     context: &Context<'_, S>,
-    mis: &VertexMis<D>,
+    mis: &VertexMis<D, L>,
     interaction: &Interaction<S::Bsdf>,
     scale: f32,
     scattered: &Scattered,
-) -> EdgeMis<D> {
+) -> EdgeMis<D, L> {
     let smooth = if scattered.delta { VertexMis { connect: D::ZERO, ..*mis } } else { *mis };
     EdgeMis {
-        before: smooth.before(&context.plan.mis, scattered.rho_opposite),
+        before: smooth.before_each(&context.plan.mis, scattered.rho_opposite),
         rho: scattered.rho_own,
         cos_out: scattered.cos,
         kind: if scattered.delta {
@@ -91,6 +94,7 @@ pub(crate) fn scatter<S: Scene, D: Densities>(
             interaction.merge_kind(scattered.sin_theta, scale)
         },
         distance_factor: mis.distance_factor,
+        shares: mis.shares,
         connectible: !scattered.delta,
         start: if interaction.in_medium() { EdgeStart::Medium } else { EdgeStart::Surface },
     }

@@ -1,5 +1,7 @@
 //! Context and buffers of a walk.
 
+use upbp_media::Lanes;
+
 use super::edge::EdgeTrace;
 use crate::iteration::IterationPlan;
 use crate::prepared::PreparedScene;
@@ -22,12 +24,12 @@ impl<S: Scene> Clone for Context<'_, S> {
 impl<S: Scene> Copy for Context<'_, S> {}
 
 /// Buffers of one thread, kept from path to path.
-pub struct Scratch<B> {
-    pub(crate) edge_trace: EdgeTrace<B>,
+pub struct Scratch<B, L: Lanes = f64> {
+    pub(crate) edge_trace: EdgeTrace<B, L>,
     pub(crate) crossings: Vec<Crossing>,
 }
 
-impl<B: Copy> Default for Scratch<B> {
+impl<B: Copy, L: Lanes> Default for Scratch<B, L> {
     fn default() -> Self {
         Self { edge_trace: EdgeTrace::new(), crossings: Vec::new() }
     }

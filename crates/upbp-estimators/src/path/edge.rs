@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 use upbp_accel::Ray;
-use upbp_media::{EdgeDensity, Interior, Medium, MediumId, MediumStack, RaySegment};
+use upbp_media::{EdgeDensity, Interior, Lanes, Medium, MediumId, MediumStack, RaySegment};
 
 use crate::iteration::IterationPlan;
 use crate::mis::BeamExtent;
@@ -26,7 +26,7 @@ pub enum Extent {
 
 /// A stretch of an edge inside one medium.
 #[derive(Clone, Copy, Debug)]
-pub struct MediumSpan {
+pub struct MediumSpan<L = f64> {
     /// Distance along the ray where it begins, scene units.
     pub start: f32,
     /// Distance along the ray where it ends; may be infinite.
@@ -34,21 +34,21 @@ pub struct MediumSpan {
     /// The medium, `None` for vacuum.
     pub medium: Option<MediumId>,
     /// Densities of the edge up to `start`.
-    pub before: EdgeDensity,
+    pub before: EdgeDensity<L>,
     /// Number of the ray's crossings before it.
     crossings: usize,
 }
 
 /// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a
-/// medium.
-pub struct EdgeTrace<B> {
+/// medium. Its densities are those of each of the [`Lanes`] `L`.
+pub struct EdgeTrace<B, L: Lanes = f64> {
     /// Start of the ray.
     pub origin: Vec3,
     /// Its direction.
     pub direction: Vec3,
     /// Stretches in order, adjoining, from 0 to the surface. With [`Extent::ToStop`] the one in which the
     /// walk stops is the last, and its end means nothing.
-    pub spans: Vec<MediumSpan>,
+    pub spans: Vec<MediumSpan<L>>,
     /// Stop of the walk in a medium: index of the stretch and distance along the ray.
     pub stop: Option<(usize, f32)>,
     /// The surface; with [`Extent::ToStop`] only if the walk gets there.
@@ -107,8 +107,10 @@ pub(crate) const fn may_correct(corrections: usize) -> bool {
 const DISTANCE_MARGIN: f32 = 8.0 * f32::EPSILON;
 
 /// The decision where a walk stops, while it is followed.
-struct Flight {
+struct Flight<L: Lanes> {
     extent: Extent,
+    /// The lane that distances are drawn from.
+    hero: L::Hero,
     /// The random numbers that decide in the current stretch.
     decision: Option<[f32; 2]>,
     /// Distance to which the ray has to be followed if the current medium goes on.
@@ -130,7 +132,7 @@ pub(crate) fn is_hidden(stack: &MediumStack, interior: &Interior, entering: bool
     }
 }
 
-impl<B: Copy> EdgeTrace<B> {
+impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     /// An empty one; [`trace`](Self::trace) fills it, again and again without allocation.
     #[must_use]
     pub fn new() -> Self {
@@ -150,7 +152,7 @@ impl<B: Copy> EdgeTrace<B> {
     }
 
     /// Follows a ray from `origin`, which lies in the bodies of `stack` but for rounding (a boundary that
-    /// contradicts them corrects them), and draws from `stream` where the walk stops.
+    /// contradicts them corrects them), and draws from `stream` where the walk stops, by the lane of `hero`.
     ///
     /// The way begins at distance `start`: 0, or −∞ for light that has come from infinity to `origin`,
     /// through the medium around everything without a stop. It does not stop in its first stretch, then.
@@ -166,6 +168,7 @@ impl<B: Copy> EdgeTrace<B> {
         stack: &MediumStack,
         start: f32,
         extent: Extent,
+        hero: L::Hero,
         stream: &mut Stream,
     ) {
         self.origin = origin;
@@ -174,7 +177,7 @@ impl<B: Copy> EdgeTrace<B> {
         self.crossings.clear();
         self.lost = false;
         let mut corrections = 0;
-        while let Some(correction) = self.follow(scene, start, extent, stream, corrections) {
+        while let Some(correction) = self.follow(scene, start, (extent, hero), stream, corrections) {
             self.conflicts += 1;
             if !may_correct(corrections) {
                 self.lose();
@@ -206,7 +209,7 @@ impl<B: Copy> EdgeTrace<B> {
         &mut self,
         scene: &S,
         start: f32,
-        extent: Extent,
+        (extent, hero): (Extent, L::Hero),
         stream: &mut Stream,
         corrections: usize,
     ) -> Option<Crossing> {
@@ -214,7 +217,8 @@ impl<B: Copy> EdgeTrace<B> {
         self.stop = None;
         self.hit = None;
         self.end.clone_from(&self.start);
-        let mut flight = Flight { extent, decision: None, max_distance: f32::INFINITY, stop: f32::INFINITY };
+        let mut flight =
+            Flight::<L> { extent, hero, decision: None, max_distance: f32::INFINITY, stop: f32::INFINITY };
         let medium = medium_of(scene, &self.start);
         let mut span = MediumSpan { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
@@ -284,8 +288,8 @@ impl<B: Copy> EdgeTrace<B> {
     fn enter<S: Scene<Bsdf = B>>(
         &self,
         scene: &S,
-        span: &MediumSpan,
-        flight: &mut Flight,
+        span: &MediumSpan<L>,
+        flight: &mut Flight<L>,
         stream: &mut Stream,
     ) {
         flight.max_distance = f32::INFINITY;
@@ -299,7 +303,7 @@ impl<B: Copy> EdgeTrace<B> {
         // A stretch without length has not used its draw.
         let u = *flight.decision.get_or_insert_with(|| stream.pair());
         if flight.extent == Extent::ToStop
-            && let Some(t) = medium.sample_distance(&self.segment(span, f32::INFINITY), u[0], u[1])
+            && let Some(t) = L::sample_distance(medium, &self.segment(span, f32::INFINITY), flight.hero, u)
             && t >= span.start
         {
             flight.max_distance = t + DISTANCE_MARGIN * t;
@@ -312,8 +316,8 @@ impl<B: Copy> EdgeTrace<B> {
     fn close<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
-        span: &mut MediumSpan,
-        flight: &Flight,
+        span: &mut MediumSpan<L>,
+        flight: &Flight<L>,
         end: f32,
     ) -> bool {
         span.end = end;
@@ -321,7 +325,7 @@ impl<B: Copy> EdgeTrace<B> {
             return false;
         }
         if self.stop.is_none()
-            && let Some([u_channel, u_distance]) = flight.decision
+            && let Some(u) = flight.decision
             && let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize])
             && medium.scatters()
         {
@@ -330,7 +334,7 @@ impl<B: Copy> EdgeTrace<B> {
             let t = if flight.max_distance < end {
                 Some(flight.stop)
             } else {
-                medium.sample_distance(&self.segment(span, end), u_channel, u_distance)
+                L::sample_distance(medium, &self.segment(span, end), flight.hero, u)
             };
             self.stop = t.map(|t| (self.spans.len(), t));
         }
@@ -342,8 +346,8 @@ impl<B: Copy> EdgeTrace<B> {
     fn cross<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
-        span: &mut MediumSpan,
-        flight: &mut Flight,
+        span: &mut MediumSpan<L>,
+        flight: &mut Flight<L>,
         crossings: usize,
         stream: &mut Stream,
     ) -> bool {
@@ -375,10 +379,12 @@ impl<B: Copy> EdgeTrace<B> {
 
     /// Densities of the edge from its start to `t` in `span`.
     #[inline]
-    pub fn density_to<S: Scene>(&self, scene: &S, span: &MediumSpan, t: f32) -> EdgeDensity {
+    pub fn density_to<S: Scene>(&self, scene: &S, span: &MediumSpan<L>, t: f32) -> EdgeDensity<L> {
         let mut density = span.before;
         match span.medium {
-            Some(medium) => density.push(&scene.media()[medium.0 as usize].segment(&self.segment(span, t))),
+            Some(medium) => {
+                density.push(&L::segment(&scene.media()[medium.0 as usize], &self.segment(span, t)));
+            }
             None => density.push_vacuum(),
         }
         density
@@ -391,12 +397,12 @@ impl<B: Copy> EdgeTrace<B> {
     }
 
     /// Densities of the whole edge.
-    pub fn density<S: Scene>(&self, scene: &S) -> EdgeDensity {
+    pub fn density<S: Scene>(&self, scene: &S) -> EdgeDensity<L> {
         self.spans.last().map_or(EdgeDensity::EMPTY, |span| self.density_to(scene, span, span.end))
     }
 
     /// The spans that a beam along the edge runs through, each with the distance where the beam ends in it.
-    pub fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&MediumSpan, f32)> {
+    pub fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&MediumSpan<L>, f32)> {
         let stop = match extent {
             BeamExtent::Short => self.stop,
             BeamExtent::Long => None,
@@ -415,7 +421,7 @@ impl<B: Copy> EdgeTrace<B> {
         plan: &IterationPlan,
         depth: u32,
         technique: Technique,
-    ) -> impl Iterator<Item = (&MediumSpan, MediumId, Ray)> {
+    ) -> impl Iterator<Item = (&MediumSpan<L>, MediumId, Ray)> {
         // The photon's side has at least one edge.
         let completes = depth < plan.lengths.max;
         let spans = completes.then(|| self.beam_spans(plan.mis.query_beams)).into_iter().flatten();
@@ -429,7 +435,7 @@ impl<B: Copy> EdgeTrace<B> {
     /// The part of `span` before `t`.
     #[inline]
     #[must_use]
-    pub fn segment(&self, span: &MediumSpan, t: f32) -> RaySegment {
+    pub fn segment(&self, span: &MediumSpan<L>, t: f32) -> RaySegment {
         RaySegment { origin: self.origin, direction: self.direction, start: span.start, end: t }
     }
 
@@ -437,7 +443,7 @@ impl<B: Copy> EdgeTrace<B> {
     ///
     /// A span may hold crossings of its own: boundaries hidden in a stronger body, which change no medium.
     #[must_use]
-    pub fn stack_in(&self, span: &MediumSpan, t: f32) -> MediumStack {
+    pub fn stack_in(&self, span: &MediumSpan<L>, t: f32) -> MediumStack {
         let mut stack = self.start.clone();
         for (i, crossing) in self.crossings.iter().enumerate() {
             if i >= span.crossings && crossing.t > t {
@@ -455,7 +461,7 @@ impl<B: Copy> EdgeTrace<B> {
     }
 }
 
-impl<B: Copy> Default for EdgeTrace<B> {
+impl<B: Copy, L: Lanes> Default for EdgeTrace<B, L> {
     fn default() -> Self {
         Self::new()
     }

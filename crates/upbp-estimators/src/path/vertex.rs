@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 use upbp_accel::Segment;
-use upbp_media::{EdgeDensity, Medium, MediumId, RaySegment, Spectrum};
+use upbp_media::{EdgeDensity, Lanes, MediumId, RaySegment, Spectrum};
 
 use super::context::Context;
 use super::edge::{EdgeTrace, MediumSpan};
@@ -15,7 +15,7 @@ use crate::technique::Technique;
 
 /// A vertex of a light sub-path where camera sub-paths can be connected or merged.
 #[derive(Clone, Copy, Debug)]
-pub struct LightVertex<B, D = f64> {
+pub struct LightVertex<B, D: Densities = f64, L: Lanes = f64> {
     /// Position, scene units.
     pub position: Vec3,
     /// Direction to the vertex before, towards the light.
@@ -23,7 +23,7 @@ pub struct LightVertex<B, D = f64> {
     /// Flux over density on arrival, before scattering (`docs/theory.md`, section 1.5).
     pub throughput: Spectrum,
     /// Densities for the weights.
-    pub mis: VertexMis<D>,
+    pub mis: VertexMis<D, L>,
     /// Kernel radii there, relative to those of the plan.
     pub scale: f32,
     /// Edges from the light.
@@ -34,7 +34,7 @@ pub struct LightVertex<B, D = f64> {
     pub interaction: Interaction<B>,
 }
 
-impl<B: Bsdf, D> LightVertex<B, D> {
+impl<B: Bsdf, D: Densities, L: Lanes> LightVertex<B, D, L> {
     /// The scattering of the light sub-path towards `to`; `None` if nothing is scattered there.
     #[inline]
     pub(crate) fn evaluate<S: Scene<Bsdf = B>>(
@@ -95,15 +95,15 @@ impl EdgeSource {
 
 /// The light that a sub-path carries through one medium along one edge.
 #[derive(Clone, Copy, Debug)]
-pub struct PhotonBeam<D = f64> {
+pub struct PhotonBeam<D: Densities = f64, L: Lanes = f64> {
     /// The segment in space; distances from the edge's first vertex.
     pub segment: Segment,
     /// The medium.
     pub medium: MediumId,
     /// Densities of the edge up to the segment's start.
-    pub before: EdgeDensity,
+    pub before: EdgeDensity<L>,
     /// Densities for the weights, at the edge's first vertex.
-    pub mis: EdgeMis<D>,
+    pub mis: EdgeMis<D, L>,
     /// The start of the edge.
     pub source: EdgeSource,
     /// Flux over density at the edge's first vertex, after scattering.
@@ -116,20 +116,21 @@ pub struct PhotonBeam<D = f64> {
     pub path: u32,
 }
 
-impl<D: Densities> PhotonBeam<D> {
+impl<D: Densities, L: Lanes> PhotonBeam<D, L> {
     /// The vertex at distance `t` along the beam; `None` where no walk can stop.
     pub(crate) fn vertex_at<S: Scene>(
         &self,
         context: &Context<'_, S>,
         t: f32,
-    ) -> Option<LightVertex<S::Bsdf, D>> {
+    ) -> Option<LightVertex<S::Bsdf, D, L>> {
         let Context { prepared, plan } = *context;
         let Segment { origin, direction, start, .. } = self.segment;
         let segment = RaySegment { origin, direction, start, end: t };
-        let density = self.before.with(&prepared.scene.media()[self.medium.0 as usize].segment(&segment));
+        let density =
+            self.before.with(&L::segment(&prepared.scene.media()[self.medium.0 as usize], &segment));
         let distance = if self.from_infinity { f64::INFINITY } else { f64::from(t) };
         let edge = Edge::new(&density, distance, 1.0, self.mis.start, true);
-        if !(edge.forward > 0.0) {
+        if !(edge.forward.mean(&self.mis.shares) > 0.0) {
             return None;
         }
         let position = origin + direction * t;
@@ -137,7 +138,7 @@ impl<D: Densities> PhotonBeam<D> {
         Some(LightVertex {
             position,
             towards_light: -direction,
-            throughput: self.throughput * transmitted(&density, plan.mis.photon_beams),
+            throughput: self.throughput * transmitted(&density, plan.mis.photon_beams, &self.mis.shares),
             mis: self.mis.arrive(&plan.mis, Walk::Light, &edge, connections),
             scale: plan.radius_field.at(position),
             depth: self.depth,
@@ -148,18 +149,18 @@ impl<D: Densities> PhotonBeam<D> {
 }
 
 /// Throughput of a beam inside it: `T/R` of a short one, `T` of a long one.
-fn transmitted(density: &EdgeDensity, extent: BeamExtent) -> Spectrum {
-    density.transmittance / extent.normalisation(density.pass_probability) as f32
+fn transmitted<L: Lanes>(density: &EdgeDensity<L>, extent: BeamExtent, shares: &L::Shares) -> Spectrum {
+    density.transmittance / extent.normalisation(density.pass_probability.mean(shares)) as f32
 }
 
 /// A vertex of a camera sub-path where light sub-paths can be connected or merged.
-pub(crate) struct CameraVertex<B, D> {
+pub(crate) struct CameraVertex<B, D: Densities, L: Lanes> {
     pub(crate) position: Vec3,
     /// Direction to the vertex before, towards the camera.
     pub(crate) towards_camera: Vec3,
     /// Importance over density on arrival, before scattering.
     pub(crate) throughput: Spectrum,
-    pub(crate) mis: VertexMis<D>,
+    pub(crate) mis: VertexMis<D, L>,
     /// Kernel radii there, relative to those of the plan.
     pub(crate) scale: f32,
     /// Edges from the camera.
@@ -167,7 +168,7 @@ pub(crate) struct CameraVertex<B, D> {
     pub(crate) interaction: Interaction<B>,
 }
 
-impl<B: Bsdf, D> CameraVertex<B, D> {
+impl<B: Bsdf, D: Densities, L: Lanes> CameraVertex<B, D, L> {
     /// The scattering of the camera sub-path towards `to`; `None` if nothing is scattered there.
     #[inline]
     pub(crate) fn evaluate<S: Scene<Bsdf = B>>(
@@ -181,34 +182,34 @@ impl<B: Bsdf, D> CameraVertex<B, D> {
 }
 
 /// An edge of a camera sub-path: a query beam through all its media.
-pub(crate) struct CameraEdge<D> {
+pub(crate) struct CameraEdge<D: Densities, L: Lanes> {
     /// Importance over density at the edge's first vertex, after scattering.
     pub(crate) throughput: Spectrum,
     /// Densities for the weights, at the first vertex.
-    pub(crate) mis: EdgeMis<D>,
+    pub(crate) mis: EdgeMis<D, L>,
     /// Samples that connect the first vertex to one on this edge, as the heuristic takes them.
     pub(crate) connections: D,
     /// Edges from the camera to a vertex on this edge.
     pub(crate) depth: u32,
 }
 
-impl<D: Densities> CameraEdge<D> {
+impl<D: Densities, L: Lanes> CameraEdge<D, L> {
     /// The vertex at distance `t` along the edge, in a medium, where kernel radii have some scale; `None`
     /// where no walk can stop.
     pub(crate) fn vertex_at<S: Scene>(
         &self,
         context: &Context<'_, S>,
-        edge_trace: &EdgeTrace<S::Bsdf>,
-        (span, medium): (&MediumSpan, MediumId),
+        edge_trace: &EdgeTrace<S::Bsdf, L>,
+        (span, medium): (&MediumSpan<L>, MediumId),
         (t, scale): (f32, f32),
-    ) -> Option<CameraVertex<S::Bsdf, D>> {
+    ) -> Option<CameraVertex<S::Bsdf, D, L>> {
         let Context { prepared, plan } = *context;
         let density = edge_trace.density_to(prepared.scene, span, t);
         let edge = Edge::new(&density, f64::from(t), 1.0, self.mis.start, true);
-        (edge.forward > 0.0).then(|| CameraVertex {
+        (edge.forward.mean(&self.mis.shares) > 0.0).then(|| CameraVertex {
             position: edge_trace.origin + edge_trace.direction * t,
             towards_camera: -edge_trace.direction,
-            throughput: self.throughput * transmitted(&density, plan.mis.query_beams),
+            throughput: self.throughput * transmitted(&density, plan.mis.query_beams, &self.mis.shares),
             mis: self.mis.arrive(&plan.mis, Walk::Camera, &edge, self.connections),
             scale,
             depth: self.depth,
@@ -228,18 +229,18 @@ pub struct Splat {
 
 /// Vertices, beams and splats of a number of light sub-paths.
 #[derive(Clone, Debug)]
-pub struct LightChunk<B, D = f64> {
+pub struct LightChunk<B, D: Densities = f64, L: Lanes = f64> {
     /// Vertices, in the order of the paths.
-    pub vertices: Vec<LightVertex<B, D>>,
+    pub vertices: Vec<LightVertex<B, D, L>>,
     /// Photon beams, in the order of the paths.
-    pub beams: Vec<PhotonBeam<D>>,
+    pub beams: Vec<PhotonBeam<D, L>>,
     /// Splats, in the order of the paths.
     pub splats: Vec<Splat>,
     /// Counters of the walks.
     pub counters: Counters,
 }
 
-impl<B, D> Default for LightChunk<B, D> {
+impl<B, D: Densities, L: Lanes> Default for LightChunk<B, D, L> {
     fn default() -> Self {
         Self { vertices: Vec::new(), beams: Vec::new(), splats: Vec::new(), counters: Counters::default() }
     }

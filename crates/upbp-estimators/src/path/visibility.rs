@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
-use upbp_media::{EdgeDensity, Medium, MediumStack, RaySegment};
+use upbp_media::{EdgeDensity, Lanes, MediumStack, RaySegment};
 
 use super::edge::{correction, correction_of_escape, is_hidden, may_correct, medium_of};
 use super::interaction::Interaction;
@@ -31,13 +31,13 @@ pub(crate) fn ray_origin<B>(interaction: &Interaction<B>, position: Vec3, direct
 /// between.
 ///
 /// `stack` holds the bodies at the near end, on the side of `target`; the far end has none of its own.
-pub fn clear_edge<S: Scene>(
+pub fn clear_edge<S: Scene, L: Lanes>(
     scene: &S,
     stack: &MediumStack,
     origin: Vec3,
     target: &Target,
     crossings: &mut Vec<Crossing>,
-) -> Option<EdgeDensity> {
+) -> Option<EdgeDensity<L>> {
     crossings.clear();
     let ray = match target.surface {
         Some((position, normal)) => {
@@ -70,30 +70,28 @@ pub fn clear_edge<S: Scene>(
 }
 
 /// The result of following an edge.
-enum Edge {
-    Clear(EdgeDensity),
+enum Edge<L> {
+    Clear(EdgeDensity<L>),
     Blocked,
     /// Another one: with this crossing at its start.
     Corrected(Crossing),
 }
 
-fn accumulate<S: Scene>(
+fn accumulate<S: Scene, L: Lanes>(
     scene: &S,
     mut stack: MediumStack,
     ray: &Ray,
     crossings: &[Crossing],
     corrections: usize,
     escapes: bool,
-) -> Edge {
-    let mut density = EdgeDensity::EMPTY;
+) -> Edge<L> {
+    let mut density = EdgeDensity::<L>::EMPTY;
     let mut start = 0.0;
     let mut push = |medium: Option<upbp_media::MediumId>, start: f32, end: f32| match medium {
-        Some(medium) => density.push(&scene.media()[medium.0 as usize].segment(&RaySegment {
-            origin: ray.origin,
-            direction: ray.direction,
-            start,
-            end,
-        })),
+        Some(medium) => {
+            let segment = RaySegment { origin: ray.origin, direction: ray.direction, start, end };
+            density.push(&L::segment(&scene.media()[medium.0 as usize], &segment));
+        }
         None => density.push_vacuum(),
     };
     let mut started = false;

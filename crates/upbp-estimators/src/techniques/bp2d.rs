@@ -1,6 +1,6 @@
 //! BP2D: photon beams around a vertex in a medium (`docs/theory.md`, section 2.5).
 
-use upbp_media::MediumId;
+use upbp_media::{Lanes, MediumId};
 
 use super::merge::merge;
 use crate::film_sample::Output;
@@ -11,10 +11,10 @@ use crate::scene::Scene;
 use crate::technique::Technique;
 
 /// Merges the photon beams around `vertex`, which lies in `medium`.
-pub(crate) fn bp2d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn bp2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf, O::Densities>,
-    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    map: &LightMap<S::Bsdf, O::Densities, L>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
     medium: MediumId,
     out: &mut Output<'_, O>,
 ) {

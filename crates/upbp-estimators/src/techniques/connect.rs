@@ -3,6 +3,8 @@
 //! Drawing `M` of the `N_V` stored vertices instead of walking along one light sub-path keeps the cost of a
 //! camera vertex constant, however long light sub-paths are (`docs/theory.md`, section 6.9).
 
+use upbp_media::Lanes;
+
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
 use crate::observer::{Completion, ObservedSample, Observer};
@@ -14,10 +16,10 @@ use crate::scene::{Crossing, Scene, Walk};
 use crate::technique::Technique;
 
 /// Connects `vertex` to as many light vertices as the plan says.
-pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn connections<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf, O::Densities>,
-    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    map: &LightMap<S::Bsdf, O::Densities, L>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
     sides: &MediumInterface,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
@@ -38,11 +40,11 @@ pub(crate) fn connections<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out.observer.enter_technique(None);
 }
 
-fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
     sides: &MediumInterface,
-    light: &LightVertex<S::Bsdf, O::Densities>,
+    light: &LightVertex<S::Bsdf, O::Densities, L>,
     factor: f64,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -74,29 +76,31 @@ fn connect<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         Interaction::Medium(_) => None,
     };
     let target = Target { direction, distance, surface };
-    let Some(density) = clear_edge(scene, &stack, origin, &target, crossings) else { return };
+    let Some(density) = clear_edge::<_, L>(scene, &stack, origin, &target, crossings) else { return };
 
     let (near, far) = (vertex.interaction.in_medium(), light.interaction.in_medium());
     let distance2 = f64::from(distance).powi(2);
-    // C_{s-1} and L_s: what each walk would have sampled instead of this connection.
-    let light_density = camera_side.rho_own * light_side.cos / distance2 * density.forward(far);
-    let camera_density = light_side.rho_own * camera_side.cos / distance2 * density.backward(near);
-    let factor_of = |walk, in_medium, t| mis.distance_factor(walk, in_medium, density.pass_probability, t);
+    let passes = density.pass_probability;
+    // Each walk, had it gone on instead of this connection.
+    let light_walk = mis.other_walk(Walk::Light, near, passes, density.backward(near), &light.mis.shares);
+    let camera_walk = mis.other_walk(Walk::Camera, far, passes, density.forward(far), &vertex.mis.shares);
     let camera_end = vertex.mis.end(
         mis,
         Walk::Camera,
         vertex.interaction.merge_kind(camera_side.sin_theta, vertex.scale),
-        factor_of(Walk::Light, near, density.backward(near)),
+        &light_walk,
         camera_side.rho_opposite,
+        light_side.rho_own * camera_side.cos / distance2,
     );
     let light_end = light.mis.end(
         mis,
         Walk::Light,
         light.interaction.merge_kind(light_side.sin_theta, light.scale),
-        factor_of(Walk::Camera, far, density.forward(far)),
+        &camera_walk,
         light_side.rho_opposite,
+        camera_side.rho_own * light_side.cos / distance2,
     );
-    let weight = mis.connect_weight(light_end, light_density, camera_end, camera_density);
+    let weight = mis.connect_weight(light_end, camera_end);
     let geometry = camera_side.cos * light_side.cos / distance2;
     let value = vertex.throughput
         * light.throughput

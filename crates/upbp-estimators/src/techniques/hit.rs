@@ -1,7 +1,7 @@
 //! Light that a camera sub-path meets: emitters, environments, emitting media.
 
 use glam::Vec3;
-use upbp_media::{Medium, Spectrum};
+use upbp_media::{Lanes, Medium, Spectrum};
 
 use crate::film_sample::Output;
 use crate::mis::{Densities, Edge, Weight};
@@ -17,10 +17,10 @@ use crate::technique::Technique;
 /// Where light sub-paths start in the volume the weight changes along the ray, and one point of each stretch
 /// stands for all of it; elsewhere there is no other technique, and the integral is in closed form
 /// (`docs/theory.md`, section 2.9).
-pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn emission_along<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    edge_trace: &EdgeTrace<S::Bsdf>,
-    edge: &CameraEdge<O::Densities>,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+    edge: &CameraEdge<O::Densities, L>,
     stream: &mut Stream,
     out: &mut Output<'_, O>,
 ) {
@@ -50,14 +50,14 @@ pub(crate) fn emission_along<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 
 /// Emission of a medium at distance `t` in a span, for all of the span; `pdf` is the density of `t`.
 #[expect(clippy::too_many_arguments, reason = "a point of an edge, used here only")]
-fn emission_at<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+fn emission_at<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    edge_trace: &EdgeTrace<S::Bsdf>,
-    span: &MediumSpan,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+    span: &MediumSpan<L>,
     t: f32,
     pdf: f64,
     medium: &S::Medium,
-    edge: &CameraEdge<O::Densities>,
+    edge: &CameraEdge<O::Densities, L>,
     out: &mut Output<'_, O>,
 ) {
     let prepared = context.prepared;
@@ -82,7 +82,7 @@ fn emission_at<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let mis_edge = Edge {
         distance_squared: f64::from(t) * f64::from(t),
         cos_in: 1.0,
-        forward: f64::from(passage),
+        forward: L::splat(f64::from(passage)),
         backward: edge.mis.start.backward(&density),
         pass_probability: density.pass_probability,
         ends_in_medium: false,
@@ -92,8 +92,8 @@ fn emission_at<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     record_hit(edge, Completion::Hit(end), weight, value, out);
 }
 
-fn record_hit<B: Bsdf, O: Observer<B> + ?Sized>(
-    edge: &CameraEdge<O::Densities>,
+fn record_hit<B: Bsdf, L: Lanes, O: Observer<B> + ?Sized>(
+    edge: &CameraEdge<O::Densities, L>,
     completion: Completion<B>,
     weight: Weight<O::Densities>,
     value: Spectrum,
@@ -109,13 +109,13 @@ fn record_hit<B: Bsdf, O: Observer<B> + ?Sized>(
 }
 
 /// The weight of a camera sub-path that ends on a light by `mis_edge`.
-fn weight_of_hit<S: Scene, D: Densities>(
+fn weight_of_hit<S: Scene, D: Densities, L: Lanes>(
     context: &Context<'_, S>,
     end: &LightEnd,
     densities: &HitDensities,
     receiver: Vec3,
-    mis_edge: &Edge,
-    edge: &CameraEdge<D>,
+    mis_edge: &Edge<L>,
+    edge: &CameraEdge<D, L>,
 ) -> Weight<D> {
     let Context { prepared, plan } = *context;
     let mis = &plan.mis;
@@ -132,14 +132,14 @@ fn weight_of_hit<S: Scene, D: Densities>(
 
 /// The camera sub-path has hit a surface that may shine.
 #[expect(clippy::too_many_arguments, reason = "the state of one hit, used here only")]
-pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn emitter_hit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     hit: &Hit<S::Bsdf>,
     direction: Vec3,
     receiver: Vec3,
-    mis_edge: &Edge,
+    mis_edge: &Edge<L>,
     throughput: Spectrum,
-    edge: &CameraEdge<O::Densities>,
+    edge: &CameraEdge<O::Densities, L>,
     out: &mut Output<'_, O>,
 ) {
     if let Some(emitter) = hit.emitter {
@@ -149,10 +149,10 @@ pub(crate) fn emitter_hit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 }
 
 /// The camera sub-path has left the scene.
-pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn environment<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    edge_trace: &EdgeTrace<S::Bsdf>,
-    edge: &CameraEdge<O::Densities>,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+    edge: &CameraEdge<O::Densities, L>,
     out: &mut Output<'_, O>,
 ) {
     let prepared = context.prepared;
@@ -160,7 +160,8 @@ pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let density = edge_trace.density(prepared.scene);
-    let throughput = edge.throughput * density.transmittance / density.pass_probability as f32;
+    let throughput =
+        edge.throughput * density.transmittance / density.pass_probability.mean(&edge.mis.shares) as f32;
     if throughput.is_black() || !throughput.is_finite() {
         return;
     }
@@ -184,15 +185,15 @@ pub(crate) fn environment<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 
 /// An emitter's light at the end of a camera sub-path.
 #[expect(clippy::too_many_arguments, reason = "the state of one hit, used here only")]
-fn shine<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     emitter: EmitterId,
     point: &EmitterPoint,
     direction: Vec3,
     receiver: Vec3,
-    mis_edge: &Edge,
+    mis_edge: &Edge<L>,
     throughput: Spectrum,
-    edge: &CameraEdge<O::Densities>,
+    edge: &CameraEdge<O::Densities, L>,
     out: &mut Output<'_, O>,
 ) {
     let Context { prepared, plan } = *context;

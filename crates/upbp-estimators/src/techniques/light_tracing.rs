@@ -1,5 +1,7 @@
 //! Light tracing: a light vertex and the lens.
 
+use upbp_media::Lanes;
+
 use crate::observer::{Completion, ObservedSample, Observer};
 use crate::path::{Context, LightChunk, LightVertex, MediumInterface, Splat, Target, clear_edge, ray_origin};
 use crate::random::Stream;
@@ -7,13 +9,13 @@ use crate::scene::{Camera, Crossing, Scene, Walk};
 use crate::technique::Technique;
 
 /// Connects a light vertex to the camera; `sides` are the bodies around it.
-pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    vertex: &LightVertex<S::Bsdf, O::Densities>,
+    vertex: &LightVertex<S::Bsdf, O::Densities, L>,
     sides: &MediumInterface,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
-    out: &mut LightChunk<S::Bsdf, O::Densities>,
+    out: &mut LightChunk<S::Bsdf, O::Densities, L>,
     observer: &mut O,
 ) {
     let Context { prepared, plan } = *context;
@@ -39,20 +41,18 @@ pub(crate) fn light_tracing<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let crosses = vertex.interaction.crosses(vertex.towards_light, direction);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
     let target = Target { direction, distance, surface: None };
-    let Some(density) = clear_edge(scene, &sides.towards(crosses), origin, &target, crossings) else {
+    let Some(density) = clear_edge::<_, L>(scene, &sides.towards(crosses), origin, &target, crossings) else {
         return;
     };
     let in_medium = vertex.interaction.in_medium();
     let distance2 = f64::from(distance) * f64::from(distance);
-    // C_{k-1}: the density of this vertex as the camera would sample it.
     let ray_pdf = f64::from(view.pdf) * scattering.cos / distance2;
-    let light_density = ray_pdf * density.backward(in_medium);
     let mis = &plan.mis;
-    let opposite =
-        mis.distance_factor(Walk::Camera, in_medium, density.pass_probability, density.backward(in_medium));
+    let (passes, stops) = (density.pass_probability, density.backward(in_medium));
+    let camera_walk = mis.other_walk(Walk::Camera, in_medium, passes, stops, &L::prior(&mis.lanes));
     let interaction = vertex.interaction.merge_kind(scattering.sin_theta, vertex.scale);
-    let end = vertex.mis.end(mis, Walk::Light, interaction, opposite, scattering.rho_opposite);
-    let weight = mis.light_tracing_weight(end, light_density);
+    let end = vertex.mis.end(mis, Walk::Light, interaction, &camera_walk, scattering.rho_opposite, ray_pdf);
+    let weight = mis.light_tracing_weight(end);
     let value = vertex.throughput
         * scattering.value
         * density.transmittance

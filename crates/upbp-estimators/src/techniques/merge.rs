@@ -3,19 +3,21 @@
 //! On a beam the vertex lies somewhere along it, not at the distance that a walk sampled: density and weight
 //! are those of the point where the beams come closest (`docs/theory.md`, sections 2.2 to 2.6 and 4.4).
 
+use upbp_media::Lanes;
+
 use crate::film_sample::Output;
-use crate::mis::{Densities, Weight};
+use crate::mis::{Densities, DistanceDensity, Weight};
 use crate::observer::{Completion, ObservedSample, Observer};
 use crate::path::{CameraVertex, Context, Interaction, LightVertex};
 use crate::scene::Scene;
 use crate::technique::Technique;
 
 /// Merges two vertices; `kernel` is the kernel's value between them, for beams per sine of the angle.
-pub(super) fn merge<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(super) fn merge<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     technique: Technique,
-    light: &LightVertex<S::Bsdf, O::Densities>,
-    camera: &CameraVertex<S::Bsdf, O::Densities>,
+    light: &LightVertex<S::Bsdf, O::Densities, L>,
+    camera: &CameraVertex<S::Bsdf, O::Densities, L>,
     kernel: f32,
     out: &mut Output<'_, O>,
 ) {
@@ -32,13 +34,14 @@ pub(super) fn merge<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             (factor, O::Densities::of(technique, factor))
         }
         Interaction::Medium(medium) => {
-            let (c_light, c_camera) = (light.mis.distance_factor, camera.mis.distance_factor);
-            let factors = mis.volume_factors(medium, c_light, c_camera, scattering.sin_theta, scale);
+            let [own, other] =
+                [light.mis.distance_factor, camera.mis.distance_factor].map(DistanceDensity::at_stop);
+            let factors = mis.volume_factors(medium, own, other, scattering.sin_theta, scale);
             (factors.of(technique), factors.sum())
         }
     };
-    let before_light = light.mis.before(mis, scattering.rho_own);
-    let before_camera = camera.mis.before(mis, scattering.rho_opposite);
+    let before_light = light.mis.before(mis, scattering.rho_own, &camera.mis.shares);
+    let before_camera = camera.mis.before(mis, scattering.rho_opposite, &light.mis.shares);
     let per_photon = kernel * plan.per_photon(technique);
     out.record(&ObservedSample {
         technique,

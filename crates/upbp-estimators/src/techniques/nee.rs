@@ -1,6 +1,6 @@
 //! Next event estimation: a camera vertex and a point chosen on a light.
 
-use upbp_media::{BodyId, MediumStack};
+use upbp_media::{BodyId, Lanes, MediumStack};
 
 use crate::film_sample::Output;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
@@ -10,9 +10,9 @@ use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
 
 /// Connects `vertex` to as many points on lights as the plan says.
-pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn next_events<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
     sides: &MediumInterface,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
@@ -29,9 +29,9 @@ pub(crate) fn next_events<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     out.observer.enter_technique(None);
 }
 
-fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
     sides: &MediumInterface,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
@@ -68,7 +68,7 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let surface = (kind == EmitterKind::Area).then_some((incident.point.position, incident.point.normal));
     let target = Target { direction, distance: incident.distance, surface };
     let stack = sides.towards(crosses);
-    let Some(density) = clear_edge(scene, &stack, origin, &target, crossings) else { return };
+    let Some(density) = clear_edge::<_, L>(scene, &stack, origin, &target, crossings) else { return };
     if let EmitterKind::Volume(body) = kind
         && !is_in_body(stack, crossings, body)
     {
@@ -83,18 +83,23 @@ fn next_event<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 
     let arrives = match kind {
         EmitterKind::Volume(_) => f64::from(light.pdf_passage(&incident.point)),
-        _ if kind.is_hittable() => density.forward(false),
+        _ if kind.is_hittable() => density.pass_probability.mean(&vertex.mis.shares),
         _ => 0.0,
     };
     let hit_density = scattering.rho_own * f64::from(cos_light) / distance2 * arrives;
     let factor = prepared.emission_factor(emitter, &incident.point, -direction, vertex.position);
-    let camera_density =
-        f64::from(incident.pdf_direction * factor) * scattering.cos / distance2 * density.backward(in_medium);
-    let opposite =
-        mis.distance_factor(Walk::Light, in_medium, density.pass_probability, density.backward(in_medium));
-    let interaction = vertex.interaction.merge_kind(scattering.sin_theta, vertex.scale);
-    let end = vertex.mis.end(mis, Walk::Camera, interaction, opposite, scattering.rho_opposite);
-    let weight = mis.nee_weight(pdf, pdf_position, hit_density, end, camera_density);
+    let light_density = f64::from(incident.pdf_direction * factor) * scattering.cos / distance2;
+    let (passes, stops) = (density.pass_probability, density.backward(in_medium));
+    let light_walk = mis.other_walk(Walk::Light, in_medium, passes, stops, &L::prior(&mis.lanes));
+    let end = vertex.mis.end(
+        mis,
+        Walk::Camera,
+        vertex.interaction.merge_kind(scattering.sin_theta, vertex.scale),
+        &light_walk,
+        scattering.rho_opposite,
+        pdf_position / pdf * light_density,
+    );
+    let weight = mis.nee_weight(pdf, hit_density, end);
     let value = vertex.throughput
         * scattering.value
         * density.transmittance

@@ -1,5 +1,7 @@
 //! PB2D: photon points in media around a camera edge, the query beam (`docs/theory.md`, section 2.4).
 
+use upbp_media::Lanes;
+
 use super::merge::merge;
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
@@ -9,11 +11,11 @@ use crate::scene::Scene;
 use crate::technique::Technique;
 
 /// Merges the photons around `edge`, through all its media.
-pub(crate) fn pb2d<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn pb2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf, O::Densities>,
-    edge_trace: &EdgeTrace<S::Bsdf>,
-    edge: &CameraEdge<O::Densities>,
+    map: &LightMap<S::Bsdf, O::Densities, L>,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+    edge: &CameraEdge<O::Densities, L>,
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;

@@ -1,8 +1,11 @@
 //! Surface merging: photons on surfaces around a surface vertex (`docs/theory.md`, section 2.2).
 
+use upbp_media::Lanes;
+
 use super::merge::merge;
 use crate::film_sample::Output;
 use crate::light_map::LightMap;
+use crate::mis::Densities;
 use crate::observer::Observer;
 use crate::path::{CameraVertex, Context, Interaction, LightVertex, SurfaceInteraction};
 use crate::scene::Scene;
@@ -16,10 +19,10 @@ const MIN_NORMAL_COSINE: f32 = 0.7;
 const MAX_PLANE_DISTANCE: f32 = 0.3;
 
 /// Merges the photons around `vertex`, which lies on `surface`.
-pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub(crate) fn surf<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf, O::Densities>,
-    vertex: &CameraVertex<S::Bsdf, O::Densities>,
+    map: &LightMap<S::Bsdf, O::Densities, L>,
+    vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
     surface: &SurfaceInteraction<S::Bsdf>,
     out: &mut Output<'_, O>,
 ) {
@@ -42,10 +45,10 @@ pub(crate) fn surf<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
 
 /// Keeps light from leaking around edges and through thin walls. What it cuts off the kernel vanishes with
 /// the radius.
-fn lies_on<B, D>(
+fn lies_on<B, D: Densities, L: Lanes>(
     surface: &SurfaceInteraction<B>,
-    vertex: &CameraVertex<B, D>,
-    photon: &LightVertex<B, D>,
+    vertex: &CameraVertex<B, D, L>,
+    photon: &LightVertex<B, D, L>,
     radius: f32,
 ) -> bool {
     let Interaction::Surface(other) = &photon.interaction else { return false };

@@ -1,7 +1,7 @@
 //! Camera sub-paths: one per pixel sample, with every technique that ends on them.
 
 use glam::Vec2;
-use upbp_media::Spectrum;
+use upbp_media::{Lanes, Spectrum};
 
 use crate::counters::Counters;
 use crate::features::Features;
@@ -21,13 +21,13 @@ use crate::techniques;
 
 /// Traces the camera sub-path of one sample of a pixel. `index` addresses its random numbers.
 #[expect(clippy::too_many_arguments, reason = "one call per sample, with the state of the pass")]
-pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    map: &LightMap<S::Bsdf, O::Densities>,
+    map: &LightMap<S::Bsdf, O::Densities, L>,
     kind: StreamKind,
     pixel: [u32; 2],
     index: u64,
-    scratch: &mut Scratch<S::Bsdf>,
+    scratch: &mut Scratch<S::Bsdf, L>,
     counters: &mut Counters,
     observer: &mut O,
 ) -> CameraWalk {
@@ -54,17 +54,18 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let mut direction = ray.direction;
     let mut edge = CameraEdge {
         throughput: Spectrum::ONE,
-        mis: EdgeMis::at_camera(f64::from(ray.pdf)),
+        mis: EdgeMis::at_camera(&plan.mis, f64::from(ray.pdf)),
         connections: O::Densities::of(Technique::LightTracing, plan.mis.pow(plan.mis.light_tracing)),
         depth: 1,
     };
 
     let mut travelled = 0.0;
     let mut survival = Survival::of_camera(plan.roulette);
+    let hero = L::draw(&plan.mis.lanes, || stream.uniform());
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
         edge.depth = depth;
-        scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, &mut stream);
+        scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, hero, &mut stream);
         out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
         let edge_trace = &scratch.edge_trace;
         techniques::emission_along(context, edge_trace, &edge, &mut stream, &mut out);
@@ -87,7 +88,7 @@ pub fn trace_camera_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             }
         };
         let in_medium = arrived.interaction.in_medium();
-        let t = arrived.density.forward(in_medium);
+        let t = arrived.density.forward(in_medium).mean(&edge.mis.shares);
         let throughput = edge.throughput * arrived.density.transmittance / t as f32;
         if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
             break;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use upbp_accel::{Segment, offset_origin};
-use upbp_media::{Medium, MediumId, MediumStack, Spectrum};
+use upbp_media::{Lanes, Medium, MediumId, MediumStack, Spectrum};
 
 use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
@@ -19,23 +19,24 @@ use crate::technique::Technique;
 use crate::techniques::light_tracing;
 
 /// The walk's state between two vertices.
-struct Flight<D> {
+struct Flight<D: Densities, L: Lanes> {
     origin: Vec3,
     direction: Vec3,
     stack: MediumStack,
-    mis: EdgeMis<D>,
+    mis: EdgeMis<D, L>,
     source: EdgeSource,
     throughput: Spectrum,
     infinite: bool,
+    hero: L::Hero,
 }
 
 /// Traces light sub-path `index`.
-pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     kind: StreamKind,
     index: u32,
-    scratch: &mut Scratch<S::Bsdf>,
-    out: &mut LightChunk<S::Bsdf, O::Densities>,
+    scratch: &mut Scratch<S::Bsdf, L>,
+    out: &mut LightChunk<S::Bsdf, O::Densities, L>,
     observer: &mut O,
 ) {
     let Context { prepared, plan } = *context;
@@ -53,7 +54,16 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         out.counters.light_edges += 1;
         let edge_trace = &mut scratch.edge_trace;
         let start = if flight.infinite { f32::NEG_INFINITY } else { 0.0 };
-        edge_trace.trace(scene, flight.origin, flight.direction, &flight.stack, start, extent, &mut stream);
+        edge_trace.trace(
+            scene,
+            flight.origin,
+            flight.direction,
+            &flight.stack,
+            start,
+            extent,
+            flight.hero,
+            &mut stream,
+        );
         out.counters.boundary_conflicts += edge_trace.take_conflicts();
         if leaves_beams {
             store_beams(context, edge_trace, &flight, depth, index, out);
@@ -69,7 +79,7 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         };
         let Arrived { position, distance, density, interaction, sides } = arrival;
         let in_medium = interaction.in_medium();
-        let t = density.forward(in_medium);
+        let t = density.forward(in_medium).mean(&flight.mis.shares);
         let throughput = flight.throughput * density.transmittance / t as f32;
         if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
             return;
@@ -135,17 +145,18 @@ pub fn trace_light_path<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,
             infinite: false,
+            hero: flight.hero,
         };
     }
 }
 
-fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
+fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     index: u32,
     stream: &mut Stream,
     counters: &mut Counters,
     observer: &mut O,
-) -> Option<Flight<O::Densities>> {
+) -> Option<Flight<O::Densities, L>> {
     let prepared = context.prepared;
     let (emitter, probability) = prepared.choose_emission(stream.uniform())?;
     let light = &prepared.scene.emitters()[emitter.0 as usize];
@@ -157,8 +168,9 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
     let kind = light.kind();
     // With another probability a walk from infinity does not arrive. Those that do have not stopped on the
     // way.
-    let passes = prepared.passes_from_infinity();
-    if kind.is_infinite() && passes < 1.0 && f64::from(stream.uniform()) >= passes {
+    let hero = L::draw(&context.plan.mis.lanes, || stream.uniform());
+    let passes = if kind.is_infinite() { prepared.passes_from_infinity::<L>().of_hero(hero) } else { 1.0 };
+    if passes < 1.0 && f64::from(stream.uniform()) >= passes {
         return None;
     }
     let cos = match kind {
@@ -212,16 +224,17 @@ fn emit<S: Scene, O: Observer<S::Bsdf> + ?Sized>(
         source: EdgeSource::Emitter { emitter, point: emission.point, pdf_position: emission.pdf_position },
         throughput,
         infinite: kind.is_infinite(),
+        hero,
     })
 }
 
-fn store_beams<S: Scene, D: Densities>(
+fn store_beams<S: Scene, D: Densities, L: Lanes>(
     context: &Context<'_, S>,
-    edge_trace: &EdgeTrace<S::Bsdf>,
-    flight: &Flight<D>,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+    flight: &Flight<D, L>,
     depth: u32,
     path: u32,
-    out: &mut LightChunk<S::Bsdf, D>,
+    out: &mut LightChunk<S::Bsdf, D, L>,
 ) {
     let Context { prepared, plan } = *context;
     for (span, end) in edge_trace.beam_spans(plan.mis.photon_beams) {
@@ -262,10 +275,10 @@ const NEGLIGIBLE: f32 = 1e-7;
 /// Where there is none, the beam ends where what is left in every channel is [negligible](NEGLIGIBLE), or is
 /// not attenuated any further. So weights may take it to be without an end. A beam from infinity has none
 /// left before the scene.
-fn beam_end<S: Scene>(
+fn beam_end<S: Scene, L: Lanes>(
     prepared: &PreparedScene<'_, S>,
-    edge_trace: &EdgeTrace<S::Bsdf>,
-    span: &MediumSpan,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+    span: &MediumSpan<L>,
     medium: MediumId,
     end: f32,
 ) -> Option<f32> {

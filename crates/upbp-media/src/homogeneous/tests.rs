@@ -14,7 +14,7 @@ fn medium(sigma_a: [f32; 3], sigma_s: [f32; 3]) -> Homogeneous {
 /// The probabilities with which a medium chooses its channels.
 fn alpha(medium: &Homogeneous) -> [f64; 3] {
     match medium.sampling {
-        Sampling::Chromatic(alpha) => alpha,
+        Sampling::Chromatic { alpha, .. } => alpha,
         _ => [1.0 / 3.0; 3],
     }
 }
@@ -132,7 +132,10 @@ fn grey_equals_the_mixture_of_three_equal_channels() {
     for sigma in [1e-12_f32, 1e-3, 0.7, 40.0] {
         let grey = medium([0.25 * sigma; 3], [0.75 * sigma; 3]);
         assert_eq!(grey.sampling, Sampling::Grey);
-        let mixed = Homogeneous { sampling: Sampling::Chromatic([1.0 / 3.0; 3]), ..grey.clone() };
+        let mixed = Homogeneous {
+            sampling: Sampling::Chromatic { alpha: [1.0 / 3.0; 3], lanes: grey.sigma_t },
+            ..grey.clone()
+        };
         for optical_depth in [0.0, 1e-12, 1e-3, 1.0, 30.0] {
             let segment = segment(0.0, optical_depth / sigma);
             let (one, other) = (grey.segment(&segment), mixed.segment(&segment));

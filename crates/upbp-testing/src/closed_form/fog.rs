@@ -67,6 +67,26 @@ impl Medium for Fog {
         (self.scatters() && t < f64::from(segment.end)).then(|| (t as f32).min(segment.end.next_down()))
     }
 
+    fn lane_extinctions(&self) -> Option<Spectrum> {
+        self.scatters().then(|| self.sigma_t(Vec3::ZERO))
+    }
+
+    fn segment_lanes(&self, segment: &RaySegment) -> SegmentDensity<[f64; 3]> {
+        let transmittance = self.segment(segment).transmittance;
+        if !self.scatters() {
+            return SegmentDensity::passing(transmittance);
+        }
+        let sigma = self.extinction();
+        let passing = sigma.map(|sigma| (-sigma * segment.length_f64().min(f64::MAX)).exp());
+        let stop = [0, 1, 2].map(|lane| sigma[lane] * passing[lane]);
+        SegmentDensity::symmetric(transmittance, passing, stop)
+    }
+
+    fn sample_lane(&self, segment: &RaySegment, lane: usize, [_, u]: [f32; 2]) -> Option<f32> {
+        let t = f64::from(segment.start) - f64::ln_1p(-f64::from(u)) / self.extinction()[lane];
+        (self.scatters() && t < f64::from(segment.end)).then(|| (t as f32).min(segment.end.next_down()))
+    }
+
     fn sigma_s(&self, _: Vec3) -> Spectrum {
         self.sigma_s.into()
     }

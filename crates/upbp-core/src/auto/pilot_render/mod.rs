@@ -16,6 +16,7 @@ use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, IterationPlan, LightMap, PreparedScene, StreamKind, Technique, TechniqueSet,
 };
+use upbp_media::Lanes;
 
 use super::full_plan::iteration_plan;
 use super::pieces::{PIECE, in_pieces};
@@ -113,7 +114,7 @@ pub(super) struct Work {
 impl PilotRender {
     /// Runs `plan` with fewer light sub-paths. `None` if there were [too many samples](MOST_SAMPLES), or if
     /// it was halted.
-    pub(super) fn run<S: Scene>(
+    pub(super) fn run<S: Scene, L: Lanes>(
         scene: &PreparedScene<'_, S>,
         settings: &CheckedSettings,
         plan: &Plan,
@@ -144,7 +145,13 @@ impl PilotRender {
             .map(|pass| {
                 // Not the iterations of other runs before the first iteration.
                 thinned.iteration = u64::from(pass) + 1;
-                Pass::trace(&Context { prepared: scene, plan: &thinned }, &grid, &room, pass == 0, halt)
+                Pass::trace::<S, L>(
+                    &Context { prepared: scene, plan: &thinned },
+                    &grid,
+                    &room,
+                    pass == 0,
+                    halt,
+                )
             })
             .collect::<Option<Vec<_>>>()?;
         for pass in &mut passes {
@@ -289,7 +296,7 @@ struct Pass {
 impl Pass {
     /// Traces the sub-paths of a pass, also at the partners of pixels if asked to; `None` if there is not
     /// enough room.
-    fn trace<S: Scene>(
+    fn trace<S: Scene, L: Lanes>(
         context: &Context<'_, S>,
         grid: &Grid,
         room: &Room,
@@ -298,11 +305,13 @@ impl Pass {
     ) -> Option<Self> {
         let plan: &IterationPlan = context.plan;
         let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
-        let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut (Recorder, LightChunk<_, _>)| {
-            let (recorder, out) = piece;
-            let kind = StreamKind::PilotLight;
-            recorder.record(room, |recorder| trace_light_path(context, kind, index, scratch, out, recorder))
-        })?;
+        let pieces =
+            in_pieces(paths, halt, |index, scratch, piece: &mut (Recorder, LightChunk<_, _, L>)| {
+                let (recorder, out) = piece;
+                let kind = StreamKind::PilotLight;
+                recorder
+                    .record(room, |recorder| trace_light_path(context, kind, index, scratch, out, recorder))
+            })?;
         let mut pass = Self {
             light: Vec::new(),
             camera: Vec::new(),

@@ -78,6 +78,7 @@ fn planned(paths: u32) -> Plan {
         roulette: OF_PILOT,
         periods: MergePeriods::ONE,
         vertices_per_light_path: 1.0,
+        lanes: None,
         radii,
     }
 }

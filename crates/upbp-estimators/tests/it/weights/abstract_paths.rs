@@ -148,6 +148,7 @@ pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
             width,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
+            lanes: [0.0; 3],
         },
     )
 }
@@ -182,5 +183,47 @@ pub(crate) fn modes() -> impl Iterator<Item = (Heuristic, BeamExtent, BeamExtent
         extents
             .into_iter()
             .flat_map(move |photon| extents.into_iter().map(move |query| (heuristic, photon, query)))
+    })
+}
+
+/// Densities of the lanes of a path with one lane: each edge has factors of its own in every lane, now and
+/// then of a lane that never stops or always passes. Walks of the last lane can make the whole path: else no
+/// channel had any light.
+pub(crate) fn in_lanes(path: Path, spread: f64) -> impl Strategy<Value = Path<[f64; 3]>> {
+    let lane = move || (0.0..1.0_f64, density(spread), density(spread));
+    let last = (0.0..1.0_f64, around_one(spread), around_one(spread));
+    vec((lane(), lane(), last), path.length()).prop_map(move |factors| {
+        let edges = path.edges.iter().zip(&factors).enumerate().map(|(i, (edge, &(first, second, last)))| {
+            let lanes = [first, second, last];
+            let passes = lanes.map(|(pass, ..)| if pass < 0.1 { 1.0 } else { pass * edge.pass_probability });
+            let t = |vertex: &PathVertex, t: f64, factors: [f64; 3]| match vertex.kind {
+                VertexKind::Medium(_) => factors.map(|factor| t * factor),
+                VertexKind::Volume => [t; 3],
+                _ => passes,
+            };
+            PathEdge {
+                distance: edge.distance,
+                t_light: t(&path.vertices[i + 1], edge.t_light, lanes.map(|lane| lane.1)),
+                t_camera: t(&path.vertices[i], edge.t_camera, lanes.map(|lane| lane.2)),
+                pass_probability: passes,
+            }
+        });
+        Path {
+            edges: edges.collect(),
+            vertices: path.vertices.clone(),
+            pdf_position: path.pdf_position,
+            pdf_incident: path.pdf_incident,
+            hittable: path.hittable,
+        }
+    })
+}
+
+/// Probabilities of three lanes, of which one may never be drawn.
+pub(crate) fn lane_probabilities() -> impl Strategy<Value = [f64; 3]> {
+    let odds = || prop_oneof![4 => 0.05..1.0_f64, 1 => Just(0.0)];
+    (odds(), odds(), 0.05..1.0_f64).prop_map(|(a, b, c)| {
+        let odds = [a, b, c];
+        let sum: f64 = odds.iter().sum();
+        odds.map(|o| o / sum)
     })
 }

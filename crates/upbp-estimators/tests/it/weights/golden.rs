@@ -83,6 +83,7 @@ fn golden_plan(query_beams: BeamExtent) -> MisPlan {
         width: Vec::new(),
         photon_beams: BeamExtent::Short,
         query_beams,
+        lanes: [0.0; 3],
     }
 }
 

@@ -4,16 +4,17 @@ mod abstract_paths;
 mod golden;
 mod recursion;
 
-use abstract_paths::{TECHNIQUES, masked, modes, path, plan};
+use abstract_paths::{TECHNIQUES, in_lanes, lane_probabilities, masked, modes, path, plan};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use recursion::{Recursion, is_ok};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
 use upbp_estimators::mis::{ByTechnique, Densities, Heuristic, MisPlan, VolumeMerges};
+use upbp_media::Lanes;
 
 /// Every strategy that the kinds of the vertices allow, and the bit of its technique.
-fn strategies(path: &Path) -> Vec<(Way, u32)> {
+fn strategies<L: Lanes>(path: &Path<L>) -> Vec<(Way, u32)> {
     let k = path.length();
     let ok = |i: usize| is_ok(&path.vertices[i]);
     let mut ways = vec![(Way::Hit, 0)];
@@ -49,9 +50,14 @@ impl Reached {
     ///
     /// A weight is known to the rounding of the sum that it is a part of: differences count relative to the
     /// weight down to `1e-200`, below which squares of densities leave the range of normal numbers.
-    fn compare<D: Densities>(&mut self, plan: &MisPlan, path: &Path, mask: u32) -> Result<(), TestCaseError> {
+    fn compare<D: Densities, L: Lanes>(
+        &mut self,
+        plan: &MisPlan,
+        path: &Path<L>,
+        mask: u32,
+    ) -> Result<(), TestCaseError> {
         let expected = path.weights(plan);
-        let recursion = Recursion::<D>::new(plan, path);
+        let recursion = Recursion::<D, L>::new(plan, path);
         let mut sum = 0.0;
         for &(way, weight) in &expected {
             let found = recursion.weight(way).value();
@@ -86,9 +92,13 @@ impl Reached {
     }
 
     /// Compares the parts that techniques have in all weights of one path.
-    fn compare_by_technique(&mut self, plan: &MisPlan, path: &Path) -> Result<(), TestCaseError> {
+    fn compare_by_technique<L: Lanes>(
+        &mut self,
+        plan: &MisPlan,
+        path: &Path<L>,
+    ) -> Result<(), TestCaseError> {
         let expected = path.weights(plan);
-        let recursion = Recursion::<ByTechnique>::new(plan, path);
+        let recursion = Recursion::<ByTechnique, L>::new(plan, path);
         let bits = strategies(path);
         let mut parts = [0.0; TECHNIQUES as usize];
         for (way, weight) in &expected {
@@ -152,7 +162,7 @@ fn recursion_equals_the_enumeration_for_all_masks() {
     let mut masks = masks();
     for_all_ranges("sums", |reached, plan, path| {
         for mask in masks.by_ref().take(16).chain([(1 << TECHNIQUES) - 1]) {
-            reached.compare::<f64>(&masked(plan, mask), path, mask).unwrap();
+            reached.compare::<f64, _>(&masked(plan, mask), path, mask).unwrap();
         }
     });
 }
@@ -167,6 +177,67 @@ fn the_recursion_by_technique_tells_the_part_of_each() {
     });
 }
 
+/// Compares by 2000 paths in lanes of each range.
+fn for_all_ranges_in_lanes(name: &str, mut compare: impl FnMut(&mut Reached, &MisPlan, &Path<[f64; 3]>)) {
+    for (longest, spread) in [(1, 3.0), (3, 3.0), (9, 2.0), (20, 3.0), (9, 8.0), (4, 12.0)] {
+        let mut runner = TestRunner::deterministic();
+        let paths = path(longest, spread).prop_flat_map(move |path| in_lanes(path, spread));
+        let strategy = (paths, plan(), lane_probabilities());
+        let mut reached = Reached::default();
+        for case in 0..2000 {
+            let (path, plan, lanes) = strategy.new_tree(&mut runner).unwrap().current();
+            let (_, photon_beams, query_beams) = modes().nth(case % 4).unwrap();
+            compare(&mut reached, &MisPlan { photon_beams, query_beams, lanes, ..plan }, &path);
+        }
+        reached.report(&format!("{name}, k <= {longest}, e^±{spread}"));
+    }
+}
+
+#[test]
+fn recursion_in_lanes_equals_the_enumeration_over_all_heroes() {
+    let mut masks = masks();
+    for_all_ranges_in_lanes("lanes", |reached, plan, path| {
+        for mask in masks.by_ref().take(8).chain([(1 << TECHNIQUES) - 1]) {
+            reached.compare::<f64, _>(&masked(plan, mask), path, mask).unwrap();
+        }
+    });
+}
+
+#[test]
+fn the_recursion_in_lanes_by_technique_tells_the_part_of_each() {
+    let mut masks = masks();
+    for_all_ranges_in_lanes("lanes by technique", |reached, plan, path| {
+        for mask in masks.by_ref().take(1).chain([(1 << TECHNIQUES) - 1]) {
+            reached.compare_by_technique(&masked(plan, mask), path).unwrap();
+        }
+    });
+}
+
+#[test]
+fn equal_lanes_are_one_lane() {
+    let mut runner = TestRunner::deterministic();
+    let strategy = (path(9, 4.0), plan(), lane_probabilities());
+    for case in 0..500 {
+        let (path, plan, lanes) = strategy.new_tree(&mut runner).unwrap().current();
+        let (_, photon_beams, query_beams) = modes().nth(case % 4).unwrap();
+        let plan = MisPlan { photon_beams, query_beams, lanes, ..plan };
+        let edges = path.edges.iter().map(|edge| PathEdge {
+            distance: edge.distance,
+            t_light: [edge.t_light; 3],
+            t_camera: [edge.t_camera; 3],
+            pass_probability: [edge.pass_probability; 3],
+        });
+        let Path { ref vertices, pdf_position, pdf_incident, hittable, .. } = path;
+        let vertices = vertices.clone();
+        let three = Path { edges: edges.collect(), vertices, pdf_position, pdf_incident, hittable };
+        for (way, weight) in path.weights(&plan) {
+            let found = Recursion::<f64, [f64; 3]>::new(&plan, &three).weight(way).value();
+            assert!((found - weight).abs() <= 1e-10 * weight + 1e-200, "{way:?}: {found}, {weight}");
+            assert!((three.weight(&plan, way) - weight).abs() <= 1e-10 * weight + 1e-200, "{way:?}");
+        }
+    }
+}
+
 #[test]
 fn the_balance_heuristic_stands_long_paths_of_wild_densities() {
     let mut runner = TestRunner::deterministic();
@@ -177,7 +248,7 @@ fn the_balance_heuristic_stands_long_paths_of_wild_densities() {
         let (heuristic, photon_beams, query_beams) = modes().nth(case as usize % 4).unwrap();
         let plan = MisPlan { heuristic, photon_beams, query_beams, ..plan };
         let mask = case * 189 % (1 << TECHNIQUES);
-        reached.compare::<f64>(&masked(&plan, mask), &path, mask).unwrap();
+        reached.compare::<f64, _>(&masked(&plan, mask), &path, mask).unwrap();
     }
     reached.report("k <= 12, e^±16, balance");
 }
@@ -213,7 +284,7 @@ proptest! {
     ) {
         for (heuristic, photon_beams, query_beams) in modes() {
             let plan = masked(&MisPlan { heuristic, photon_beams, query_beams, ..plan.clone() }, mask);
-            Reached::default().compare::<f64>(&plan, &path, mask)?;
+            Reached::default().compare::<f64, _>(&plan, &path, mask)?;
         }
     }
 

@@ -3,19 +3,20 @@
 use upbp_estimators::Technique;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
 use upbp_estimators::mis::{
-    Densities, Edge, EdgeMis, EdgeStart, End, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
+    Densities, DistanceDensity, Edge, EdgeMis, EdgeStart, MergeKind, MisPlan, VertexMis, VolumeMerges, Weight,
 };
 use upbp_estimators::scene::Walk;
+use upbp_media::Lanes;
 
 /// Weights by the recursion, with exactly the calls that the walks make.
-pub(crate) struct Recursion<'a, D> {
+pub(crate) struct Recursion<'a, D: Densities, L: Lanes = f64> {
     plan: &'a MisPlan,
-    path: &'a Path,
+    path: &'a Path<L>,
     /// By vertex; those that a walk does not arrive at stay empty.
-    pub(crate) light: Vec<VertexMis<D>>,
-    pub(crate) camera: Vec<VertexMis<D>>,
+    pub(crate) light: Vec<VertexMis<D, L>>,
+    pub(crate) camera: Vec<VertexMis<D, L>>,
     /// On arrival of the camera walk at the light, with next events as connections.
-    pub(crate) at_light: VertexMis<D>,
+    pub(crate) at_light: VertexMis<D, L>,
 }
 
 pub(crate) fn is_ok(vertex: &PathVertex) -> bool {
@@ -44,38 +45,44 @@ fn kind(vertex: &PathVertex) -> MergeKind {
     }
 }
 
-fn distance_squared(edge: &PathEdge) -> f64 {
+fn distance_squared<L>(edge: &PathEdge<L>) -> f64 {
     if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 }
 }
 
 /// The values that a vertex passes on after it has scattered.
-fn scatter<D: Densities>(
+fn scatter<D: Densities, L: Lanes>(
     plan: &MisPlan,
     vertex: &PathVertex,
-    vertex_mis: &VertexMis<D>,
+    vertex_mis: &VertexMis<D, L>,
     rho: f64,
     rho_opposite: f64,
     cos_out: f64,
-) -> EdgeMis<D> {
+) -> EdgeMis<D, L> {
     let vertex_mis = if is_ok(vertex) { *vertex_mis } else { VertexMis { connect: D::ZERO, ..*vertex_mis } };
     EdgeMis {
-        before: vertex_mis.before(plan, rho_opposite),
+        before: vertex_mis.before_each(plan, rho_opposite),
         rho,
         cos_out,
         kind: kind(vertex),
         distance_factor: vertex_mis.distance_factor,
+        shares: vertex_mis.shares,
         connectible: is_ok(vertex),
         start: start(vertex),
     }
 }
 
-impl<'a, D: Densities> Recursion<'a, D> {
-    pub(crate) fn new(plan: &'a MisPlan, path: &'a Path) -> Self {
+impl<'a, D: Densities, L: Lanes> Recursion<'a, D, L> {
+    pub(crate) fn new(plan: &'a MisPlan, path: &'a Path<L>) -> Self {
         let (k, v) = (path.length(), &path.vertices);
-        let nowhere = VertexMis { connect: D::ZERO, below: D::ZERO, distance_factor: 0.0 };
+        let nowhere = VertexMis::<D, L> {
+            connect: D::ZERO,
+            below: L::each(|_| D::ZERO),
+            distance_factor: 0.0,
+            shares: L::prior(&plan.lanes),
+        };
         let mut light = vec![nowhere; k + 1];
         let hit = match v[0].kind {
-            VertexKind::Volume => path.edges[0].t_camera,
+            VertexKind::Volume => path.edges[0].t_camera.mean(&L::prior(&plan.lanes)),
             _ => f64::from(u8::from(path.hittable)),
         };
         let mut edge_mis =
@@ -86,7 +93,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
                 distance_squared: distance_squared(e),
                 cos_in: v[i].cos_light,
                 forward: e.t_light,
-                backward: if edge_mis.start == EdgeStart::Volume { 1.0 } else { e.t_camera },
+                backward: if edge_mis.start == EdgeStart::Volume { L::ONE } else { e.t_camera },
                 pass_probability: e.pass_probability,
                 ends_in_medium: in_medium(&v[i]),
             };
@@ -102,7 +109,7 @@ impl<'a, D: Densities> Recursion<'a, D> {
         }
         let mut camera = vec![nowhere; k + 1];
         let mut at_light = nowhere;
-        let mut edge_mis = EdgeMis::at_camera(v[k].rho_camera);
+        let mut edge_mis = EdgeMis::at_camera(plan, v[k].rho_camera);
         for i in (0..k).rev() {
             let e = &path.edges[i];
             let edge = Edge {
@@ -131,22 +138,84 @@ impl<'a, D: Densities> Recursion<'a, D> {
         Self { plan, path, light, camera, at_light }
     }
 
-    /// The end of the light sub-path at vertex `i`, with the edge that the camera's side would arrive by.
-    fn light_end(&self, i: usize) -> End<D> {
+    /// The end of the light sub-path at vertex `i`, with the edge that the camera's side would arrive by,
+    /// from where its lanes have `shares`.
+    fn light_end(&self, i: usize, shares: &L::Shares) -> D {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i]);
-        let opposite =
-            self.plan.distance_factor(Walk::Camera, in_medium(vertex), edge.pass_probability, edge.t_camera);
-        self.light[i].end(self.plan, Walk::Light, kind(vertex), opposite, vertex.rho_camera)
+        let other = self.plan.other_walk(
+            Walk::Camera,
+            in_medium(vertex),
+            edge.pass_probability,
+            edge.t_camera,
+            shares,
+        );
+        let density = self.path.vertices[i + 1].rho_camera * vertex.cos_camera / distance_squared(edge);
+        self.light[i].end(self.plan, Walk::Light, kind(vertex), &other, vertex.rho_camera, density)
     }
 
-    /// The end of the camera sub-path at vertex `i`, with the edge that the light's side would arrive by.
-    fn camera_end(&self, i: usize) -> End<D> {
+    /// The end of the camera sub-path at vertex `i`, with the edge that the light's side would arrive by,
+    /// from where its lanes have `shares`; its density times `factor`.
+    fn camera_end(&self, i: usize, shares: &L::Shares, factor: f64) -> D {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i - 1]);
-        let opposite =
-            self.plan.distance_factor(Walk::Light, in_medium(vertex), edge.pass_probability, edge.t_light);
-        self.camera[i].end(self.plan, Walk::Camera, kind(vertex), opposite, vertex.rho_light)
+        let other =
+            self.plan.other_walk(Walk::Light, in_medium(vertex), edge.pass_probability, edge.t_light, shares);
+        let density =
+            factor * self.path.vertices[i - 1].rho_light * vertex.cos_light / distance_squared(edge);
+        self.camera[i].end(self.plan, Walk::Camera, kind(vertex), &other, vertex.rho_light, density)
     }
 
+    /// `C_0`, given that vertex 1 scatters towards it.
+    fn hit_density(&self) -> f64 {
+        let (edge, v) = (&self.path.edges[0], &self.path.vertices);
+        let t = edge.t_camera.mean(&self.camera[1].shares);
+        v[1].rho_camera * v[0].cos_camera / distance_squared(edge) * t
+    }
+
+    fn merge(&self, i: usize, factor: impl Fn(&VolumeMerges) -> f64) -> Weight<D> {
+        let vertex = &self.path.vertices[i];
+        let (light, camera) = (&self.light[i], &self.camera[i]);
+        let (factor, merges) = if let VertexKind::Medium(medium) = vertex.kind {
+            let [light, camera] =
+                [light.distance_factor, camera.distance_factor].map(DistanceDensity::at_stop);
+            let factors = self.plan.volume_factors(medium, light, camera, vertex.sin_theta, vertex.scale);
+            (factor(&factors), factors.sum())
+        } else {
+            let factor = self.plan.surface_factor(vertex.scale);
+            (factor, D::of(Technique::Surf, factor))
+        };
+        let before_light = light.before(self.plan, vertex.rho_camera, &camera.shares);
+        let before_camera = camera.before(self.plan, vertex.rho_light, &light.shares);
+        Weight::of_merge(factor, merges, before_light, before_camera)
+    }
+
+    pub(crate) fn weight(&self, way: Way) -> Weight<D> {
+        let Self { plan, path, .. } = *self;
+        let k = path.length();
+        let rho_light = path.vertices[0].rho_light;
+        let start = L::prior(&plan.lanes);
+        match way {
+            Way::Hit if k == 1 => Weight::alone(Technique::Hit),
+            Way::Hit => plan.hit_weight(&self.at_light, path.pdf_incident, path.pdf_position, rho_light),
+            Way::Nee => plan.nee_weight(
+                path.pdf_incident,
+                if path.hittable { self.hit_density() } else { 0.0 },
+                self.camera_end(1, &start, path.pdf_position / path.pdf_incident),
+            ),
+            Way::Connect(s) => plan.connect_weight(
+                self.light_end(s - 1, &self.camera[s].shares),
+                self.camera_end(s, &self.light[s - 1].shares, 1.0),
+            ),
+            Way::LightTracing => plan.light_tracing_weight(self.light_end(k - 1, &start)),
+            Way::Surf(i) => self.merge(i, |_| 0.0),
+            Way::Pp3d(i) => self.merge(i, |v| v.pp3d),
+            Way::Pb2d(i) => self.merge(i, |v| v.pb2d),
+            Way::Bp2d(i) => self.merge(i, |v| v.bp2d),
+            Way::Bb1d(i) => self.merge(i, |v| v.bb1d),
+        }
+    }
+}
+
+impl<D: Densities> Recursion<'_, D> {
     /// `L_i`, given that vertex `i − 1` scatters towards it.
     pub(crate) fn light_density(&self, i: usize) -> f64 {
         let (edge, v) = (&self.path.edges[i - 1], &self.path.vertices);
@@ -157,50 +226,5 @@ impl<'a, D: Densities> Recursion<'a, D> {
     pub(crate) fn camera_density(&self, i: usize) -> f64 {
         let (edge, v) = (&self.path.edges[i], &self.path.vertices);
         v[i + 1].rho_camera * v[i].cos_camera / distance_squared(edge) * edge.t_camera
-    }
-
-    fn merge(&self, i: usize, factor: impl Fn(&VolumeMerges) -> f64) -> Weight<D> {
-        let vertex = &self.path.vertices[i];
-        let (light, camera) = (&self.light[i], &self.camera[i]);
-        let (factor, merges) = if let VertexKind::Medium(medium) = vertex.kind {
-            let (c_light, c_camera) = (light.distance_factor, camera.distance_factor);
-            let factors = self.plan.volume_factors(medium, c_light, c_camera, vertex.sin_theta, vertex.scale);
-            (factor(&factors), factors.sum())
-        } else {
-            let factor = self.plan.surface_factor(vertex.scale);
-            (factor, D::of(Technique::Surf, factor))
-        };
-        let before_light = light.before(self.plan, vertex.rho_camera);
-        let before_camera = camera.before(self.plan, vertex.rho_light);
-        Weight::of_merge(factor, merges, before_light, before_camera)
-    }
-
-    pub(crate) fn weight(&self, way: Way) -> Weight<D> {
-        let Self { plan, path, .. } = *self;
-        let k = path.length();
-        let rho_light = path.vertices[0].rho_light;
-        match way {
-            Way::Hit if k == 1 => Weight::alone(Technique::Hit),
-            Way::Hit => plan.hit_weight(&self.at_light, path.pdf_incident, path.pdf_position, rho_light),
-            Way::Nee => plan.nee_weight(
-                path.pdf_incident,
-                path.pdf_position,
-                if path.hittable { self.camera_density(0) } else { 0.0 },
-                self.camera_end(1),
-                self.light_density(1),
-            ),
-            Way::Connect(s) => plan.connect_weight(
-                self.light_end(s - 1),
-                self.camera_density(s - 1),
-                self.camera_end(s),
-                self.light_density(s),
-            ),
-            Way::LightTracing => plan.light_tracing_weight(self.light_end(k - 1), self.camera_density(k - 1)),
-            Way::Surf(i) => self.merge(i, |_| 0.0),
-            Way::Pp3d(i) => self.merge(i, |v| v.pp3d),
-            Way::Pb2d(i) => self.merge(i, |v| v.pb2d),
-            Way::Bp2d(i) => self.merge(i, |v| v.bp2d),
-            Way::Bb1d(i) => self.merge(i, |v| v.bb1d),
-        }
     }
 }

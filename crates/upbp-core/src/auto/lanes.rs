@@ -1,0 +1,34 @@
+//! The choice of lanes: whether sub-paths draw all their distances by one channel (`docs/theory.md`, section
+//! 6.13).
+
+use upbp_estimators::PreparedScene;
+use upbp_estimators::mis::Heuristic;
+use upbp_estimators::scene::Scene;
+use upbp_media::lane_probabilities;
+
+use crate::error::{RenderError, SettingsError};
+use crate::plan::Plan;
+use crate::settings::Settings;
+
+/// The probability of each lane; `None` without lanes.
+pub(super) fn choose<S: Scene>(scene: &PreparedScene<'_, S>, settings: &Settings) -> Option<[f64; 3]> {
+    if settings.heuristic != Heuristic::Balance {
+        return None;
+    }
+    lane_probabilities(scene.scene.media())
+}
+
+/// The lanes of a plan that is given.
+///
+/// # Errors
+/// If the settings rule them out.
+pub(super) fn of_plan(plan: &Plan, settings: &Settings) -> Result<Option<[f64; 3]>, RenderError> {
+    if plan.lanes.is_some() && settings.heuristic != Heuristic::Balance {
+        return Err(RenderError::Settings(SettingsError {
+            name: "heuristic",
+            expected: "Balance, since the plan has lanes",
+            found: format!("{:?}", settings.heuristic),
+        }));
+    }
+    Ok(plan.lanes)
+}

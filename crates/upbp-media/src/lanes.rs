@@ -1,0 +1,362 @@
+//! Lanes: the distributions that a walk may draw all its distances from.
+//!
+//! With one lane (`f64`) every segment draws its distance from the medium's own distribution, in a chromatic
+//! medium from a mixture of the channels, anew on each segment. With three lanes (`[f64; 3]`, a lane per
+//! channel) a walk draws one lane at its start, its hero, and all its distances from it. What it meets is
+//! divided by the density that a walk with any hero has, so no channel's throughput exceeds one over the
+//! probability of its lane, however long the walk.
+//!
+//! Nobody needs to know the hero after the fact: the density of a path is a mixture over heroes of products,
+//! and each factor of it is a mean over the lanes with [shares](Lanes::Shares), the probabilities of the
+//! heroes given what the walk has done so far.
+//!
+//! Source: `docs/theory.md`, sections 1.4 and 6.13. Oracle:
+//! `tests::means_by_shares_are_the_mixture_of_products`.
+
+use std::fmt::Debug;
+use std::ops::{Add, Mul};
+
+use crate::{Medium, RaySegment, SegmentDensity, Spectrum};
+
+/// A density for each lane: `f64` for one lane, `[f64; 3]` for a lane per channel.
+pub trait Lanes: Copy + Debug + PartialEq + Send + Sync + 'static {
+    /// A value for each lane.
+    type Each<T: Copy + Debug + Send + Sync>: Copy + Debug + Send + Sync;
+    /// The probability of each lane to be the hero of a walk, given what the walk has done; nothing if there
+    /// is one lane.
+    type Shares: Copy + Debug + PartialEq + Send + Sync;
+    /// The lane that a walk draws its distances from.
+    type Hero: Copy + Debug + Send + Sync;
+
+    /// The number of lanes.
+    const COUNT: usize;
+    /// Zero in all lanes.
+    const ZERO: Self;
+    /// One in all lanes.
+    const ONE: Self;
+
+    /// The same value in all lanes.
+    #[must_use]
+    fn splat(value: f64) -> Self;
+
+    /// The product, lane by lane.
+    #[must_use]
+    fn times(self, other: Self) -> Self;
+
+    /// Whether the value of any lane is positive.
+    #[must_use]
+    fn is_positive(self) -> bool;
+
+    /// The value of a lane.
+    #[must_use]
+    fn get(self, lane: usize) -> f64;
+
+    /// The value of the hero's lane.
+    #[must_use]
+    fn of_hero(self, hero: Self::Hero) -> f64;
+
+    /// Computes a value for each lane, from the index of the lane.
+    fn each<T: Copy + Debug + Send + Sync>(value: impl FnMut(usize) -> T) -> Self::Each<T>;
+
+    /// The value of a lane.
+    fn pick<T: Copy + Debug + Send + Sync>(each: &Self::Each<T>, lane: usize) -> T;
+
+    /// The mean of values with shares. Lanes without a share do not count, whatever their value.
+    fn blend<T>(zero: T, each: &Self::Each<T>, shares: &Self::Shares) -> T
+    where
+        T: Copy + Debug + Send + Sync + Add<Output = T> + Mul<f64, Output = T>;
+
+    /// The mean over the lanes.
+    #[must_use]
+    fn mean(self, shares: &Self::Shares) -> f64;
+
+    /// The shares after a step that has the density `self` in each lane, and `mean` in the
+    /// [mean](Self::mean), which is positive (Bayes).
+    #[must_use]
+    fn given(self, shares: &Self::Shares, mean: f64) -> Self::Shares;
+
+    /// The shares of a walk that starts, from the probabilities of the lanes.
+    #[must_use]
+    fn prior(probabilities: &[f64; 3]) -> Self::Shares;
+
+    /// Draws the hero of a walk with these probabilities, which sum to one; asks for a uniform number in
+    /// `[0, 1)` if there is a choice.
+    fn draw(probabilities: &[f64; 3], uniform: impl FnOnce() -> f32) -> Self::Hero;
+
+    /// The densities of a segment in `medium`.
+    fn segment<M: Medium>(medium: &M, segment: &RaySegment) -> SegmentDensity<Self>;
+
+    /// Draws the distance at which a walk with this hero stops, as [`Medium::sample_distance`].
+    fn sample_distance<M: Medium>(
+        medium: &M,
+        segment: &RaySegment,
+        hero: Self::Hero,
+        u: [f32; 2],
+    ) -> Option<f32>;
+}
+
+impl Lanes for f64 {
+    type Each<T: Copy + Debug + Send + Sync> = T;
+    type Shares = ();
+    type Hero = ();
+
+    const COUNT: usize = 1;
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+
+    #[inline]
+    fn splat(value: f64) -> Self {
+        value
+    }
+
+    #[inline]
+    fn times(self, other: Self) -> Self {
+        self * other
+    }
+
+    #[inline]
+    fn is_positive(self) -> bool {
+        self > 0.0
+    }
+
+    #[inline]
+    fn get(self, _: usize) -> f64 {
+        self
+    }
+
+    #[inline]
+    fn of_hero(self, (): ()) -> f64 {
+        self
+    }
+
+    #[inline]
+    fn each<T: Copy + Debug + Send + Sync>(mut value: impl FnMut(usize) -> T) -> T {
+        value(0)
+    }
+
+    #[inline]
+    fn pick<T: Copy + Debug + Send + Sync>(each: &T, _: usize) -> T {
+        *each
+    }
+
+    #[inline]
+    fn blend<T>(_: T, each: &T, (): &()) -> T
+    where
+        T: Copy + Debug + Send + Sync + Add<Output = T> + Mul<f64, Output = T>,
+    {
+        *each
+    }
+
+    #[inline]
+    fn mean(self, (): &()) -> f64 {
+        self
+    }
+
+    #[inline]
+    fn given(self, (): &(), _: f64) {}
+
+    #[inline]
+    fn prior(_: &[f64; 3]) {}
+
+    #[inline]
+    fn draw(_: &[f64; 3], _: impl FnOnce() -> f32) {}
+
+    #[inline]
+    fn segment<M: Medium>(medium: &M, segment: &RaySegment) -> SegmentDensity {
+        medium.segment(segment)
+    }
+
+    #[inline]
+    fn sample_distance<M: Medium>(medium: &M, segment: &RaySegment, (): (), u: [f32; 2]) -> Option<f32> {
+        medium.sample_distance(segment, u[0], u[1])
+    }
+}
+
+impl Lanes for [f64; 3] {
+    type Each<T: Copy + Debug + Send + Sync> = [T; 3];
+    type Shares = [f64; 3];
+    type Hero = usize;
+
+    const COUNT: usize = 3;
+    const ZERO: Self = [0.0; 3];
+    const ONE: Self = [1.0; 3];
+
+    #[inline]
+    fn splat(value: f64) -> Self {
+        [value; 3]
+    }
+
+    #[inline]
+    fn times(self, other: Self) -> Self {
+        std::array::from_fn(|lane| self[lane] * other[lane])
+    }
+
+    #[inline]
+    fn is_positive(self) -> bool {
+        self.iter().any(|value| *value > 0.0)
+    }
+
+    #[inline]
+    fn get(self, lane: usize) -> f64 {
+        self[lane]
+    }
+
+    #[inline]
+    fn of_hero(self, hero: usize) -> f64 {
+        self[hero]
+    }
+
+    #[inline]
+    fn each<T: Copy + Debug + Send + Sync>(value: impl FnMut(usize) -> T) -> [T; 3] {
+        std::array::from_fn(value)
+    }
+
+    #[inline]
+    fn pick<T: Copy + Debug + Send + Sync>(each: &[T; 3], lane: usize) -> T {
+        each[lane]
+    }
+
+    #[inline]
+    fn blend<T>(zero: T, each: &[T; 3], shares: &[f64; 3]) -> T
+    where
+        T: Copy + Debug + Send + Sync + Add<Output = T> + Mul<f64, Output = T>,
+    {
+        let with_share = each.iter().zip(shares).filter(|(_, share)| **share > 0.0);
+        with_share.fold(zero, |sum, (value, share)| sum + *value * *share)
+    }
+
+    #[inline]
+    fn mean(self, shares: &[f64; 3]) -> f64 {
+        self[0] * shares[0] + self[1] * shares[1] + self[2] * shares[2]
+    }
+
+    #[inline]
+    fn given(self, shares: &[f64; 3], mean: f64) -> [f64; 3] {
+        std::array::from_fn(|lane| shares[lane] * self[lane] / mean)
+    }
+
+    #[inline]
+    fn prior(probabilities: &[f64; 3]) -> [f64; 3] {
+        *probabilities
+    }
+
+    #[inline]
+    fn draw(probabilities: &[f64; 3], uniform: impl FnOnce() -> f32) -> usize {
+        let mut rest = f64::from(uniform());
+        for (lane, probability) in probabilities.iter().enumerate() {
+            if rest < *probability {
+                return lane;
+            }
+            rest -= probability;
+        }
+        // Rounding: the last lane that can be drawn.
+        probabilities.iter().rposition(|probability| *probability > 0.0).unwrap_or(0)
+    }
+
+    #[inline]
+    fn segment<M: Medium>(medium: &M, segment: &RaySegment) -> SegmentDensity<Self> {
+        medium.segment_lanes(segment)
+    }
+
+    #[inline]
+    fn sample_distance<M: Medium>(medium: &M, segment: &RaySegment, hero: usize, u: [f32; 2]) -> Option<f32> {
+        medium.sample_lane(segment, hero, u)
+    }
+}
+
+/// Media whose lanes differ by less than this factor need no lanes: the second moment of a mixture that is
+/// drawn anew on each segment then grows by less than 2 % per collision.
+const LEAST_RATIO: f32 = 1.25;
+
+/// The probability of each lane to be the hero of a walk through `media`: equal shares for all lanes that
+/// differ in any of them, so that no channel's throughput exceeds the number of lanes. `None` if lanes differ
+/// nowhere by more than a [small factor](LEAST_RATIO).
+#[must_use]
+pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
+    let lanes: Vec<_> = media.iter().filter_map(Medium::lane_extinctions).collect();
+    let largest = |medium: &Spectrum| (0..3).map(|lane| medium[lane]).fold(0.0, f32::max);
+    let least = |medium: &Spectrum| (0..3).map(|lane| medium[lane]).fold(f32::INFINITY, f32::min);
+    if lanes.iter().all(|medium| largest(medium) < LEAST_RATIO * least(medium)) {
+        return None;
+    }
+    let is_new =
+        |lane: usize| (0..lane).all(|earlier| lanes.iter().any(|medium| medium[lane] != medium[earlier]));
+    let drawn = [0, 1, 2].map(is_new);
+    let count = drawn.iter().filter(|is_drawn| **is_drawn).count();
+    (count > 1).then(|| drawn.map(|is_drawn| if is_drawn { 1.0 / count as f64 } else { 0.0 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{EdgeDensity, Homogeneous, PhaseFunction};
+    use glam::Vec3;
+
+    fn medium(sigma_a: [f32; 3], sigma_s: [f32; 3]) -> Homogeneous {
+        Homogeneous::new(sigma_a.into(), sigma_s.into(), PhaseFunction::Isotropic).expect("in range")
+    }
+
+    fn segment(length: f32) -> RaySegment {
+        RaySegment { origin: Vec3::ZERO, direction: Vec3::X, start: 0.0, end: length }
+    }
+
+    /// Factors of a path whose edges stop or pass: means by shares, and the mixture of the products.
+    #[test]
+    fn means_by_shares_are_the_mixture_of_products() {
+        let media = [medium([0.0; 3], [0.5, 4.0, 15.0]), medium([2.0, 0.0, 0.0], [0.0, 1.0, 0.3])];
+        let probabilities = lane_probabilities(&media).expect("lanes differ");
+        let mut shares = <[f64; 3]>::prior(&probabilities);
+        let (mut by_shares, mut products) = (1.0, [1.0; 3]);
+        for (i, length) in [0.1, 0.7, 0.02, 1.5, 0.3, 0.3].into_iter().enumerate() {
+            let density = media[i % 2].segment_lanes(&segment(length));
+            let step = EdgeDensity::EMPTY.with(&density).forward(i % 3 > 0);
+            let mean = step.mean(&shares);
+            shares = step.given(&shares, mean);
+            by_shares *= mean;
+            products = products.times(step);
+        }
+        let mixture = products.mean(&probabilities);
+        assert!((by_shares / mixture - 1.0).abs() < 1e-14, "{by_shares}, {mixture}");
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-14, "{shares:?}");
+    }
+
+    /// A lane passes at least what its channel passes, and stops at least where it scatters: so no throughput
+    /// exceeds one over the probability of the lane.
+    #[test]
+    fn every_channel_has_a_lane_that_bounds_its_throughput() {
+        for (sigma_a, sigma_s) in [
+            ([0.0; 3], [0.5, 4.0, 15.0]),
+            ([0.0, 0.0, 3.0], [1.0, 2.0, 0.0]),
+            ([0.1, 0.1, 0.0], [1.0, 2.0, 0.0]),
+            ([5.0, 0.0, 0.5], [0.0, 2.0, 0.0]),
+        ] {
+            let medium = medium(sigma_a, sigma_s);
+            for length in [0.0, 0.01, 0.3, 4.0] {
+                let density = medium.segment_lanes(&segment(length));
+                for (lane, sigma_s) in sigma_s.into_iter().enumerate() {
+                    let transmittance = f64::from(density.transmittance[lane]);
+                    let scatters = f64::from(sigma_s) * transmittance;
+                    assert!(density.pass_probability[lane] >= transmittance * (1.0 - 1e-6));
+                    assert!(density.stop_at_end[lane] >= scatters * (1.0 - 1e-6));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_that_are_equal_share_one() {
+        let of = |media: &[Homogeneous]| lane_probabilities(media);
+        let third = 1.0 / 3.0;
+        assert_eq!(of(&[medium([0.0; 3], [2.0; 3])]), None);
+        assert_eq!(of(&[medium([1.0, 2.0, 3.0], [0.0; 3])]), None, "nothing scatters");
+        assert_eq!(of(&[medium([0.0; 3], [1.0, 1.1, 1.2])]), None, "hardly any difference");
+        assert_eq!(of(&[medium([0.0; 3], [1.0, 4.0, 15.0])]), Some([third; 3]));
+        assert_eq!(of(&[medium([0.0; 3], [1.0, 4.0, 1.0])]), Some([0.5, 0.5, 0.0]));
+        // What only absorbs passes by the lane that gets farthest, if that is far enough.
+        assert_eq!(of(&[medium([0.0, 0.0, 3.0], [1.0, 4.0, 0.0])]), Some([0.5, 0.5, 0.0]));
+        assert_eq!(of(&[medium([0.0, 0.0, 0.5], [1.0, 4.0, 0.0])]), Some([third; 3]));
+        // Equal in one medium, not in another.
+        let media = [medium([0.0; 3], [1.0, 4.0, 1.0]), medium([0.0; 3], [1.0, 4.0, 2.0])];
+        assert_eq!(of(&media), Some([third; 3]));
+    }
+}
