@@ -264,13 +264,13 @@ impl Lanes for [f64; 3] {
     }
 }
 
-/// Media whose lanes differ by less than this factor need no lanes: the second moment of a mixture that is
-/// drawn anew on each segment then grows by less than 2 % per collision.
+/// Ratio of the lanes of a medium from which on they are worth their time: with less the second moment of the
+/// mixture that is drawn anew on each segment hardly grows. Not tuned.
 const LEAST_RATIO: f32 = 1.25;
 
 /// The probability of each lane to be the hero of a walk through `media`: equal shares for all lanes that
 /// differ in any of them, so that no channel's throughput exceeds the number of lanes. `None` if lanes differ
-/// nowhere by more than a [small factor](LEAST_RATIO).
+/// nowhere by more than a small factor.
 #[must_use]
 pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
     let lanes: Vec<_> = media.iter().filter_map(Medium::lane_extinctions).collect();
