@@ -461,8 +461,8 @@ fn on_photons(cases: &mut Vec<Case>) {
             for (tau, radius) in
                 [(1.0, None), (1.0, Some(1e-7)), (1.0, Some(1.0)), (1e2, None), (1e2, Some(1e-7))]
             {
-                // Too little of the near lamp is seen there: the far one keeps the light sub-paths, and hardly
-                // any arrives.
+                // Too little of the near lamp is seen there: the far one keeps the light sub-paths, and
+                // hardly any arrives.
                 if matches!(light, Light::Uneven(_)) && layout == Layout::Room {
                     continue;
                 }
