@@ -100,7 +100,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             next_event: power.clone(),
             ..EmitterChoice::default()
         });
-        let mut tree = EmitterTree::new(scene.emitters(), &powers, &bounds);
+        let mut tree = tree_of(scene, &power, &bounds);
         if let Some(tree) = &mut tree {
             tree.set_shares(&power);
         }
@@ -326,6 +326,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         }
         self.volumes = kept;
         self.power = self.power.without(|id| out.iter().any(|&(_, other)| other == id));
+        // What is left to hits must not be found by next events: they would not be weighed beside each other.
+        self.tree = tree_of(self.scene, &self.power, &self.bounds);
         self.choose_emitters_by_power();
     }
 
@@ -392,6 +394,16 @@ fn from_infinity<S: Scene, L: Lanes>(scene: &S, bounds: &BoundingSphere) -> Segm
         RaySegment { origin: bounds.centre, direction: glam::Vec3::Z, start: 0.0, end: f32::INFINITY };
     let medium = scene.outside().map(|medium| &scene.media()[medium.0 as usize]);
     medium.map_or(SegmentDensity::VACUUM, |medium| L::segment(medium, &everything))
+}
+
+/// The tree over the emitters that can be chosen by `power`.
+fn tree_of<S: Scene>(scene: &S, power: &Selection, bounds: &BoundingSphere) -> Option<EmitterTree> {
+    let emitters = scene.emitters();
+    let is_chosen = |i: usize| power.probability(EmitterId(i as u32)) > 0.0;
+    let powers: Vec<_> = (0..emitters.len())
+        .map(|i| if is_chosen(i) { f64::from(emitters[i].power(bounds)) } else { 0.0 })
+        .collect();
+    EmitterTree::new(emitters, &powers, bounds)
 }
 
 /// Media whose mean free path is a smaller part of the scene's radius are dense: of their vertices next to a

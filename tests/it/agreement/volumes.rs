@@ -1,9 +1,11 @@
 //! Bodies that emit, of all shapes and in all surroundings: sets of techniques that begin at them agree with
 //! hits alone.
 
-use upbp_estimators::PathLengths;
-use upbp_estimators::scene::Scene;
+use glam::Vec3;
+use upbp_estimators::scene::{Emitter, EmitterId, EmitterKind, Scene};
+use upbp_estimators::{EmitterSample, PathLengths, PreparedScene, Stream, StreamKind};
 use upbp_scene::ReadyScene;
+use upbp_testing::closed_form::scene::ClosedForm;
 
 use super::subsets::{SIZE, agree_in};
 
@@ -99,5 +101,29 @@ fn surroundings() {
     ] {
         println!("{name}");
         agree_in(&scene(flame, &bodies, camera), LENGTHS, &sets);
+    }
+}
+
+/// Hits have the weight of one there: next events would bring the light once more.
+#[test]
+fn volumes_that_are_left_to_hits_are_chosen_by_no_receiver() {
+    let scene = ClosedForm::glowing(Vec3::new(0.2, 0.3, 3.0), 16);
+    let emitters = 0..scene.emitters().len() as u32;
+    let is_volume = |id: u32| matches!(scene.emitters()[id as usize].kind(), EmitterKind::Volume(_));
+    let mut world = PreparedScene::new(&scene).expect("the scene is in order");
+    world.leave_out_volumes(|_| true);
+    let mut stream = Stream::new(7, 0, StreamKind::Light, 0);
+    let mut place = || Vec3::from([0; 3].map(|_| 3.0 * stream.uniform() - 1.5));
+    let sample = |receiver| (receiver, EmitterSample { emitter: EmitterId(0), light: 1.0, others: 0.0 });
+    let samples: Vec<_> = (0..1000).map(|_| sample(place())).collect();
+    world.choose_by_receiver(&samples);
+    for _ in 0..100 {
+        let receiver = place();
+        let probabilities = emitters.clone().map(|id| world.next_event_probability(receiver, EmitterId(id)));
+        let probabilities: Vec<_> = probabilities.collect();
+        assert!((probabilities.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{probabilities:?}");
+        for (id, probability) in emitters.clone().zip(&probabilities) {
+            assert!(!(is_volume(id) && *probability != 0.0), "{probabilities:?}");
+        }
     }
 }

@@ -9,7 +9,8 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::{DVec3, Vec3};
 use upbp_accel::{Shape, ShapeVolume, Sphere};
 use upbp_estimators::scene::{
-    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
+    BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
+    HitDensities, Incident,
 };
 use upbp_media::{BodyId, Homogeneous, Medium, RaySegment};
 
@@ -31,6 +32,7 @@ const LEAST_DEPTH: f64 = 3e-5;
 pub struct VolumeLight {
     body: BodyId,
     inside: ShapeVolume,
+    bounds: EmitterBounds,
     medium: Homogeneous,
     /// Length of a ray inside from which light gets out, scene units.
     depth: f64,
@@ -52,7 +54,9 @@ impl VolumeLight {
         let power = (f64::from(4.0 * PI) * inside.volume() * source) as f32;
         let numbers = [inside.pdf() as f32, (1.0 / depth) as f32, power];
         let is_fit = numbers.iter().all(|x| x.is_normal()) && depth > LEAST_DEPTH * f64::from(scene_radius);
-        Some(Self { body, inside, medium, depth, power: if is_fit { power } else { 0.0 } })
+        let (min, max) = shape.aabb();
+        let bounds = EmitterBounds::all_around(min, max);
+        Some(Self { body, inside, bounds, medium, depth, power: if is_fit { power } else { 0.0 } })
     }
 
     fn pdf_position(&self) -> f32 {
@@ -124,6 +128,10 @@ impl Emitter for VolumeLight {
 
     fn power(&self, _: &BoundingSphere) -> f32 {
         self.power
+    }
+
+    fn bounds(&self, _: &BoundingSphere) -> Option<EmitterBounds> {
+        Some(self.bounds)
     }
 
     fn sample_emission(
