@@ -13,7 +13,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::finite::direction_and_distance;
+use super::finite::{direction_and_distance, incident};
 use crate::sampling;
 
 /// Nearer to the centre of a sphere than this many radii (squared), the cone of directions is too close to a
@@ -129,15 +129,7 @@ impl Emitter for AreaLight {
         let point = self.sample_point(receiver, u)?;
         let (towards_light, distance) = direction_and_distance(receiver, point.position)?;
         let seen = self.hit(bounds, &point, -towards_light, receiver)?;
-        (seen.pdf_incident > 0.0).then_some(Incident {
-            point,
-            towards_light,
-            distance,
-            radiance: seen.radiance,
-            pdf: seen.pdf_incident,
-            pdf_position: seen.pdf_position,
-            pdf_direction: seen.pdf_direction,
-        })
+        incident(point, towards_light, distance, &seen)
     }
 
     fn hit(

@@ -14,7 +14,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::{BodyId, Homogeneous, Medium, RaySegment};
 
-use super::finite::direction_and_distance;
+use super::finite::{direction_and_distance, incident};
 use crate::sampling;
 
 /// Nearer to the centre of a sphere than this many radii (squared), directions are chosen from all.
@@ -155,15 +155,7 @@ impl Emitter for VolumeLight {
         let (towards_light, distance) = direction_and_distance(receiver, position)?;
         let point = EmitterPoint { position, normal: -towards_light };
         let seen = self.hit(bounds, &point, -towards_light, receiver)?;
-        (seen.pdf_incident > 0.0).then_some(Incident {
-            point,
-            towards_light,
-            distance,
-            radiance: seen.radiance,
-            pdf: seen.pdf_incident,
-            pdf_position: seen.pdf_position,
-            pdf_direction: seen.pdf_direction,
-        })
+        incident(point, towards_light, distance, &seen)
     }
 
     fn hit(
