@@ -37,6 +37,7 @@ pub(crate) trait Wide: Copy {
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
     fn abs(self, a: Self::F) -> Self::F;
     fn sqrt(self, a: Self::F) -> Self::F;
     /// `a`, negated where the sign bit of `by` is set.
@@ -165,6 +166,11 @@ impl Wide for Plain {
     }
 
     #[inline(always)]
+    fn div(self, a: Self::F, b: Self::F) -> Self::F {
+        each(|i| a[i] / b[i])
+    }
+
+    #[inline(always)]
     fn abs(self, a: Self::F) -> Self::F {
         each(|i| a[i].abs())
     }
@@ -262,6 +268,11 @@ mod avx2 {
         }
 
         #[inline(always)]
+        fn div(self, a: f32x8, b: f32x8) -> f32x8 {
+            self.div_f32x8(a, b)
+        }
+
+        #[inline(always)]
         fn abs(self, a: f32x8) -> f32x8 {
             self.abs_f32x8(a)
         }
@@ -321,6 +332,7 @@ mod tests {
                     wide.add(a, b),
                     wide.sub(a, b),
                     wide.mul(a, b),
+                    wide.div(a, b),
                     wide.abs(a),
                     wide.sqrt(a),
                     wide.flip_sign(a, b),

@@ -15,6 +15,7 @@ pub use geometry::{
     SurfacePoint, TriangleMesh, Visit,
 };
 pub use lookup::{
-    ClosestApproach, PARALLEL_SIN2, PointTree, Segment, SegmentTree, SplitParams, closest_approach,
+    ClosestApproach, GrowingRadius, PARALLEL_SIN2, PointTree, SearchRadius, Segment, SegmentTree,
+    SplitParams, closest_approach,
 };
 pub use ray::{Ray, offset_origin};

@@ -6,7 +6,7 @@
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
-use upbp_accel::Ray;
+use upbp_accel::{GrowingRadius, SearchRadius};
 
 /// Kernel radii at a point, relative to those of the plan: the same factor for all techniques.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -37,10 +37,6 @@ pub struct FootprintField {
 
 /// Radii differ by at most this much per distance: so that within a kernel they are about the same.
 const LIPSCHITZ: f32 = 0.1;
-/// Greatest ratio of factors within a [piece](RadiusField::pieces).
-const STEP: f32 = 1.5;
-/// Steps that make up more than the range.
-const LEVELS: usize = 12;
 
 impl RadiusField {
     /// The factor at a point.
@@ -85,25 +81,20 @@ impl RadiusField {
             && radius <= self.largest_radius()
     }
 
-    /// Parts of a ray that make it up, each with a bound of the factors on it that exceeds none of them by
-    /// more than half.
-    pub fn pieces(&self, ray: &Ray) -> impl Iterator<Item = (Ray, f32)> {
-        let (ray, field) = (*ray, *self);
-        let along = match &field {
-            Self::Uniform => None,
-            Self::Footprint(field) => Some(Along::new(field, &ray)),
-        };
-        let cuts = along.as_ref().map_or([ray.t_max; 2 * LEVELS + 1], Along::cuts);
-        let mut start = ray.t_min;
-        cuts.into_iter().filter_map(move |cut| {
-            let piece = Ray { t_min: start, t_max: cut.min(ray.t_max), ..ray };
-            // Farther from the eye than both ends is nothing in between.
-            let most = |along: &Along| along.at(piece.t_min).max(along.at(piece.t_max)) * 1.0001;
-            (piece.t_max > start).then(|| {
-                start = piece.t_max;
-                (piece, along.as_ref().map_or(1.0, most))
-            })
-        })
+    /// Radii along a ray, of searches for what a kernel reaches; `radius` (scene units) is that where the factor
+    /// is one.
+    #[must_use]
+    pub fn search_radius(&self, radius: f32) -> SearchRadius {
+        match *self {
+            Self::Uniform => SearchRadius::Constant(radius),
+            Self::Footprint(field) => SearchRadius::Growing(GrowingRadius {
+                centre: field.eye.into(),
+                offset: radius * field.offset,
+                slope: radius * field.slope,
+                least: radius * field.least,
+                most: radius * field.most,
+            }),
+        }
     }
 }
 
@@ -113,41 +104,5 @@ impl FootprintField {
 
     fn at_distance(&self, distance: f32) -> f32 {
         (self.offset + self.slope * distance).clamp(self.least, self.most)
-    }
-}
-
-/// A field along a ray.
-struct Along {
-    field: FootprintField,
-    /// Distance along the ray to the point nearest to the eye.
-    nearest: f32,
-    /// Square of the distance of that point from the eye.
-    height2: f32,
-}
-
-impl Along {
-    fn new(field: &FootprintField, ray: &Ray) -> Self {
-        let to_eye = Vec3::from(field.eye) - ray.origin;
-        let nearest = to_eye.dot(ray.direction);
-        Self { field: *field, nearest, height2: (to_eye - nearest * ray.direction).length_squared() }
-    }
-
-    fn at(&self, t: f32) -> f32 {
-        self.field.at_distance(((t - self.nearest).powi(2) + self.height2).sqrt())
-    }
-
-    /// Distances in ascending order where the factor is `least` times a power of the step, and behind all.
-    fn cuts(&self) -> [f32; 2 * LEVELS + 1] {
-        let FootprintField { offset, slope, least, most, .. } = self.field;
-        let mut cuts = [f32::INFINITY; 2 * LEVELS + 1];
-        for level in 0..LEVELS {
-            let factor = least * STEP.powi(level.cast_signed() as i32);
-            let distance = (factor.min(most) - offset) / slope;
-            let half = (distance * distance - self.height2).max(0.0).sqrt();
-            let half = if distance > 0.0 { half } else { 0.0 };
-            cuts[LEVELS - 1 - level] = self.nearest - half;
-            cuts[LEVELS + level] = self.nearest + half;
-        }
-        cuts
     }
 }

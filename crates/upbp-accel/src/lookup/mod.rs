@@ -10,6 +10,7 @@ mod approach;
 mod boxes;
 mod point_tree;
 mod query;
+mod radius;
 mod region;
 mod segment_tree;
 mod sort;
@@ -19,5 +20,6 @@ mod tree;
 
 pub use approach::{ClosestApproach, PARALLEL_SIN2, Segment, closest_approach};
 pub use point_tree::PointTree;
+pub use radius::{GrowingRadius, SearchRadius};
 pub use segment_tree::SegmentTree;
 pub use split::SplitParams;

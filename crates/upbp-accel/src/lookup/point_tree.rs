@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::boxes::Rounded;
 use super::query::Query;
+use super::radius::{GrowingAlong, RadiusAlong, SearchRadius};
 use super::region::{Ball, ThickRay};
 use super::sort::Item;
 use super::tree::PackedTree;
@@ -72,14 +73,21 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         }
     }
 
-    /// Visits every point nearer than `radius` to the ray.
+    /// Visits every point nearer to the ray than `radius`, at the foot of the perpendicular.
     ///
     /// `visit` gets the payload, the distance along the ray to the foot of the perpendicular, in `[t_min,
     /// t_max)`, and the squared distance between foot and point, in scene units.
-    pub fn around_ray(&self, ray: &Ray, radius: f32, visit: impl FnMut(P, f32, f32)) {
-        if radius > 0.0 {
+    pub fn around_ray(&self, ray: &Ray, radius: impl Into<SearchRadius>, visit: impl FnMut(P, f32, f32)) {
+        match radius.into() {
+            SearchRadius::Constant(radius) => self.within(ray, radius, visit),
+            SearchRadius::Growing(radius) => self.within(ray, GrowingAlong::new(&radius, ray), visit),
+        }
+    }
+
+    fn within(&self, ray: &Ray, radius: impl RadiusAlong, visit: impl FnMut(P, f32, f32)) {
+        if radius.largest() > 0.0 {
             let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin));
-            self.tree.search(region, AroundRay { ray: *ray, radius2: radius * radius, visit });
+            self.tree.search(region, AroundRay { ray: *ray, radius, visit });
         }
     }
 }
@@ -108,13 +116,13 @@ impl<P: Copy, V: FnMut(P, f32)> Query<Block<P>> for InBall<V> {
 }
 
 /// Points nearer than a radius to a ray; finds distances along it and squared distances from it.
-struct AroundRay<V> {
+struct AroundRay<R, V> {
     ray: Ray,
-    radius2: f32,
+    radius: R,
     visit: V,
 }
 
-impl<P: Copy, V: FnMut(P, f32, f32)> Query<Block<P>> for AroundRay<V> {
+impl<P: Copy, R: RadiusAlong, V: FnMut(P, f32, f32)> Query<Block<P>> for AroundRay<R, V> {
     type Found = [[f32; WIDTH]; 2];
 
     #[inline(always)]
@@ -122,7 +130,8 @@ impl<P: Copy, V: FnMut(P, f32, f32)> Query<Block<P>> for AroundRay<V> {
         // Differences first: dot products of positions cancel far from the origin.
         let offset = wide.sub3(wide.load3(&block.position), wide.splat3(self.ray.origin.to_array()));
         let [t, distance2] = wide.perpendicular(offset, wide.splat3(self.ray.direction.to_array()));
-        let inside = wide.less(distance2, wide.splat(self.radius2))
+        let radius = self.radius.at_each(wide, t);
+        let inside = wide.less(distance2, wide.mul(radius, radius))
             & wide.less_equal(wide.splat(self.ray.t_min), t)
             & wide.less(t, wide.splat(self.ray.t_max));
         (inside, [t, distance2].map(|lanes| wide.store(lanes)))

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::boxes::Boxes;
+use super::radius::RadiusAlong;
 use crate::lanes::Wide;
 use crate::ray::Ray;
 
@@ -17,18 +18,20 @@ pub(super) trait Region {
 }
 
 /// The points within a radius of a ray.
-pub(super) struct ThickRay {
+pub(super) struct ThickRay<R> {
     origin: [f32; 3],
     inverse: [f32; 3],
     negative: [bool; 3],
     t_min: f32,
     t_max: f32,
-    radius: f32,
+    radius: R,
+    /// Added to radii for the rounding of the tests on items.
+    rounding: f32,
 }
 
-impl ThickRay {
+impl<R: RadiusAlong> ThickRay<R> {
     /// Widened by the rounding of the tests on items, whose distances are at most `extent`.
-    pub(super) fn new(ray: &Ray, radius: f32, extent: f32) -> Self {
+    pub(super) fn new(ray: &Ray, radius: R, extent: f32) -> Self {
         let inverse = ray.direction.recip().to_array();
         Self {
             origin: ray.origin.to_array(),
@@ -36,33 +39,41 @@ impl ThickRay {
             negative: inverse.map(f32::is_sign_negative),
             t_min: ray.t_min,
             t_max: ray.t_max,
-            radius: radius * 1.001 + ROUNDING * extent,
+            radius,
+            rounding: ROUNDING * extent,
         }
     }
-}
 
-impl Region for ThickRay {
-    /// Intersects the ray with each box, widened by the radius.
+    /// Distances along the ray between which it is in each box, widened by the radii.
     ///
     /// A zero component of the direction gives infinite distances, or NaN for a plane that holds the origin.
     /// The comparisons are written so that a NaN does not constrain.
     #[inline(always)]
-    fn overlaps<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
+    fn inside<W: Wide>(&self, wide: W, boxes: &impl Boxes, radii: W::F) -> (W::F, W::F) {
         let mut near = wide.splat(self.t_min);
         let mut far = wide.splat(self.t_max);
         for axis in 0..3 {
-            let negative = self.negative[axis];
-            let (enter, exit) = if negative {
-                (boxes.max(wide, axis), boxes.min(wide, axis))
-            } else {
-                (boxes.min(wide, axis), boxes.max(wide, axis))
-            };
-            let outwards = wide.splat(if negative { self.radius } else { -self.radius });
             let (origin, inverse) = (wide.splat(self.origin[axis]), wide.splat(self.inverse[axis]));
-            let from = wide.mul(wide.add(wide.sub(enter, origin), outwards), inverse);
-            let to = wide.mul(wide.sub(wide.sub(exit, origin), outwards), inverse);
-            near = wide.greater_of(from, near);
-            far = wide.less_of(to, far);
+            let low = wide.sub(wide.sub(boxes.min(wide, axis), origin), radii);
+            let high = wide.add(wide.sub(boxes.max(wide, axis), origin), radii);
+            let (enter, exit) = if self.negative[axis] { (high, low) } else { (low, high) };
+            near = wide.greater_of(wide.mul(enter, inverse), near);
+            far = wide.less_of(wide.mul(exit, inverse), far);
+        }
+        (near, far)
+    }
+}
+
+impl<R: RadiusAlong> Region for ThickRay<R> {
+    /// Intersects the ray with each box, widened by the greatest radius, then by that where it may be inside.
+    #[inline(always)]
+    fn overlaps<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
+        let (mut near, mut far) =
+            self.inside(wide, boxes, wide.splat(self.radius.largest() * 1.001 + self.rounding));
+        if !R::IS_CONSTANT {
+            let radii = self.radius.within(wide, near, far);
+            let widened = wide.add(wide.mul(radii, wide.splat(1.001)), wide.splat(self.rounding));
+            (near, far) = self.inside(wide, boxes, widened);
         }
         wide.less_equal(near, far)
     }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::approach::{ClosestApproach, Segment, closest_approach};
 use super::boxes::Exact;
 use super::query::Query;
+use super::radius::{GrowingAlong, RadiusAlong, SearchRadius};
 use super::region::{Ball, ThickRay};
 use super::sort::Item;
 use super::split::{Piece, SplitParams, split};
@@ -105,13 +106,25 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
         Self { tree, payloads, max_distance, pieces: pieces.len(), dropped }
     }
 
-    /// Visits every segment that the ray passes within `radius`, see
+    /// Visits every segment that the ray passes within `radius`, at its closest approach to it, see
     /// [`closest_approach`](crate::closest_approach).
     ///
     /// If the ray and a segment are parallel within rounding, a hit at the very end of the ray's range may be
     /// missed.
-    pub fn around_ray(&self, ray: &Ray, radius: f32, visit: impl FnMut(P, ClosestApproach)) {
-        if radius > 0.0 {
+    pub fn around_ray(
+        &self,
+        ray: &Ray,
+        radius: impl Into<SearchRadius>,
+        visit: impl FnMut(P, ClosestApproach),
+    ) {
+        match radius.into() {
+            SearchRadius::Constant(radius) => self.within(ray, radius, visit),
+            SearchRadius::Growing(radius) => self.within(ray, GrowingAlong::new(&radius, ray), visit),
+        }
+    }
+
+    fn within(&self, ray: &Ray, radius: impl RadiusAlong, visit: impl FnMut(P, ClosestApproach)) {
+        if radius.largest() > 0.0 {
             let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin) + self.max_distance);
             self.tree.search(region, AroundRay { payloads: &self.payloads, ray: *ray, radius, visit });
         }
@@ -131,18 +144,18 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
 }
 
 /// Segments that a ray passes within a radius.
-struct AroundRay<'a, P, V> {
+struct AroundRay<'a, P, R, V> {
     payloads: &'a [P],
     ray: Ray,
-    radius: f32,
+    radius: R,
     visit: V,
 }
 
-impl<P: Copy, V: FnMut(P, ClosestApproach)> Query<Block> for AroundRay<'_, P, V> {
+impl<P: Copy, R: RadiusAlong, V: FnMut(P, ClosestApproach)> Query<Block> for AroundRay<'_, P, R, V> {
     type Found = ();
 
-    /// Compares the distance between the lines with the radius, without a division. Squares lose the last
-    /// bits, or vanish: this keeps too many lanes rather than too few.
+    /// Compares the distance between the lines with the radius, without a division if that is constant. Squares
+    /// lose the last bits, or vanish: this keeps too many lanes rather than too few.
     #[inline(always)]
     fn test<W: Wide>(&self, wide: W, block: &Block) -> (u32, ()) {
         let direction = wide.load3(&block.direction);
@@ -150,14 +163,22 @@ impl<P: Copy, V: FnMut(P, ClosestApproach)> Query<Block> for AroundRay<'_, P, V>
         let normal = wide.cross(wide.splat3(self.ray.direction.to_array()), direction);
         let volume = wide.dot(between, normal);
         let sin2 = wide.dot(normal, normal);
-        let radius2 = wide.splat(self.radius * self.radius * 1.000_01);
+        let radius = if R::IS_CONSTANT {
+            wide.splat(self.radius.largest())
+        } else {
+            let along = wide.dot(wide.cross(between, direction), normal);
+            self.radius.at_each(wide, wide.mul(along, wide.div(wide.splat(1.0), sin2)))
+        };
+        let radius2 = wide.mul(wide.mul(radius, radius), wide.splat(1.000_01));
         let limit = wide.add(wide.mul(radius2, sin2), wide.splat(f32::MIN_POSITIVE));
         (wide.less_equal(wide.mul(volume, volume), limit), ())
     }
 
     #[inline(always)]
     fn report(&mut self, block: &Block, (): &(), lane: usize) {
-        if let Some(approach) = closest_approach(&self.ray, &block.piece(lane), self.radius) {
+        if let Some(approach) = closest_approach(&self.ray, &block.piece(lane), self.radius.largest())
+            && (R::IS_CONSTANT || approach.distance < self.radius.at(approach.t_ray))
+        {
             (self.visit)(self.payloads[block.segment[lane] as usize], approach);
         }
     }

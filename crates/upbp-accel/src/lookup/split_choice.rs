@@ -60,7 +60,7 @@ impl SplitParams {
 
 /// A ray without width that counts the boxes it is tested against.
 struct CountingRay<'a> {
-    ray: ThickRay,
+    ray: ThickRay<f32>,
     effort: &'a Cell<u64>,
 }
 
@@ -95,7 +95,7 @@ impl<P> SegmentTree<P> {
     fn effort(&self, rays: &[Ray]) -> u64 {
         let effort = Cell::new(0);
         for ray in rays {
-            let region = CountingRay { ray: ThickRay::new(ray, 0.0, 0.0), effort: &effort };
+            let region = CountingRay { ray: ThickRay::new(ray, 0.0_f32, 0.0), effort: &effort };
             self.tree.search(region, CountBlocks { effort: &effort });
         }
         effort.get()

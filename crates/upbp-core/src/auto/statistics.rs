@@ -232,11 +232,9 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
             }),
             pb2d: of(Technique::Pb2d, &|| {
                 near.of(&queries.edges, medium.len(), 2.0, |edge, radius, found| {
-                    for (ray, largest) in field.pieces(edge) {
-                        medium.around_ray(&ray, largest * radius, |(), t, distance2| {
-                            found(distance2.sqrt() / field.at(ray.at(t)));
-                        });
-                    }
+                    medium.around_ray(edge, field.search_radius(radius), |(), t, distance2| {
+                        found(distance2.sqrt() / field.at(edge.at(t)));
+                    });
                 })
             }),
             bp2d: of(Technique::Bp2d, &|| {
@@ -249,11 +247,9 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
             }),
             // Tells how many beams are enough, too.
             bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, |edge, radius, found| {
-                for (ray, largest) in field.pieces(edge) {
-                    beams.around_ray(&ray, largest * radius, |(), approach| {
-                        found(approach.distance / field.at(ray.at(approach.t_ray)));
-                    });
-                }
+                beams.around_ray(edge, field.search_radius(radius), |(), approach| {
+                    found(approach.distance / field.at(edge.at(approach.t_ray)));
+                });
             }),
         }
     }

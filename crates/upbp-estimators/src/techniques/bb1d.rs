@@ -22,23 +22,22 @@ pub(crate) fn bb1d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let kernel = &plan.kernels.bb1d;
     for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Bb1d) {
         out.observer.enter_technique(Some(Technique::Bb1d));
-        for (ray, largest) in plan.radius_field.pieces(&beam) {
-            map.beam_tree.around_ray(&ray, kernel.radius() * largest, |index, approach| {
-                let t = approach.t_ray;
-                let scale = plan.radius_field.at(ray.at(t)).min(largest);
-                let kernel = kernel.scaled(scale).value(approach.distance * approach.distance);
-                let photons = &map.beams[index as usize];
-                if kernel > 0.0
-                    && photons.medium == medium
-                    && plan.lengths.contain(edge.depth + photons.depth)
-                    && let Some(light) = photons.vertex_at(context, approach.t_segment)
-                    && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), (t, scale))
-                {
-                    let kernel = kernel / approach.sin_theta;
-                    merge(context, Technique::Bb1d, &light, &vertex, kernel, out);
-                }
-            });
-        }
+        let radius = plan.radius_field.search_radius(kernel.radius());
+        map.beam_tree.around_ray(&beam, radius, |index, approach| {
+            let t = approach.t_ray;
+            let scale = plan.radius_field.at(beam.at(t));
+            let kernel = kernel.scaled(scale).value(approach.distance * approach.distance);
+            let photons = &map.beams[index as usize];
+            if kernel > 0.0
+                && photons.medium == medium
+                && plan.lengths.contain(edge.depth + photons.depth)
+                && let Some(light) = photons.vertex_at(context, approach.t_segment)
+                && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), (t, scale))
+            {
+                let kernel = kernel / approach.sin_theta;
+                merge(context, Technique::Bb1d, &light, &vertex, kernel, out);
+            }
+        });
         out.observer.enter_technique(None);
     }
 }

@@ -22,20 +22,19 @@ pub(crate) fn pb2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let kernel = &plan.kernels.pb2d;
     for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Pb2d) {
         out.observer.enter_technique(Some(Technique::Pb2d));
-        for (ray, largest) in plan.radius_field.pieces(&beam) {
-            map.medium.around_ray(&ray, kernel.radius() * largest, |index, t, distance2| {
-                let scale = plan.radius_field.at(ray.at(t)).min(largest);
-                let kernel = kernel.scaled(scale).value(distance2);
-                let photon = &map.vertices[index as usize];
-                if kernel > 0.0
-                    && matches!(photon.interaction, Interaction::Medium(other) if other == medium)
-                    && plan.lengths.contain(edge.depth + photon.depth)
-                    && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), (t, scale))
-                {
-                    merge(context, Technique::Pb2d, photon, &vertex, kernel, out);
-                }
-            });
-        }
+        let radius = plan.radius_field.search_radius(kernel.radius());
+        map.medium.around_ray(&beam, radius, |index, t, distance2| {
+            let scale = plan.radius_field.at(beam.at(t));
+            let kernel = kernel.scaled(scale).value(distance2);
+            let photon = &map.vertices[index as usize];
+            if kernel > 0.0
+                && matches!(photon.interaction, Interaction::Medium(other) if other == medium)
+                && plan.lengths.contain(edge.depth + photon.depth)
+                && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), (t, scale))
+            {
+                merge(context, Technique::Pb2d, photon, &vertex, kernel, out);
+            }
+        });
         out.observer.enter_technique(None);
     }
 }
