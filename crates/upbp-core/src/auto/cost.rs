@@ -16,9 +16,9 @@ const NS_PER_EDGE: f64 = 300.0;
 /// Part of a camera edge's time if no query beam has to know what is beyond the end of the edge.
 const SHORT: f64 = 0.85;
 /// Nanoseconds of a call of each technique.
-const NS_PER_CALL: ByTechnique<f64> = [0.0, 220.0, 330.0, 150.0, 110.0, 110.0, 220.0, 200.0, 420.0];
+const NS_PER_CALL: ByTechnique<f64> = [0.0, 220.0, 330.0, 150.0, 110.0, 110.0, 250.0, 200.0, 270.0];
 /// Nanoseconds of a sample that a call of each technique finds.
-const NS_PER_SAMPLE: ByTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 70.0, 90.0, 130.0, 200.0, 330.0];
+const NS_PER_SAMPLE: ByTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 70.0, 90.0, 150.0, 200.0, 215.0];
 /// Nanoseconds of storing a light vertex.
 const NS_PER_VERTEX: f64 = 25.0;
 /// Nanoseconds of building a light vertex into a tree.
