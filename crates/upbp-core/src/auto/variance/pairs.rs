@@ -188,7 +188,8 @@ impl<'a> View<'a> {
             std::array::from_fn(|i| shares[i] * self.relative[i]);
         // Not one after the other, and one division: the search has nothing else to wait for.
         let (camera, merges) = ((a + b) + c, ((e + f) + (g + h)) + i);
-        Share { splats: d, merges, inverse: 1.0 / ((camera + d) + merges) }
+        let inverse = 1.0 / ((camera + d) + merges);
+        Share { splats: d, merges, inverse, charge: inverse * (inverse / TRUSTED).max(1.0).sqrt() }
     }
 }
 
@@ -198,19 +199,26 @@ pub(super) struct Share {
     merges: f32,
     /// One over the sum of all.
     inverse: f32,
+    /// What second moments are multiplied by: the same, and more where the plan finds next to nothing.
+    charge: f32,
 }
+
+/// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it finds
+/// more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened to meet is
+/// mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest too.
+const TRUSTED: f32 = 4.0;
 
 impl Share {
     /// The part in the second moment of single samples of one whose square is `square`.
     #[inline]
     pub(super) fn single(&self, square: f32) -> f32 {
-        square * self.inverse
+        square * self.charge
     }
 
     /// The part of it that is due to splats and merges.
     #[inline]
     fn light(&self, square: f32) -> f32 {
-        square * self.inverse * ((self.splats + self.merges) * self.inverse)
+        square * self.charge * ((self.splats + self.merges) * self.inverse)
     }
 }
 
