@@ -174,3 +174,45 @@ fn rough_layers_are_the_same_by_all_techniques() {
         assert!((found.mean - expected.mean).abs() < 4.0 * error + slack, "{case}: {found:?} {expected:?}");
     }
 }
+
+/// Rough glass around a medium, which fills it.
+fn rough_ball(alpha: f64, scattering: f64) -> ReadyScene {
+    let text = format!(
+        "(version: 1, camera: Perspective(origin: (0, 0, 5), target: (0, 0, 0), fov_degrees: 16),
+          film: (width: 16, height: 16), media: {{ \"m\": Homogeneous(sigma_s: {scattering:?}) }},
+          materials: {{ \"frosted\": RoughDielectric(alpha: {alpha:?}, ior: 1.5) }},
+          shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"frosted\", interior: \"m\")],
+          lights: [Constant(1)])"
+    );
+    ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Facets scatter once, so that light is lost: the same share by all techniques, as the README of
+/// `upbp-scene` says.
+#[test]
+fn rough_glass_loses_what_is_said() {
+    let said = [
+        (0.01, [1.000, 0.999]),
+        (0.05, [0.993, 0.978]),
+        (0.1, [0.970, 0.931]),
+        (0.2, [0.890, 0.820]),
+        (0.3, [0.793, 0.718]),
+        (0.5, [0.614, 0.563]),
+        (0.7, [0.482, 0.456]),
+        (1.0, [0.355, 0.349]),
+    ];
+    for (alpha, shares) in said {
+        for (scattering, share) in [0.0, 2.0].into_iter().zip(shares) {
+            let scene = rough_ball(alpha, scattering);
+            for techniques in TECHNIQUES {
+                let iterations = if techniques == "all" { 24 } else { 64 };
+                let (found, _) = render(&scene, &settings(techniques), iterations);
+                let case = format!("alpha {alpha}, scattering {scattering}, {techniques}");
+                println!("{case}: {:.5} ± {:.5}", found.mean, found.error);
+                // The last digit of what is said, and what merges lose.
+                let slack = 1e-3 + if techniques == "all" { BOUNDARY_LOSS } else { 0.0 };
+                assert!((found.mean - share).abs() < 4.0 * found.error + slack, "{case}: {found:?}");
+            }
+        }
+    }
+}
