@@ -18,4 +18,4 @@ pub use lookup::{
     ClosestApproach, GrowingRadius, PARALLEL_SIN2, PointTree, SearchRadius, Segment, SegmentTree,
     SplitParams, closest_approach,
 };
-pub use ray::{Ray, offset_origin};
+pub use ray::{RAY_OFFSET, Ray, offset_origin};

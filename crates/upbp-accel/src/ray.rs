@@ -37,12 +37,12 @@ impl Ray {
     }
 }
 
-/// Offset from the surface in units of the rounding error of the largest coordinate.
+/// Distance of an [offset origin](offset_origin) from its surface, relative to the largest coordinate.
 ///
-/// A point that is rounded once is off its surface by at most `√3/2` such units, as is the sum that is
+/// A point that is rounded once is off its surface by at most `√3/2` roundings, as is the sum that is
 /// returned; 4 would do for the shapes of this crate. The rest is margin for hosts, whose own intersections
-/// may be good to fewer digits.
-const OFFSET_ULPS: f32 = 32.0;
+/// may be good to fewer digits, and for surfaces that coincide.
+pub const RAY_OFFSET: f32 = 32.0 * f32::EPSILON;
 
 /// Moves a surface point off its surface, to the side that `direction` points to.
 ///
@@ -57,7 +57,7 @@ const OFFSET_ULPS: f32 = 32.0;
 #[must_use]
 pub fn offset_origin(position: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
     // Never zero: the scene's own origin may lie on a surface.
-    let distance = (OFFSET_ULPS * f32::EPSILON * position.abs().max_element()).max(f32::MIN_POSITIVE);
+    let distance = (RAY_OFFSET * position.abs().max_element()).max(f32::MIN_POSITIVE);
     let side = if direction.dot(normal) < 0.0 { -distance } else { distance };
     position + normal * side
 }

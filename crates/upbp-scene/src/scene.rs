@@ -2,7 +2,7 @@
 //!
 //! The geometry lies behind one hierarchy, with a record of material, body and light for each shape.
 //! Boundaries of bodies are gathered in one traversal together with the surface that ends the ray, so that
-//! boundaries that coincide are all found.
+//! boundaries that coincide are all found ([`place`]).
 
 use std::path::PathBuf;
 
@@ -14,9 +14,6 @@ use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
 use crate::camera::PerspectiveCamera;
 use crate::light::Light;
 use crate::material::Material;
-
-/// Relative difference of distances below which two surfaces coincide: some roundings.
-const COINCIDENT: f32 = 4.0 * f32::EPSILON;
 
 /// The record of a shape: everything but its geometry.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +46,8 @@ pub struct ReadyScene {
     pub(crate) media: Vec<Homogeneous>,
     pub(crate) camera: PerspectiveCamera,
     pub(crate) outside: Option<MediumId>,
+    /// Largest coordinate of meshes that refract.
+    pub(crate) largest_corner: f32,
     pub(crate) bounds: BoundingSphere,
     pub(crate) origin: Vec3,
     pub(crate) hash: u64,
@@ -117,12 +116,13 @@ fn sort(crossings: &mut [Crossing]) {
 }
 
 /// Keeps the nearer of two candidates, at equal distance that of the earlier shape: the order of the
-/// traversal does not matter.
-fn keep_nearer(nearest: &mut Option<Candidate>, candidate: &Candidate) {
+/// traversal does not matter. Returns the distance of the other.
+fn keep_nearer(nearest: &mut Option<Candidate>, candidate: &Candidate) -> f32 {
     let key = |candidate: &Candidate| (candidate.t, candidate.shape, candidate.primitive);
-    if nearest.as_ref().is_none_or(|nearest| key(candidate) < key(nearest)) {
-        *nearest = Some(*candidate);
+    if nearest.as_ref().is_some_and(|nearest| key(nearest) <= key(candidate)) {
+        return candidate.t;
     }
+    nearest.replace(*candidate).map_or(f32::INFINITY, |farther| farther.t)
 }
 
 impl Scene for ReadyScene {
@@ -165,35 +165,50 @@ impl Scene for ReadyScene {
 
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Material>> {
         let (mut opaque, mut refracting) = (None, None);
+        let mut second = f32::INFINITY;
         self.geometry.for_each_hit(*ray, |candidate| {
             let record = self.record(candidate);
             match (record.bsdf, record.interior) {
                 (None, Some(interior)) => {
                     crossings.push(self.crossing(ray, candidate, interior, false));
-                    return Visit::Continue;
+                    Visit::Continue
                 }
-                (_, None) => keep_nearer(&mut opaque, candidate),
-                (Some(_), Some(_)) => keep_nearer(&mut refracting, candidate),
+                (_, None) => {
+                    keep_nearer(&mut opaque, candidate);
+                    Visit::ShrinkTo(candidate.t.next_up())
+                }
+                (Some(_), Some(_)) => {
+                    second = second.min(keep_nearer(&mut refracting, candidate));
+                    // As far as something may coincide.
+                    Visit::ShrinkTo(candidate.t + self.largest_width(ray, candidate.t))
+                }
             }
-            // As far as something may coincide.
-            Visit::ShrinkTo(candidate.t * (1.0 + 2.0 * COINCIDENT))
         });
-        let nearest = match (opaque, refracting) {
-            // A glass that stands on a table: the light inside of it must not get below.
-            (Some(opaque), Some(refracting)) if opaque.t > refracting.t * (1.0 + COINCIDENT) => {
-                Some(refracting)
-            }
-            (opaque, refracting) => opaque.or(refracting),
+        let nearest = refracting.filter(|refracting| opaque.is_none_or(|opaque| refracting.t < opaque.t));
+        let Some(nearest) = nearest.or(opaque) else {
+            sort(crossings);
+            return None;
         };
-        if let Some(nearest) = &nearest {
-            // What is reflected by an opaque surface stays on this side of a boundary that coincides with
-            // it. At a refracting surface most goes through.
-            let refracts = self.record(nearest).interior.is_some();
-            let end = if refracts { nearest.t } else { nearest.t * (1.0 - COINCIDENT) };
-            crossings.retain(|crossing| crossing.t <= end);
+        let mut hit = self.hit(ray, &nearest);
+        if hit.interior.is_none() && crossings.is_empty() {
+            return Some(hit);
+        }
+        let width = self.width(ray, &nearest, &hit);
+        let (before, behind) = (nearest.t - width, nearest.t + width);
+        let coincides = |t: f32| before < t && t < behind;
+        if hit.interior.is_some()
+            && (second < behind
+                || ray.t_max < behind
+                || opaque.is_some_and(|opaque| opaque.t < behind)
+                || crossings.iter().any(|crossing| coincides(crossing.t)))
+        {
+            hit = self.surface_at(ray, nearest.t, width, crossings).unwrap_or(hit);
+        } else {
+            // What is reflected by an opaque surface stays on this side of a boundary that coincides with it.
+            crossings.retain(|crossing| crossing.t <= before);
         }
         sort(crossings);
-        nearest.map(|nearest| self.hit(ray, &nearest))
+        Some(hit)
     }
 
     fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
@@ -205,6 +220,7 @@ impl Scene for ReadyScene {
         });
         if clear {
             sort(crossings);
+            self.join(ray, crossings);
         }
         clear
     }
@@ -223,5 +239,6 @@ impl Scene for ReadyScene {
     }
 }
 
+mod place;
 #[cfg(test)]
 mod tests;

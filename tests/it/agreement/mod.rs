@@ -5,6 +5,7 @@ mod channels;
 mod far_away;
 mod rebuild;
 mod roulette;
+mod shared_faces;
 mod subsets;
 mod traced_weights;
 mod unbounded;

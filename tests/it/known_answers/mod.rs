@@ -14,6 +14,8 @@
 //! | `infinite_point_source_moments` | 4 | moments of the stored photons |
 //! | `canonical_variance` | all | [`canonical_variance`] |
 //!
+//! Bodies in layers, in a white furnace of their own: [`layers`].
+//!
 //! Not covered: the furnace with a density grid (no such medium); half-spaces of albedo 1, whose finite slabs
 //! converge as 1/τ only (`slab_RT` has slabs of albedo 1).
 //!
@@ -24,6 +26,7 @@ mod canonical_variance;
 mod furnace;
 mod glowing_ball;
 mod halfspace;
+mod layers;
 mod point_source;
 mod references;
 mod single_scatter;

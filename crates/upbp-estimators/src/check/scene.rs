@@ -104,7 +104,8 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
         "crossings are sorted and before the hit",
         (ray, &crossings, end),
     )?;
-    require(crossings.iter().all(|c| !c.scatters), "trace only crosses null boundaries", (ray, &crossings))?;
+    let passes = crossings.iter().all(|c| !c.scatters || c.t == end);
+    require(passes, "trace only crosses null boundaries before the hit", (ray, &crossings))?;
 
     // Short of the hit nothing blocks; beyond an opaque one something does.
     let mut passed = Vec::new();

@@ -10,22 +10,18 @@ use crate::mis::{Densities, EdgeMis, EdgeStart, MergeKind, VertexMis};
 use crate::scene::Scene;
 
 /// The end of an edge.
-pub(crate) struct Arrived<B, L> {
+pub(crate) struct Arrived<'a, B, L> {
     pub(crate) position: Vec3,
     pub(crate) distance: f32,
     pub(crate) density: EdgeDensity<L>,
     pub(crate) interaction: Interaction<B>,
     /// The bodies around it.
-    pub(crate) sides: MediumInterface,
+    pub(crate) sides: MediumInterface<'a>,
 }
 
-#[expect(
-    clippy::large_enum_variant,
-    reason = "lives on the stack for a moment, and is nearly always the large one"
-)]
-pub(crate) enum Arrival<B, L> {
+pub(crate) enum Arrival<'a, B, L> {
     /// At a vertex.
-    Vertex(Arrived<B, L>),
+    Vertex(Arrived<'a, B, L>),
     /// To infinity.
     Escaped,
     /// Grazing a surface.
@@ -35,13 +31,14 @@ pub(crate) enum Arrival<B, L> {
     Lost,
 }
 
-pub(crate) fn arrive<S: Scene, L: Lanes>(
+pub(crate) fn arrive<'a, S: Scene, L: Lanes>(
     scene: &S,
-    edge_trace: &EdgeTrace<S::Bsdf, L>,
-) -> Arrival<S::Bsdf, L> {
+    edge_trace: &'a EdgeTrace<S::Bsdf, L>,
+) -> Arrival<'a, S::Bsdf, L> {
     if edge_trace.is_lost() {
         return Arrival::Lost;
     }
+    let sides = edge_trace.sides();
     if let Some((i, t)) = edge_trace.stop {
         let span = &edge_trace.spans[i];
         let Some(medium) = span.medium else { return Arrival::Lost };
@@ -54,16 +51,15 @@ pub(crate) fn arrive<S: Scene, L: Lanes>(
             distance: t,
             density: edge_trace.density_to(scene, span, t),
             interaction: Interaction::Medium(medium),
-            sides: MediumInterface::around(edge_trace.stack_in(span, t)),
+            sides,
         });
     }
-    let stack = edge_trace.stack_at_end();
     let Some(hit) = &edge_trace.hit else {
-        return if stack.is_empty() { Arrival::Escaped } else { Arrival::Lost };
+        return if sides.near.is_empty() { Arrival::Escaped } else { Arrival::Lost };
     };
     let Some(bsdf) = hit.bsdf else { return Arrival::Lost };
-    match Interaction::at_hit(hit, bsdf, edge_trace.direction, stack) {
-        Some((interaction, sides)) => Arrival::Vertex(Arrived {
+    match Interaction::at_hit(hit, bsdf, edge_trace.direction, &sides) {
+        Some(interaction) => Arrival::Vertex(Arrived {
             position: hit.position,
             distance: hit.t,
             density: edge_trace.density(scene),

@@ -7,8 +7,10 @@
 
 use glam::Vec3;
 use upbp_accel::Ray;
-use upbp_media::{EdgeDensity, Interior, Lanes, Medium, MediumId, MediumStack, RaySegment};
+use upbp_media::{EdgeDensity, Lanes, Medium, MediumId, MediumStack, RaySegment};
 
+use super::crossing::{correction, correction_of_escape, cross_all, is_surface, may_correct};
+use super::interaction::MediumInterface;
 use crate::iteration::IterationPlan;
 use crate::mis::BeamExtent;
 use crate::random::Stream;
@@ -55,8 +57,10 @@ pub struct EdgeTrace<B, L: Lanes = f64> {
     pub hit: Option<Hit<B>>,
     /// The bodies at the start.
     start: MediumStack,
-    /// The bodies at the end.
+    /// The bodies at the end: around the stop, or before the surface.
     end: MediumStack,
+    /// The bodies behind the surface, if it bounds one.
+    behind: MediumStack,
     crossings: Vec<Crossing>,
     found: Vec<Crossing>,
     /// Boundaries that contradicted the bodies that the ray was thought to be in, since they were last taken.
@@ -69,38 +73,6 @@ pub struct EdgeTrace<B, L: Lanes = f64> {
 /// which [`check_scene`](crate::check::check_scene) finds.
 pub(crate) fn medium_of<S: Scene>(scene: &S, stack: &MediumStack) -> Option<MediumId> {
     stack.medium().filter(|medium| (medium.0 as usize) < scene.media().len())
-}
-
-/// A crossing that must have happened where a ray starts, if `crossing` is the first of its body and
-/// contradicts the bodies that the ray is thought to be in: an index-matched body that is left was entered
-/// before, and one that is entered was not.
-///
-/// Vertices within rounding of a boundary come out on the wrong side of it, and cameras and lights may stand
-/// on one.
-pub(crate) fn correction(stack: &MediumStack, crossing: &Crossing, earlier: &[Crossing]) -> Option<Crossing> {
-    let body = crossing.interior.body;
-    let contradicts = !crossing.scatters && stack.contains(body) == crossing.entering;
-    (contradicts && earlier.iter().all(|other| other.interior.body != body)).then_some(Crossing {
-        t: 0.0,
-        entering: !crossing.entering,
-        ..*crossing
-    })
-}
-
-/// As [`correction`], for a ray that gets to infinity: what it never crossed it was not inside of.
-pub(crate) fn correction_of_escape(stack: &MediumStack, earlier: &[Crossing]) -> Option<Crossing> {
-    let crossed = |body| earlier.iter().any(|other| other.interior.body == body);
-    let interior = stack.bodies().find(|interior| !crossed(interior.body))?;
-    Some(Crossing { t: 0.0, interior, entering: false, scatters: false })
-}
-
-/// Bodies at the start of a ray that may turn out to be others than was thought.
-const MAX_CORRECTIONS: usize = 64;
-
-/// Whether a ray is followed again with one more correction, or is lost: a scene that tells of other bodies
-/// each time would never end.
-pub(crate) const fn may_correct(corrections: usize) -> bool {
-    corrections < MAX_CORRECTIONS
 }
 
 /// A distance is followed by this share farther than it was drawn: some roundings.
@@ -120,18 +92,6 @@ struct Flight<L: Lanes> {
     stop: f32,
 }
 
-/// Whether a boundary is hidden by the bodies that a ray is in.
-///
-/// A boundary inside a stronger body, or of a body that is hidden by one, is no surface: the body is entered
-/// or left, and the ray goes on (`docs/theory.md`, section 1.7).
-pub(crate) fn is_hidden(stack: &MediumStack, interior: &Interior, entering: bool) -> bool {
-    if entering {
-        interior.priority < stack.priority()
-    } else {
-        stack.top().is_none_or(|top| top.body != interior.body)
-    }
-}
-
 impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     /// An empty one; [`trace`](Self::trace) fills it, again and again without allocation.
     #[must_use]
@@ -144,6 +104,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             hit: None,
             start: MediumStack::new(None),
             end: MediumStack::new(None),
+            behind: MediumStack::new(None),
             crossings: Vec::new(),
             found: Vec::new(),
             conflicts: 0,
@@ -186,6 +147,9 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             self.crossings.truncate(corrections);
             self.crossings.push(correction);
             corrections += 1;
+        }
+        if let Some((span, t)) = self.stop {
+            self.end = self.stack_in(&self.spans[span], t);
         }
     }
 
@@ -236,39 +200,54 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 self.lose();
                 return None;
             }
-            for i in 0..self.found.len() {
-                let crossing = self.found[i];
-                if crossing.t > flight.max_distance {
+            let known = hit.as_ref().map_or(ray.t_max, |hit| hit.t);
+            let boundary = hit.as_ref().and_then(|hit| hit.crossing(self.direction));
+            // What coincides with the surface of a body counts together with it.
+            let before = match boundary {
+                Some(_) => self.found.partition_point(|crossing| crossing.t < known),
+                None => self.found.len(),
+            };
+            for i in 0..before {
+                if self.found[i].t > flight.max_distance {
                     break;
                 }
-                let correction = correction(&self.end, &crossing, &self.crossings);
+                let correction = correction(&self.end, &self.found[i..=i], &self.crossings);
                 if correction.is_some() {
                     return correction;
                 }
-                self.crossings.push(crossing);
+                self.crossings.push(self.found[i]);
                 if self.cross(scene, &mut span, &mut flight, self.crossings.len(), stream) {
                     return None;
                 }
             }
-            let known = hit.as_ref().map_or(ray.t_max, |hit| hit.t);
             if let Some(hit) = hit
                 && known <= flight.max_distance
             {
-                if let Some(interior) = hit.interior
-                    && let entering = self.direction.dot(hit.geometric_normal) < 0.0
-                    && is_hidden(&self.end, &interior, entering)
-                {
-                    self.crossings.push(Crossing { t: known, interior, entering, scatters: true });
-                    if self.cross(scene, &mut span, &mut flight, self.crossings.len(), stream) {
-                        return None;
+                if let Some(boundary) = boundary {
+                    // Into a body before out of one, as all crossings at a distance.
+                    let place = if boundary.entering { before } else { self.found.len() };
+                    self.found.insert(place, boundary);
+                    let place = &self.found[before..];
+                    let correction = correction(&self.end, place, &self.crossings);
+                    if correction.is_some() {
+                        return correction;
                     }
-                    ray.t_min = known * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
-                } else {
+                    self.behind.clone_from(&self.end);
+                    cross_all(&mut self.behind, place);
+                }
+                if boundary.is_none_or(|boundary| is_surface(&self.end, &self.behind, &boundary)) {
                     if !self.close(scene, &mut span, &flight, known) {
                         self.hit = Some(hit);
                     }
                     return None;
                 }
+                for i in before..self.found.len() {
+                    self.crossings.push(self.found[i]);
+                    if self.cross(scene, &mut span, &mut flight, self.crossings.len(), stream) {
+                        return None;
+                    }
+                }
+                ray.t_min = known * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
             } else if flight.max_distance <= known {
                 let escapes = flight.max_distance == f32::INFINITY;
                 let correction = escapes.then(|| correction_of_escape(&self.end, &self.crossings)).flatten();
@@ -454,10 +433,11 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         stack
     }
 
-    /// The bodies at the end, before the surface.
+    /// The bodies where the walk stops, or on the two sides of the surface.
     #[must_use]
-    pub const fn stack_at_end(&self) -> &MediumStack {
-        &self.end
+    pub fn sides(&self) -> MediumInterface<'_> {
+        let crosses = self.stop.is_none() && self.hit.as_ref().is_some_and(|hit| hit.interior.is_some());
+        MediumInterface { near: &self.end, far: if crosses { &self.behind } else { &self.end } }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Vertices where a path can be connected and merged, and how they scatter.
 
 use glam::Vec3;
-use upbp_media::{Interior, Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
+use upbp_media::{Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
 
 use crate::mis::MergeKind;
 use crate::random::Stream;
@@ -34,33 +34,21 @@ pub struct SurfaceInteraction<B> {
 }
 
 /// The bodies on the two sides of a vertex.
-#[derive(Clone, Debug)]
-pub struct MediumInterface {
+#[derive(Clone, Copy, Debug)]
+pub struct MediumInterface<'a> {
     /// Bodies on the side that the walk comes from.
-    near: MediumStack,
-    /// The body whose surface the vertex is on, and whether the walk would enter it.
-    boundary: Option<(Interior, bool)>,
+    pub near: &'a MediumStack,
+    /// Bodies on the other side; in a medium the same.
+    pub far: &'a MediumStack,
 }
 
-impl MediumInterface {
-    /// Bodies around a vertex in a medium, the same on all sides.
-    #[must_use]
-    pub const fn around(stack: MediumStack) -> Self {
-        Self { near: stack, boundary: None }
-    }
-
+impl<'a> MediumInterface<'a> {
     /// The bodies on the side that a path goes to, which `crosses` the surface or stays on the side it came
     /// from.
     #[inline]
     #[must_use]
-    pub fn towards(&self, crosses: bool) -> MediumStack {
-        let mut stack = self.near.clone();
-        if let Some((interior, entering)) = self.boundary
-            && crosses
-        {
-            let _ = stack.cross(interior, entering);
-        }
-        stack
+    pub const fn towards(&self, crosses: bool) -> &'a MediumStack {
+        if crosses { self.far } else { self.near }
     }
 }
 
@@ -108,33 +96,20 @@ fn sine(a: Vec3, b: Vec3) -> f64 {
 }
 
 impl<B: Bsdf> Interaction<B> {
-    /// The surface of a hit; `before` are the bodies on the side that the ray comes from. `None` if the
-    /// surface is grazed.
-    pub fn at_hit(
-        hit: &Hit<B>,
-        bsdf: B,
-        direction: Vec3,
-        before: &MediumStack,
-    ) -> Option<(Self, MediumInterface)> {
+    /// The surface of a hit, between the bodies of `sides`. `None` if the surface is grazed.
+    pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, sides: &MediumInterface<'_>) -> Option<Self> {
         let cos = direction.dot(hit.geometric_normal);
         if cos.abs() < MIN_COSINE {
             return None;
         }
-        let entering = cos < 0.0;
-        let sides = MediumInterface {
-            near: before.clone(),
-            boundary: hit.interior.map(|interior| (interior, entering)),
-        };
-        let near = before.ior();
-        let far = if sides.boundary.is_some() { sides.towards(true).ior() } else { near };
-        let (above, below) = if entering { (near, far) } else { (far, near) };
-        let interaction = SurfaceInteraction {
+        let (near, far) = (sides.near.ior(), sides.far.ior());
+        let (above, below) = if cos < 0.0 { (near, far) } else { (far, near) };
+        Some(Self::Surface(SurfaceInteraction {
             bsdf,
             geometric_normal: hit.geometric_normal,
             shading_normal: hit.shading_normal,
             interface: Interface { above, below },
-        };
-        Some((Self::Surface(interaction), sides))
+        }))
     }
 
     /// Whether paths can be connected and merged here.

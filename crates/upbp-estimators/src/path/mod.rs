@@ -2,6 +2,7 @@
 
 mod arrival;
 mod context;
+mod crossing;
 mod edge;
 mod interaction;
 mod vertex;

@@ -4,7 +4,8 @@ use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
 use upbp_media::{EdgeDensity, Lanes, MediumStack, RaySegment};
 
-use super::edge::{correction, correction_of_escape, is_hidden, may_correct, medium_of};
+use super::crossing::{correction, correction_of_escape, cross_all, has_surface, may_correct};
+use super::edge::medium_of;
 use super::interaction::Interaction;
 use crate::scene::{Crossing, MAX_CROSSINGS, Scene};
 
@@ -95,19 +96,21 @@ fn accumulate<S: Scene, L: Lanes>(
         None => density.push_vacuum(),
     };
     let mut started = false;
-    for (i, crossing) in crossings.iter().enumerate() {
-        if i >= corrections
-            && let Some(correction) = correction(&stack, crossing, &crossings[..i])
+    let mut crossed = 0;
+    for place in crossings.chunk_by(|a, b| a.t == b.t) {
+        if crossed >= corrections
+            && let Some(correction) = correction(&stack, place, &crossings[..crossed])
         {
             return Edge::Corrected(correction);
         }
-        if crossing.scatters && !is_hidden(&stack, &crossing.interior, crossing.entering) {
+        crossed += place.len();
+        if has_surface(&stack, place) {
             return Edge::Blocked;
         }
         let medium = medium_of(scene, &stack);
-        let _ = stack.cross(crossing.interior, crossing.entering);
+        cross_all(&mut stack, place);
         if medium_of(scene, &stack) != medium {
-            let t = crossing.t.max(start);
+            let t = place[0].t.max(start);
             // The first stretch counts even without a length.
             if t > start || !started {
                 push(medium, start, t);

@@ -28,6 +28,18 @@ pub struct Hit<B> {
 }
 
 impl<B> Hit<B> {
+    /// The crossing of a ray along `direction` that passes straight, if the surface bounds a body.
+    #[inline]
+    #[must_use]
+    pub fn crossing(&self, direction: Vec3) -> Option<Crossing> {
+        Some(Crossing {
+            t: self.t,
+            interior: self.interior?,
+            entering: direction.dot(self.geometric_normal) < 0.0,
+            scatters: self.bsdf.is_some(),
+        })
+    }
+
     /// Whether a ray from `t_min` on can have met it: it lies ahead, and all its numbers are finite. A walk
     /// that meets another is lost.
     #[inline]

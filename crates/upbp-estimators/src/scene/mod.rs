@@ -76,6 +76,11 @@ pub trait Scene: Sync {
     /// The nearest surface that scatters, and in `crossings` (empty before, sorted by distance after) the
     /// null boundaries before it, or all along the ray if there is none.
     ///
+    /// Where surfaces of bodies coincide, it is that of the highest priority, and the other boundaries there,
+    /// those that scatter too, are crossings at its distance: a path meets them as one, between the body that
+    /// counts before them and the one that counts behind (`docs/theory.md`, section 1.7). Rays that leave
+    /// start behind what is as near as [`RAY_OFFSET`](upbp_accel::RAY_OFFSET), so that this must coincide.
+    ///
     /// The default asks [`intersect`](Self::intersect) again behind each boundary, and so misses one of two
     /// boundaries that coincide to rounding; a host with such geometry overrides this. It gives up at
     /// [`MAX_CROSSINGS`], and at a hit that is not [sound](Hit::is_sound): walks are lost there.
@@ -86,7 +91,7 @@ pub trait Scene: Sync {
             if hit.bsdf.is_some() || !hit.is_sound(rest.t_min) {
                 return Some(hit);
             }
-            push_crossing(crossings, ray.direction, &hit);
+            crossings.extend(hit.crossing(ray.direction));
             rest.t_min = behind(hit.t);
         }
         None
@@ -94,7 +99,8 @@ pub trait Scene: Sync {
 
     /// Whether the segment `(ray.t_min, ray.t_max)` is free of surfaces that end every connection: those that
     /// scatter and enclose no body. Boundaries of bodies on the way, null or not, go to `crossings`, sorted
-    /// by distance; they are of no interest if the answer is `false`.
+    /// by distance, which is the same for those that coincide with one that scatters; they are of no
+    /// interest if the answer is `false`.
     fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
         let mut rest = *ray;
         for _ in 0..MAX_CROSSINGS {
@@ -102,7 +108,7 @@ pub trait Scene: Sync {
             if (hit.bsdf.is_some() && hit.interior.is_none()) || !hit.is_sound(rest.t_min) {
                 return false;
             }
-            push_crossing(crossings, ray.direction, &hit);
+            crossings.extend(hit.crossing(ray.direction));
             rest.t_min = behind(hit.t);
         }
         false
@@ -152,15 +158,4 @@ pub const MAX_CROSSINGS: usize = 4096;
 /// The next distance that is certainly not the same intersection again.
 fn behind(t: f32) -> f32 {
     t + t.abs().max(f32::MIN_POSITIVE) * 4.0 * f32::EPSILON
-}
-
-fn push_crossing<B>(crossings: &mut Vec<Crossing>, direction: Vec3, hit: &Hit<B>) {
-    if let Some(interior) = hit.interior {
-        crossings.push(Crossing {
-            t: hit.t,
-            interior,
-            entering: direction.dot(hit.geometric_normal) < 0.0,
-            scatters: hit.bsdf.is_some(),
-        });
-    }
 }

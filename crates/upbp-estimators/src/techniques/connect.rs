@@ -20,7 +20,7 @@ pub(crate) fn connections<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities, L>,
     vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
-    sides: &MediumInterface,
+    sides: &MediumInterface<'_>,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -43,7 +43,7 @@ pub(crate) fn connections<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
-    sides: &MediumInterface,
+    sides: &MediumInterface<'_>,
     light: &LightVertex<S::Bsdf, O::Densities, L>,
     factor: f64,
     crossings: &mut Vec<Crossing>,
@@ -76,7 +76,7 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         Interaction::Medium(_) => None,
     };
     let target = Target { direction, distance, surface };
-    let Some(density) = clear_edge::<_, L>(scene, &stack, origin, &target, crossings) else { return };
+    let Some(density) = clear_edge::<_, L>(scene, stack, origin, &target, crossings) else { return };
 
     let (near, far) = (vertex.interaction.in_medium(), light.interaction.in_medium());
     let distance2 = f64::from(distance).powi(2);

@@ -12,7 +12,7 @@ use crate::technique::Technique;
 pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &LightVertex<S::Bsdf, O::Densities, L>,
-    sides: &MediumInterface,
+    sides: &MediumInterface<'_>,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut LightChunk<S::Bsdf, O::Densities, L>,
@@ -41,7 +41,7 @@ pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let crosses = vertex.interaction.crosses(vertex.towards_light, direction);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
     let target = Target { direction, distance, surface: None };
-    let Some(density) = clear_edge::<_, L>(scene, &sides.towards(crosses), origin, &target, crossings) else {
+    let Some(density) = clear_edge::<_, L>(scene, sides.towards(crosses), origin, &target, crossings) else {
         return;
     };
     let in_medium = vertex.interaction.in_medium();

@@ -13,7 +13,7 @@ use crate::technique::Technique;
 pub(crate) fn next_events<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
-    sides: &MediumInterface,
+    sides: &MediumInterface<'_>,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -32,7 +32,7 @@ pub(crate) fn next_events<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
-    sides: &MediumInterface,
+    sides: &MediumInterface<'_>,
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
@@ -68,9 +68,9 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let surface = (kind == EmitterKind::Area).then_some((incident.point.position, incident.point.normal));
     let target = Target { direction, distance: incident.distance, surface };
     let stack = sides.towards(crosses);
-    let Some(density) = clear_edge::<_, L>(scene, &stack, origin, &target, crossings) else { return };
+    let Some(density) = clear_edge::<_, L>(scene, stack, origin, &target, crossings) else { return };
     if let EmitterKind::Volume(body) = kind
-        && !is_in_body(stack, crossings, body)
+        && !is_in_body(stack.clone(), crossings, body)
     {
         return;
     }

@@ -113,7 +113,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             out.counters.cut_walks += u64::from(arrived.interaction.is_connectible());
             break;
         }
-        let (connectible, sides) = (arrived.interaction.is_connectible(), &arrived.sides);
+        let (connectible, sides) = (arrived.interaction.is_connectible(), arrived.sides);
         let mis = edge.mis.arrive(
             &plan.mis,
             Walk::Camera,
@@ -135,8 +135,8 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
                 scattered_before = true;
             }
             let crossings = &mut scratch.crossings;
-            techniques::next_events(context, &vertex, sides, &mut stream, crossings, &mut out);
-            techniques::connections(context, map, &vertex, sides, &mut stream, crossings, &mut out);
+            techniques::next_events(context, &vertex, &sides, &mut stream, crossings, &mut out);
+            techniques::connections(context, map, &vertex, &sides, &mut stream, crossings, &mut out);
             match &vertex.interaction {
                 Interaction::Surface(surface) => techniques::surf(context, map, &vertex, surface, &mut out),
                 Interaction::Medium(medium) => {
@@ -165,7 +165,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         });
         origin = ray_origin(&vertex.interaction, vertex.position, scattered.direction);
         direction = scattered.direction;
-        stack = sides.towards(scattered.transmitted);
+        stack.clone_from(sides.towards(scattered.transmitted));
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
             mis: scatter(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),

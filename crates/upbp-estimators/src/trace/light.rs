@@ -140,7 +140,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         flight = Flight {
             origin: ray_origin(&interaction, position, scattered.direction),
             direction: scattered.direction,
-            stack: sides.towards(scattered.transmitted),
+            stack: sides.towards(scattered.transmitted).clone(),
             mis: scatter(context, &mis, &interaction, scale, &scattered),
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,

@@ -4,7 +4,7 @@
 //! the given priority, then the smaller volume above the larger, then the later in the file above the
 //! earlier. The second rule makes nested bodies work without any number: the inner one is smaller.
 
-use upbp_accel::{Shape, ShapeId};
+use upbp_accel::{Shape, ShapeId, offset_origin};
 use upbp_media::{BodyId, Interior};
 
 use super::builder::Builder;
@@ -80,8 +80,12 @@ fn is_inside(shape: &Shape, other: &Shape) -> bool {
 /// points all over its surface. A cloud in a glass block has the index of the glass, or a bubble in the
 /// cloud would refract wrongly.
 fn surrounding_ior(shape: &Shape, lower: &[BodyDraft<'_>], placed: &[Body]) -> f32 {
-    let surface =
-        |i: u8| shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]).0;
+    // Just inside of it, so that a body that fills another is surrounded by it.
+    let surface = |i: u8| {
+        let (point, normal) =
+            shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]);
+        offset_origin(point, normal, -normal)
+    };
     let (min, max) = shape.aabb();
     let contains = |other: &Shape| {
         let (outer_min, outer_max) = other.aabb();

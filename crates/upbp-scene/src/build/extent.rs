@@ -66,3 +66,13 @@ pub(super) fn bounds(drafts: &[ShapeDraft], lights: &[Light], camera: &Perspecti
     let radius = radius * (1.0 + 1e-5) + 1e-6 * centre.abs().max_element();
     BoundingSphere { centre, radius: if radius > 0.0 { radius } else { 1.0 } }
 }
+
+/// The largest coordinate of meshes that refract; zero if there are none.
+pub(super) fn largest_corner(drafts: &[ShapeDraft]) -> f32 {
+    let refracting = drafts.iter().filter(|draft| draft.bsdf.is_some() && draft.body.is_some());
+    let meshes = refracting.filter(|draft| matches!(draft.shape, Shape::Mesh(_)));
+    meshes.fold(0.0, |largest, draft| {
+        let (min, max) = draft.shape.aabb();
+        min.abs().max(max.abs()).max_element().max(largest)
+    })
+}

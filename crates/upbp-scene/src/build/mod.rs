@@ -117,6 +117,7 @@ impl Builder<'_> {
         let origin = extent::move_near_origin(&mut drafts, &mut lights, &mut camera);
         let bounds = extent::bounds(&drafts, &lights, &camera);
         let bodies = bodies::rank(&drafts);
+        let largest_corner = extent::largest_corner(&drafts);
         let surfaces = self.records(&drafts, &bodies, &mut lights);
         lights.extend(volume_lights(&drafts, &bodies, &media, bounds.radius));
         let geometry = SceneGeometry::build(drafts.into_iter().map(|draft| draft.shape).collect());
@@ -130,6 +131,7 @@ impl Builder<'_> {
             media,
             camera,
             outside,
+            largest_corner,
             bounds,
             origin,
             hash,

@@ -235,6 +235,85 @@ fn a_boundary_inside_glass_has_the_index_of_the_glass() {
 }
 
 #[test]
+fn a_null_body_that_fills_glass_has_its_index() {
+    let glass_and_fog = |geometry: &str| {
+        format!(
+            "(geometry: {geometry}, material: \"glass\"), (geometry: {geometry}, material: \"null\", interior: \"a\")"
+        )
+    };
+    for geometry in ["Sphere(centre: (0.1, 0.2, 0.3), radius: 0.7)", "Box(min: (-1, -1, -1), max: (1, 1, 1))"]
+    {
+        let scene = scene(MEDIA, &glass_and_fog(geometry));
+        let inside = scene.stack_at(Vec3::new(0.1, 0.0, 0.2));
+        assert_eq!((inside.medium(), inside.ior()), (Some(MediumId(0)), 1.5));
+        // And its surface.
+        let mut crossings = Vec::new();
+        let hit = scene.trace(&ALONG_X, &mut crossings).unwrap();
+        assert_eq!((hit.interior.unwrap().body, crossings.len()), (BodyId(0), 1));
+        assert_eq!((crossings[0].interior.body, crossings[0].t), (BodyId(1), hit.t));
+    }
+}
+
+#[test]
+fn refracting_surfaces_that_coincide_are_one_hit() {
+    // A box of glass below a larger one of water, which has the higher number, and a sphere that touches both
+    // boxes from the side.
+    let scene = scene(
+        MEDIA,
+        "(geometry: Box(min: (-1, -1, -1), max: (0, 1, 1)), material: \"glass\"),
+         (geometry: Box(min: (0, -2, -2), max: (1, 2, 2)), material: \"water\", priority: 1),
+         (geometry: Sphere(centre: (0, 2, 0.2), radius: 1), material: \"null\", interior: \"a\")",
+    );
+    for (origin, direction) in [(-0.5, Vec3::X), (0.5, -Vec3::X)] {
+        let ray = Ray { origin: Vec3::new(origin, 0.1, 0.2), direction, ..ALONG_X };
+        let mut crossings = Vec::new();
+        let hit = scene.trace(&ray, &mut crossings).unwrap();
+        let [other] = crossings[..] else { panic!("{crossings:?}") };
+        assert_eq!((hit.t, other.t), (0.5, 0.5));
+        assert_eq!((hit.interior.unwrap().ior, other.interior.ior, other.scatters), (1.33, 1.5, true));
+        assert_eq!(other.entering, origin > 0.0);
+        let mut stack = scene.stack_at(ray.origin);
+        let mut connection = Vec::new();
+        assert!(scene.is_clear(&ray.with_range(0.0, 0.6), &mut connection));
+        assert_eq!(connection.iter().map(|crossing| crossing.t).collect::<Vec<_>>(), [0.5, 0.5]);
+        for crossing in connection {
+            assert_eq!(stack.cross(crossing.interior, crossing.entering), upbp_media::Crossing::Done);
+        }
+        assert_eq!(stack, scene.stack_at(ray.at(0.6)));
+    }
+    check_scene(&scene).unwrap();
+}
+
+#[test]
+fn what_is_nearer_than_a_ray_starts_from_a_surface_coincides() {
+    // A gap of some roundings between two bodies, near the origin and far from it: either they are met as
+    // one, or a ray that leaves the one meets the other.
+    for x in [1e-3_f32, 1.0, 700.0] {
+        for roundings in 0..80 {
+            let start = x + roundings as f32 * f32::EPSILON * x;
+            let text = format!(
+                "(geometry: Box(min: ({:?}, -1e-4, -1e-4), max: ({x:?}, 1e-4, 1e-4)), material: \"glass\"),
+                 (geometry: Box(min: ({start:?}, -1e-4, -1e-4), max: ({:?}, 1e-4, 1e-4)), material: \"water\"),
+                 (geometry: Sphere(centre: (0, 0, 0), radius: 1e-6), material: \"null\")",
+                0.5 * x,
+                2.0 * x,
+            );
+            let scene = scene(MEDIA, &text);
+            let origin = scene.origin();
+            let ray = Ray { origin: Vec3::new(0.75 * x, 0.0, 0.0) - origin, ..ALONG_X };
+            let mut crossings = Vec::new();
+            let hit = scene.trace(&ray, &mut crossings).unwrap();
+            if crossings.is_empty() {
+                let start = upbp_accel::offset_origin(hit.position, hit.geometric_normal, ray.direction);
+                let next = scene.trace(&Ray { origin: start, ..ray }, &mut crossings).unwrap();
+                // Beyond the second face there is its other side.
+                assert!(next.position.x < 1.5 * x - origin.x, "{x} {roundings}");
+            }
+        }
+    }
+}
+
+#[test]
 fn refracting_bodies_do_not_block_a_segment_but_are_reported() {
     let scene = scene(MEDIA, "(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"glass\")");
     let mut crossings = Vec::new();
