@@ -81,8 +81,8 @@ impl RadiusField {
             && radius <= self.largest_radius()
     }
 
-    /// Radii along a ray, of searches for what a kernel reaches; `radius` (scene units) is that where the factor
-    /// is one.
+    /// Radii along a ray, of searches for what a kernel reaches; `radius` (scene units) is that where the
+    /// factor is one.
     #[must_use]
     pub fn search_radius(&self, radius: f32) -> SearchRadius {
         match *self {

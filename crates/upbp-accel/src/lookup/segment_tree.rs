@@ -154,8 +154,8 @@ struct AroundRay<'a, P, R, V> {
 impl<P: Copy, R: RadiusAlong, V: FnMut(P, ClosestApproach)> Query<Block> for AroundRay<'_, P, R, V> {
     type Found = ();
 
-    /// Compares the distance between the lines with the radius, without a division if that is constant. Squares
-    /// lose the last bits, or vanish: this keeps too many lanes rather than too few.
+    /// Compares the distance between the lines with the radius, without a division if that is constant.
+    /// Squares lose the last bits, or vanish: this keeps too many lanes rather than too few.
     #[inline(always)]
     fn test<W: Wide>(&self, wide: W, block: &Block) -> (u32, ()) {
         let direction = wide.load3(&block.direction);

@@ -35,10 +35,10 @@ fn ray() -> impl Strategy<Value = Ray> {
         .prop_map(|(origin, direction, (t_min, t_max))| Ray::new(origin, direction).with_range(t_min, t_max))
 }
 
-/// Whether what was found is what lies within the radius: all of which the distance is less than the radius, none
-/// of which it is more, and each once. The distance is given as a part of the radius at the place; where the two
-/// are equal within rounding, either is right.
-fn are_those_within(found: Vec<(u32, u32)>, all: Vec<(u32, u32, f32)>) -> bool {
+/// Whether what was found is what lies within the radius: all of which the distance is less than the radius,
+/// none of which it is more, and each once. The distance is given as a part of the radius at the place; where
+/// the two are equal within rounding, either is right.
+fn are_those_within(found: &[(u32, u32)], all: &[(u32, u32, f32)]) -> bool {
     let count = |hit: (u32, u32)| found.iter().filter(|other| **other == hit).count();
     let is_right = |&(index, t, part): &(u32, u32, f32)| match count((index, t)) {
         0 => part > 0.9999,
@@ -73,7 +73,7 @@ proptest! {
             let part = distance / (radius * field.at(ray.at(t)));
             (t >= ray.t_min && t < ray.t_max).then_some((index, t.to_bits(), part))
         });
-        prop_assert!(are_those_within(found, brute.collect()));
+        prop_assert!(are_those_within(&found, &brute.collect::<Vec<_>>()));
     }
 
     #[test]
@@ -95,7 +95,7 @@ proptest! {
             let part = approach.distance / (radius * field.at(ray.at(approach.t_ray)));
             Some((index, approach.t_ray.to_bits(), part))
         });
-        prop_assert!(are_those_within(found, brute.collect()));
+        prop_assert!(are_those_within(&found, &brute.collect::<Vec<_>>()));
     }
 
     #[test]

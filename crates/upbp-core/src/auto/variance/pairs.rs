@@ -203,9 +203,10 @@ pub(super) struct Share {
     charge: f32,
 }
 
-/// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it finds
-/// more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened to meet is
-/// mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest too.
+/// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it
+/// finds more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened
+/// to meet is mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest
+/// too.
 const TRUSTED: f32 = 4.0;
 
 impl Share {
