@@ -10,6 +10,12 @@ use crate::auto::pilot_render::PilotRender;
 use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
 use crate::auto::roulette::{COUNT, relative_pass_probability};
 
+/// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it
+/// finds more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened
+/// to meet is mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest
+/// too.
+const TRUSTED: f32 = 4.0;
+
 /// The samples of a pilot render, ready for the predictions of many plans.
 pub(super) struct Looks {
     /// By look, those after most albedos first.
@@ -199,15 +205,9 @@ pub(super) struct Share {
     merges: f32,
     /// One over the sum of all.
     inverse: f32,
-    /// What second moments are multiplied by: the same, and more where the plan finds next to nothing.
+    /// Factor of second moments: the same, and more where the plan finds next to nothing.
     charge: f32,
 }
-
-/// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it
-/// finds more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened
-/// to meet is mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest
-/// too.
-const TRUSTED: f32 = 4.0;
 
 impl Share {
     /// The part in the second moment of single samples of one whose square is `square`.
