@@ -43,7 +43,8 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
         description.film.height = side;
     })
     .expect("the shipped scene");
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a thread pool");
+    // One thread: how many have buffers of their own at the same time is up to the system's scheduler.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
     pool.install(|| {
         let renderer = |paths, memory| {
             let checked = settings(paths, beams, memory).validate().expect("valid settings");
