@@ -44,11 +44,11 @@ impl Bsdf for Matt {
 
 /// A glowing ball.
 pub(crate) struct Lamp {
-    /// Its centre.
+    /// Centre of the ball.
     pub centre: Vec3,
-    /// Its radius.
+    /// Radius of the ball.
     pub radius: f32,
-    /// Its radiance, the same in all directions.
+    /// Radiance of the surface, alike in all directions.
     pub radiance: Spectrum,
 }
 

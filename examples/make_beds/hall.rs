@@ -5,7 +5,7 @@ use glam::dvec3;
 use crate::Bed;
 use crate::mesh::Mesh;
 
-/// What the slide shows: an opening per `#`.
+/// Letters of the slide: an opening per `#`.
 const LETTERS: [&str; 7] = [
     "#..#.###..###..###.",
     "#..#.#..#.#..#.#..#",

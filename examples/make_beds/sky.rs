@@ -8,7 +8,7 @@ use glam::Vec3;
 /// Pixels along the horizon.
 const WIDTH: usize = 256;
 
-/// Where the glow around the sun is, in scenes without a rotation: behind the left shoulder of −z.
+/// Direction of the glow around the sun, in scenes without a rotation: behind the left shoulder of −z.
 const SUN: Vec3 = Vec3::new(-0.57, 0.57, -0.59);
 
 /// Radiance from a direction: pale at the horizon, deep blue above, a glow around the sun, and an earthy

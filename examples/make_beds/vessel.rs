@@ -112,7 +112,7 @@ impl Vessel {
         Mesh::revolve(&profile, SEGMENTS)
     }
 
-    /// What fills the vessel up to `level`, with a meniscus; it reaches `into` the wall, which has to have
+    /// Liquid that fills the vessel up to `level`, with a meniscus; it reaches `into` the wall, which needs
     /// the higher priority.
     pub(crate) fn filling(&self, level: f64, into: f64) -> Mesh {
         let reach = |point: DVec2| dvec2(if point.x > 0.0 { point.x + into } else { 0.0 }, point.y - into);

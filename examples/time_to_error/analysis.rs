@@ -26,7 +26,7 @@ pub(crate) enum Reached {
     Before(f64),
     /// Between two points.
     At(f64),
-    /// Not by the end.
+    /// Later than the end, as far as relMSE falls like 1/t.
     Not(f64),
 }
 
@@ -45,8 +45,8 @@ impl Curve {
         Self { name, series, floor, mean }
     }
 
-    /// The same with relMSE over scales for that of pixels. A reference with independent pixels has the same
-    /// floor.
+    /// The curves with relMSE over scales for that of pixels. A reference with independent pixels has the
+    /// same floor.
     pub(crate) fn over_scales(&self) -> Self {
         let series = self.series.iter().map(|(seed, points)| {
             let over_scales = |p: &ErrorPoint| ErrorPoint { relative_mse: p.over_scales, ..*p };

@@ -37,7 +37,7 @@ pub enum RenderError {
         /// The techniques that are not ruled out.
         techniques: TechniqueSet,
     },
-    /// Its canceller was used before there was anything to show.
+    /// The render was cancelled before there was anything to show.
     #[error("cancelled before the first iteration")]
     Cancelled,
     /// Techniques of which none can make any light in the scene.
@@ -175,11 +175,11 @@ pub enum OutputError {
     SameFile {
         /// Name of the output that would be written.
         role: String,
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
-        /// Name of the other role of the file.
+        /// Name of the other file.
         other_role: String,
-        /// Its name in that role.
+        /// Path of the same file in that role.
         other_path: PathBuf,
     },
     /// Something else would be overwritten.

@@ -19,7 +19,7 @@ pub struct Report {
     pub support: TechniqueSupport,
     /// Width and height of the picture.
     pub resolution: [u32; 2],
-    /// Seed.
+    /// Seed of the random numbers.
     pub seed: u64,
     /// Iterations done.
     pub iterations: u64,
@@ -47,8 +47,8 @@ pub struct Report {
     /// Estimated relMSE of the image, without the bias of kernels and light that no technique finds; `None`
     /// before there are two halves.
     pub estimated_error: Option<ErrorEstimate>,
-    /// The same over scales ([`crate::Image::relative_mse_over_scales`]): larger where neighbouring pixels
-    /// share errors, as blotches and streaks do.
+    /// Estimated error over scales ([`crate::Image::relative_mse_over_scales`]): larger than that of pixels
+    /// where neighbours share errors, as blotches and streaks do.
     pub estimated_over_scales: Option<f64>,
     /// Error against a reference over time, if there is one.
     pub series: ErrorSeries,

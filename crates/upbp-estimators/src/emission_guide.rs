@@ -31,7 +31,7 @@ const UNEVEN: f64 = 1.15;
 pub struct EmissionSample {
     /// The random numbers that it was made with: two for the place, two for the direction.
     pub at: [f32; 4],
-    /// Its light, not negative: contributions that already count for their density, in any unit.
+    /// Light of the start, not negative: contributions that already count for their density, in any unit.
     pub light: f64,
 }
 

@@ -12,19 +12,19 @@ use crate::scene::{BoundingSphere, EmitterId};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EmitterChoice {
-    /// Where light sub-paths start.
+    /// Probabilities of emitters at which light sub-paths start.
     pub(crate) emission: Selection,
-    /// Where camera vertices look for light, wherever they are.
+    /// Probabilities of emitters of next events, alike for all receivers.
     pub(crate) next_event: Selection,
-    /// Where camera vertices look for light by the place that they are at, but for a [part](EVERYWHERE) of
-    /// the choice.
+    /// Probabilities of emitters of next events by the place of the receiver, for all but a
+    /// [part](EVERYWHERE) of the choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) receivers: Option<ReceiverShares>,
-    /// Where on an emitter, and in which direction, light sub-paths start; emitters that are left out have no
+    /// Distributions of places and directions of starts, by emitter; emitters that are left out have no
     /// guide.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) guides: Vec<Option<EmissionGuide>>,
-    /// Where the rays of most guided starts pass: light from infinity starts on discs around it.
+    /// Point that the rays of most guided starts pass: light from infinity starts on discs around it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) focus: Option<Vec3>,
 }
@@ -202,7 +202,7 @@ impl Selection {
         self.cumulative.last() == power.cumulative.last() && steps(self) == steps(power)
     }
 
-    /// This distribution without some of the emitters.
+    /// The distribution without some of the emitters.
     pub(crate) fn without(&self, is_left_out: impl Fn(EmitterId) -> bool) -> Self {
         let probability = |id| if is_left_out(id) { 0.0 } else { f64::from(self.probability(id)) };
         let rest: Vec<f64> = (0..self.cumulative.len()).map(|i| probability(EmitterId(i as u32))).collect();
@@ -213,7 +213,7 @@ impl Selection {
         self.cumulative.last().is_none_or(|&end| end == 0)
     }
 
-    /// This distribution with a part that follows `shares`, the larger the more samples they stand on.
+    /// The distribution with a part that follows `shares`, the larger the more samples they stand on.
     pub(crate) fn blend(&self, shares: &EmitterShares) -> Self {
         let count = self.cumulative.len();
         let power = |i: usize| f64::from(self.probability(EmitterId(i as u32)));

@@ -245,7 +245,7 @@ impl EmitterTree {
     }
 }
 
-/// Where to split sorted items: those of unknown bounds from others, else by place, where the product of
+/// Index at which to split items: those of unknown bounds from others, else by place, where the product of
 /// power, area and solid angle is least. Sorts them.
 fn split(items: &mut [Item]) -> usize {
     let unknown = items.iter().take_while(|item| item.bounds.is_none()).count();

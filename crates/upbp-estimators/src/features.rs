@@ -22,10 +22,10 @@ pub struct Features {
 }
 
 impl Features {
-    /// Nothing is seen.
+    /// Features of a sub-path that sees nothing.
     pub const NONE: Self = Self { albedo: Spectrum::ZERO, normal: Vec3::ZERO, distance: None };
 
-    /// What a vertex looks like that a sub-path comes to from `from`, after `distance`.
+    /// Features of a vertex to which a sub-path comes from `from`, after `distance`.
     pub(crate) fn at<S: Scene>(
         scene: &S,
         interaction: &Interaction<S::Bsdf>,

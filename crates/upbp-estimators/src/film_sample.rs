@@ -15,7 +15,7 @@ pub struct CameraWalk {
     /// The part in `layers` that was met before the first vertex that scatters: seen directly, by mirrors and
     /// through glass. How bright it is depends on the place on the film alone, not on luck further on.
     pub seen: Spectrum,
-    /// What is seen first, if the plan [asks for it](crate::IterationPlan::features).
+    /// Features of what is seen first, if the plan [asks for them](crate::IterationPlan::features).
     pub features: Features,
 }
 

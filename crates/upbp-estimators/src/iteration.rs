@@ -202,7 +202,7 @@ impl IterationPlan {
         }
     }
 
-    /// This iteration with fewer light sub-paths, each of which counts for more, for pilot renders. Weights
+    /// The iteration with fewer light sub-paths, each of which counts for more, for pilot renders. Weights
     /// stay those of the whole number.
     #[must_use]
     pub fn thinned(&self, light_paths: u32, beam_paths: u32) -> Self {

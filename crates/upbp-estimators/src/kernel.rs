@@ -28,7 +28,7 @@ enum Shape {
 }
 
 impl Kernel {
-    /// Nothing is within reach: radius 0, of no effect in weights.
+    /// A kernel that nothing is within reach of: radius 0, of no effect in weights.
     pub const NONE: Self =
         Self { shape: Shape::Disc, radius: 0.0, peak: 0.0, falloff: 0.0, effective_volume: 0.0 };
 

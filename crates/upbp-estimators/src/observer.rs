@@ -30,7 +30,7 @@ pub struct ObservedVertex<B> {
     pub interaction: Interaction<B>,
     /// Whether it scattered by a Dirac lobe.
     pub delta: bool,
-    /// Its own probability to continue the walk, 1 without roulette.
+    /// Probability of the vertex to continue the walk, 1 without roulette.
     pub albedo: f32,
 }
 

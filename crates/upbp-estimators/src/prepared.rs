@@ -14,14 +14,14 @@ use crate::scene::{BoundingSphere, Camera, Emission, Emitter, EmitterId, Emitter
 pub struct PreparedScene<'a, S: Scene> {
     /// The scene.
     pub scene: &'a S,
-    /// Its bounds.
+    /// Bounding sphere of the scene.
     pub bounds: BoundingSphere,
     /// By power.
     power: Selection,
     /// By place and power; `None` where that tells nothing.
     tree: Option<EmitterTree>,
     choice: Arc<EmitterChoice>,
-    /// Of [`EmitterChoice::emission_bounds`].
+    /// Bounds of light sub-paths' starts, by [`EmitterChoice::emission_bounds`].
     emission_bounds: BoundingSphere,
     environments: Vec<EmitterId>,
     /// Bodies whose volume emits and where sub-paths begin, in order.
@@ -429,7 +429,7 @@ pub enum PrepareError {
     Power {
         /// Index of the emitter.
         emitter: usize,
-        /// Its power.
+        /// Power that it claims.
         power: f32,
     },
     /// The choice of emitters that a plan makes.

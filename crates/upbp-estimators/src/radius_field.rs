@@ -14,7 +14,7 @@ pub enum RadiusField {
     /// One everywhere.
     #[default]
     Uniform,
-    /// As the width of a pixel.
+    /// A factor like the width of a pixel.
     Footprint(FootprintField),
 }
 
@@ -23,7 +23,7 @@ pub enum RadiusField {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FootprintField {
-    /// Where the rays of the camera start, scene units.
+    /// Start of the camera's rays, scene units.
     pub eye: [f32; 3],
     /// Factor next to the eye.
     pub offset: f32,

@@ -61,7 +61,7 @@ enum Region {
 }
 
 impl Default for ReceiverShares {
-    /// Nothing learnt: the tree alone chooses.
+    /// Shares of which nothing is learnt: the tree alone chooses.
     fn default() -> Self {
         Self { nodes: vec![Region::Shares(Vec::new())] }
     }

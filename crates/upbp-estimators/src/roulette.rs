@@ -44,13 +44,13 @@ pub struct Survival {
 }
 
 impl Survival {
-    /// Of a camera sub-path that starts.
+    /// State of a camera sub-path that starts.
     #[must_use]
     pub const fn of_camera(roulette: Roulette) -> Self {
         Self { roulette, left: 1.0 }
     }
 
-    /// Of a light sub-path that starts.
+    /// State of a light sub-path that starts.
     #[must_use]
     pub const fn of_light(roulette: Roulette) -> Self {
         let roulette = match roulette {

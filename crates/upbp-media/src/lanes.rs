@@ -35,7 +35,7 @@ pub trait Lanes: Copy + Debug + PartialEq + Send + Sync + 'static {
     /// One in all lanes.
     const ONE: Self;
 
-    /// The same value in all lanes.
+    /// One value in all lanes.
     #[must_use]
     fn splat(value: f64) -> Self;
 

@@ -148,7 +148,7 @@ pub trait Medium: Send + Sync {
         None
     }
 
-    /// As [`segment`](Self::segment), with the densities of walks in each lane.
+    /// Transmittance and densities of a [`segment`](Self::segment), the densities for walks in each lane.
     fn segment_lanes(&self, segment: &RaySegment) -> SegmentDensity<[f64; 3]> {
         let SegmentDensity { transmittance, pass_probability, stop_at_end, stop_at_start } =
             self.segment(segment);
@@ -160,7 +160,7 @@ pub trait Medium: Send + Sync {
         }
     }
 
-    /// As [`sample_distance`](Self::sample_distance), for a walk in a lane.
+    /// Distance of a walk in one lane, as [`sample_distance`](Self::sample_distance) samples it.
     ///
     /// `u` are two uniform numbers in `[0, 1)`; the second decides, the first is there for media that need
     /// another, or more digits.

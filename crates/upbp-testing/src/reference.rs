@@ -140,7 +140,7 @@ impl Spread {
 pub struct Comparison {
     /// Mean of the picture.
     pub mean: [Estimate; 3],
-    /// Its difference to the reference in standard errors.
+    /// Difference to the reference in standard errors.
     pub sigmas: [f64; 3],
     /// Difference of the means of the picture in percent.
     pub percent: [f64; 3],

@@ -17,7 +17,7 @@ use crate::lanes::{WIDTH, Wide};
 pub(super) trait Block: Copy {
     /// A primitive.
     type Primitive: Copy;
-    /// What a ray is prepared with for this kind alone.
+    /// Values of a ray that only tests of this kind need, computed once per ray.
     type Prepared;
 
     const EMPTY: Self;

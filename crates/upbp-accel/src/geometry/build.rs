@@ -99,8 +99,8 @@ fn group_by_centre(boxes: &[Boxed]) -> (Vec<u32>, Vec<Group>) {
     (members.into_iter().map(|(_, index)| index).collect(), groups)
 }
 
-/// What a binary node and all below it become at least cost, by the number of children of a wide node that
-/// they may take up.
+/// Least costs of a binary node and all below it, by the number of children of a wide node that they may
+/// take up.
 #[derive(Clone, Copy)]
 struct Subtree {
     /// Cost with up to one, two, ... seven children.

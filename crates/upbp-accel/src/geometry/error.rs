@@ -15,7 +15,7 @@ pub enum GeometryError {
     NonFiniteElement {
         /// The kind of element.
         what: &'static str,
-        /// Its place in the list.
+        /// Index of the shape in the list.
         index: usize,
     },
     /// A shape encloses no volume or has no area.

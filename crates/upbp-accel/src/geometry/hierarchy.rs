@@ -16,7 +16,7 @@ pub(super) enum Kind {
     Triangle,
 }
 
-/// What is below a place in the hierarchy: a node, or a block with a number of primitives.
+/// A child of a node: another node, or a block with a number of primitives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Child(u32);
 
@@ -104,7 +104,7 @@ impl Node {
 #[derive(Clone, Debug)]
 pub(super) struct Hierarchy {
     pub(super) nodes: Vec<Node>,
-    /// Where rays start: the root, or all blocks of a small scene.
+    /// First items that rays test: the root, or all blocks of a small scene.
     pub(super) roots: Vec<Child>,
 }
 

@@ -214,7 +214,7 @@ fn touches(corners: [DVec3; 3], half: DVec3) -> bool {
     !is_between(edges[0].cross(edges[1])) && !across.any(is_between)
 }
 
-/// What is known of a cell.
+/// State of a cell during the division.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Unknown,

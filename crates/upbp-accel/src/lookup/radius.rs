@@ -8,7 +8,7 @@ use crate::ray::Ray;
 /// The radius of a search around a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SearchRadius {
-    /// The same everywhere, scene units.
+    /// One radius everywhere, scene units.
     Constant(f32),
     /// Growing with the distance from a point.
     Growing(GrowingRadius),

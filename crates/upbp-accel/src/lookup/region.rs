@@ -86,7 +86,7 @@ pub(super) struct Ball {
 }
 
 impl Ball {
-    /// For items whose test has no more rounding than that of their box.
+    /// A region for items whose test has no more rounding than that of their box.
     pub(super) fn exact(centre: Vec3, radius: f32) -> Self {
         Self { centre: centre.to_array(), radius2: radius * radius }
     }

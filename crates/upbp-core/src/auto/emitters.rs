@@ -258,7 +258,7 @@ struct Seen {
     emission: Vec<(u32, Contribution)>,
     /// By light and receiver.
     next_event: Vec<(LightEnd, Vec3, Contribution)>,
-    /// Where camera sub-paths were reflected or refracted in one direction.
+    /// Places where camera sub-paths were reflected or refracted in one direction.
     specular: Vec<Vec3>,
 }
 
@@ -277,7 +277,7 @@ struct Contribution {
 }
 
 impl Contribution {
-    /// As a sample of its emitter, which was chosen with a probability.
+    /// Turns the sample into one of its emitter, which was chosen with a probability.
     fn of(self, emitter: EmitterId, chosen: f64, scale: f64) -> EmitterSample {
         let others = chosen * (1.0 - self.weight) / self.weight;
         EmitterSample { emitter, light: scale * self.value, others }

@@ -76,7 +76,7 @@ pub(super) fn can_guide<S: Scene>(scene: &PreparedScene<'_, S>, techniques: Tech
     !techniques.without(TechniqueSet::PT).is_empty() && scene.scene.emitters().iter().enumerate().any(tells)
 }
 
-/// Where starts should pass: in the midst of the specular surfaces that camera sub-paths have met. `None`
+/// Point that guided starts should pass: amid the specular surfaces that camera sub-paths have met. `None`
 /// without light from infinity that comes from many directions: for any other the place on a disc does not
 /// depend on the direction.
 pub(super) fn focus<S: Scene>(scene: &PreparedScene<'_, S>, seen: &Evidence) -> Option<Vec3> {

@@ -98,7 +98,7 @@ pub(crate) fn choose<S: Scene>(
     }
 }
 
-/// As [`choose`], with walks in the lanes `L`.
+/// Chooses as [`choose`] does, with walks in the lanes `L`.
 fn choose_in<S: Scene, L: Lanes>(
     scene: &mut PreparedScene<'_, S>,
     settings: &CheckedSettings,

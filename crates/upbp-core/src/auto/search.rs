@@ -85,7 +85,7 @@ impl Judged {
         self.variance.iter().sum::<f64>() * self.cost
     }
 
-    /// This, unless the other's product is less: by [`GAIN`] for each time that it has a quarter of the light
+    /// Takes the other if its product is less: by [`GAIN`] for each time that it has a quarter of the light
     /// sub-paths.
     fn or_better(self, other: Self) -> Self {
         let needed = (1.0 - GAIN).powf(log4_path_ratio(&self.plan, &other.plan));

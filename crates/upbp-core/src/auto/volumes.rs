@@ -110,11 +110,11 @@ struct Light {
     hits: f64,
     /// Squares of single hits.
     squares: f64,
-    /// The same by all samples, those of next events included: a hit there would have been as bright.
+    /// Expected squares by all samples, those of next events included: a hit there would have been as bright.
     expected_squares: f64,
 }
 
-/// What a camera sub-path has seen.
+/// Light that a camera sub-path has seen.
 #[derive(Default)]
 struct Seen {
     all: f64,

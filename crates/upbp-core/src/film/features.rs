@@ -26,9 +26,9 @@ pub struct FeatureImages {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FeatureSums {
     albedo: Vec<Sum3>,
-    /// Of `(normal + 1) / 2`, since sums have no sign.
+    /// Sums of `(normal + 1) / 2`, since sums have no sign.
     normal: Vec<Sum3>,
-    /// Of distances, and of samples that have one.
+    /// Sums of distances, and of samples that have one.
     distance: Vec<Sum3>,
 }
 

@@ -19,7 +19,7 @@ pub enum LightPaths {
     /// this pays.
     #[default]
     Auto,
-    /// This many, within the memory budget.
+    /// A given number, within the memory budget.
     Count(u32),
 }
 

@@ -13,7 +13,7 @@ pub enum Techniques {
     /// The techniques that pay in the scene, with the numbers of samples that pay most ([`crate::Plan`]).
     #[default]
     Auto,
-    /// These, as far as the scene can use them.
+    /// A given set, as far as the scene can use it.
     Set(TechniqueSet),
 }
 

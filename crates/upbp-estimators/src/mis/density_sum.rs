@@ -10,13 +10,13 @@ use crate::technique::Technique;
 /// The recursion is linear in the counts, so it can carry the sum of all techniques (`f64`, what a render
 /// needs) or every technique for itself ([`ByTechnique`], from which the weights of any other counts follow).
 pub trait Densities: Copy + fmt::Debug + Send + Sync + Add<Output = Self> + Mul<f64, Output = Self> {
-    /// Of no technique.
+    /// Densities of no technique.
     const ZERO: Self;
 
-    /// Of one technique.
+    /// Densities of one technique.
     fn of(technique: Technique, density: f64) -> Self;
 
-    /// Of all together.
+    /// Density of all together.
     fn total(&self) -> f64;
 }
 
@@ -43,7 +43,7 @@ fn times(density: f64, factor: f64) -> f64 {
 /// Densities by technique.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ByTechnique {
-    /// Of each, by its number.
+    /// Density of each technique, by its number.
     pub of: [f64; Technique::ALL.len()],
 }
 
@@ -84,14 +84,14 @@ impl Densities for ByTechnique {
 /// A technique's density among those of all that can make the same path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weight<D = f64> {
-    /// Its own.
+    /// Density of the technique that made the sample.
     pub own: f64,
-    /// All, its own among them.
+    /// Densities of all techniques, that one among them.
     pub all: D,
 }
 
 impl<D: Densities> Weight<D> {
-    /// Of a technique that is the only one.
+    /// Densities of a technique that is the only one.
     #[inline]
     #[must_use]
     pub fn alone(technique: Technique) -> Self {

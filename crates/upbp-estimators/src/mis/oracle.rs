@@ -29,7 +29,7 @@ pub enum VertexKind {
 /// A vertex of a path; index 0 is on the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathVertex {
-    /// Its kind.
+    /// Kind of the vertex.
     pub kind: VertexKind,
     /// `ρL_i`: solid-angle density (Dirac: probability) of the light walk towards the camera's side, roulette
     /// included.
@@ -206,7 +206,7 @@ impl<L: Lanes> Path<L> {
         densities
     }
 
-    /// The same for any heroes: the sum over all pairs, each with its probability.
+    /// Densities for any heroes: the sum over all pairs, each with its probability.
     fn densities_of_all_heroes(&self, plan: &MisPlan) -> Vec<(Strategy, f64)> {
         let probability = |lane: usize| if L::COUNT == 1 { 1.0 } else { plan.lanes[lane] };
         let mut sums: Vec<(Strategy, f64)> = Vec::new();

@@ -56,7 +56,7 @@ pub(crate) fn correction(stack: &MediumStack, place: &[Crossing], earlier: &[Cro
     Some(Crossing { t: 0.0, entering: !place[i].entering, ..place[i] })
 }
 
-/// As [`correction`], for a ray that gets to infinity: what it never crossed it was not inside of.
+/// The [`correction`] for a ray that gets to infinity: what it never crossed it was not inside of.
 pub(crate) fn correction_of_escape(stack: &MediumStack, earlier: &[Crossing]) -> Option<Crossing> {
     let crossed = |body| earlier.iter().any(|other| other.interior.body == body);
     let interior = stack.bodies().find(|interior| !crossed(interior.body))?;

@@ -46,7 +46,7 @@ pub struct MediumSpan<L = f64> {
 pub struct EdgeTrace<B, L: Lanes = f64> {
     /// Start of the ray.
     pub origin: Vec3,
-    /// Its direction.
+    /// Direction of the ray, a unit vector.
     pub direction: Vec3,
     /// Stretches in order, adjoining, from 0 to the surface. With [`Extent::ToStop`] the one in which the
     /// walk stops is the last, and its end means nothing.

@@ -76,13 +76,13 @@ pub struct Scattered {
     pub weight: Spectrum,
     /// The vertex's own probability to continue the walk, 1 without roulette.
     pub albedo: f32,
-    /// As [`Evaluation::rho_own`]; for a Dirac lobe its probability.
+    /// Density as [`Evaluation::rho_own`]; for a Dirac lobe its probability.
     pub rho_own: f64,
-    /// As [`Evaluation::rho_opposite`]; for a Dirac lobe as in (4.6).
+    /// Density as [`Evaluation::rho_opposite`]; for a Dirac lobe as in (4.6).
     pub rho_opposite: f64,
-    /// As [`Evaluation::cos`].
+    /// Cosine as [`Evaluation::cos`].
     pub cos: f64,
-    /// As [`Evaluation::sin_theta`].
+    /// Sine as [`Evaluation::sin_theta`].
     pub sin_theta: f64,
     /// Whether the lobe is a Dirac.
     pub delta: bool,

@@ -84,7 +84,7 @@ pub struct Incident {
     pub towards_light: Vec3,
     /// Distance in scene units; infinite for an infinite emitter.
     pub distance: f32,
-    /// As [`Emission::radiance`], towards the receiver.
+    /// Radiance towards the receiver, as [`Emission::radiance`].
     pub radiance: Spectrum,
     /// `p_nee`: density of this choice, in the measure of [`Emission::pdf_position`] (area, 1, solid angle,
     /// or volume).
@@ -193,7 +193,7 @@ pub trait Emitter: Send + Sync {
     /// emitters the power that falls on the disc `π radius²`. Finite, not negative; zero is never chosen.
     fn power(&self, bounds: &BoundingSphere) -> f32;
 
-    /// Where the emitter is, and which way it shines. The default is an emitter of which that is unknown, or
+    /// Place of the emitter, and which way it shines. The default is an emitter of which that is unknown, or
     /// that is infinitely far away: all receivers then choose it equally often, unless it turns out where it
     /// is needed.
     fn bounds(&self, scene: &BoundingSphere) -> Option<EmitterBounds> {

@@ -74,11 +74,11 @@ pub enum Phase {
     Blend(Vec<(Positive, Phase)>),
     /// One for each channel.
     PerChannel {
-        /// Of the red channel.
+        /// Phase function of the red channel.
         r: Box<Phase>,
-        /// Of the green channel.
+        /// Phase function of the green channel.
         g: Box<Phase>,
-        /// Of the blue channel.
+        /// Phase function of the blue channel.
         b: Box<Phase>,
     },
 }

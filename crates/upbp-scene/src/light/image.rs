@@ -47,7 +47,7 @@ pub enum EnvironmentImageError {
         x: usize,
         /// Row, from 0 at the top.
         y: usize,
-        /// Its channels.
+        /// Channels of the pixel.
         value: [f32; 3],
     },
     /// Every pixel is black.

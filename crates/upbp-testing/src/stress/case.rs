@@ -107,7 +107,7 @@ pub(crate) enum View {
     OnWall,
     /// Between a slab and the plane above it; rays fall on the slab with this cosine.
     OnSlab(f64),
-    /// Here: where a photon is.
+    /// A camera on a photon, at this position.
     OnPhoton([f64; 3]),
 }
 
@@ -128,7 +128,7 @@ pub(crate) struct Axes {
     pub view: View,
     pub technique: &'static str,
     pub max_length: u32,
-    /// Of all kernels, relative to the scene's bounding sphere.
+    /// Radius of all kernels, relative to the scene's bounding sphere.
     pub radius: Option<f64>,
     pub long_photon_beams: bool,
 }

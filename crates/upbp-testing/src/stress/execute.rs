@@ -35,7 +35,7 @@ pub(crate) struct Render {
 }
 
 impl Render {
-    /// Of a scene that is black.
+    /// Result of a scene that is black.
     fn black(start: Instant) -> Self {
         Self {
             means: [Estimate::exactly(0.0); 3],

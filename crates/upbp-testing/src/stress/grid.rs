@@ -14,7 +14,7 @@ use crate::statistics::Estimate;
 /// A check of a case, besides those that are made always.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Check {
-    /// Nothing.
+    /// Only that all numbers are sane.
     Sane,
     /// Radiance 1, less what the limit of the length cuts.
     Furnace,

@@ -287,7 +287,7 @@ struct Pass {
     light: Vec<Recorder>,
     /// Recorders of camera sub-paths, by piece.
     camera: Vec<Recorder>,
-    /// The same of the partners of cells' pixels.
+    /// Recorders of the partners of cells' pixels, in the same order.
     partners: Vec<Recorder>,
     splats: Vec<(u32, Sample)>,
     counters: Counters,

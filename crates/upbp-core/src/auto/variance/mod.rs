@@ -123,7 +123,7 @@ impl Variance {
         self.with(&Counts::of(plan, &self.pilot))
     }
 
-    /// The same of blocks of pixels, times their pixels, mean over [sides](crate::film::BLOCK_SIDES) of
+    /// Variances of blocks of pixels, times their pixels, mean over [sides](crate::film::BLOCK_SIDES) of
     /// blocks: what pixels have in common counts once for each of them.
     pub(super) fn over_scales(&self, plan: &Plan) -> [f64; GROUPS] {
         let counts = Counts::of(plan, &self.pilot);
@@ -170,7 +170,7 @@ impl Variance {
     }
 }
 
-/// Not a number where no technique of a plan finds a path.
+/// Infinite instead of not a number, which it is where no technique of a plan finds a path.
 fn finite_or_infinite(variance: f64) -> f64 {
     if variance.is_finite() { variance } else { f64::INFINITY }
 }

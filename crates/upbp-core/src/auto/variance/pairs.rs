@@ -33,7 +33,7 @@ struct Seen {
     /// Weight relative to that in the pilot render, by the number of a roulette: walks get to it less often.
     rarity: [f32; COUNT],
     value: Vec3,
-    /// Its square, of as many samples as the plan has.
+    /// Square of the value, of as many samples as the plan has.
     square: f32,
     shares: [f32; TECHNIQUES],
 }
