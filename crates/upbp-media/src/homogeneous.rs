@@ -11,7 +11,7 @@
 use glam::Vec3;
 
 use crate::error::check_non_negative;
-use crate::mixture::channel_probabilities;
+use crate::mixture::{channel_probabilities, growth};
 use crate::{MediaError, Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 
 /// Floor of [`Medium::continuation`]: keeps the probability positive where hardly anything scatters. A
@@ -262,6 +262,16 @@ impl Medium for Homogeneous {
             Sampling::Chromatic { lanes, .. } => Some(lanes),
             Sampling::Never | Sampling::Grey => None,
         }
+    }
+
+    fn mixture_growth(&self) -> f64 {
+        let alpha = match self.sampling {
+            Sampling::Chromatic { alpha, .. } => alpha,
+            // Any mixture of equal channels is the one exponential.
+            Sampling::Never | Sampling::Grey => [1.0 / 3.0; 3],
+        };
+        let growth = |channel| growth(channel, &alpha, self.sigma_s, self.sigma_t);
+        (0..3).map(growth).fold(0.0, f64::max) / f64::from(self.continuation(Vec3::ZERO))
     }
 
     #[inline]

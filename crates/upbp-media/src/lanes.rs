@@ -269,16 +269,21 @@ impl Lanes for [f64; 3] {
 const LEAST_RATIO: f32 = 1.25;
 
 /// The probability of each lane to be the hero of a walk through `media`: equal shares for all lanes that
-/// differ in any of them, so that no channel's throughput exceeds the number of lanes. `None` if lanes differ
-/// nowhere by more than a small factor.
+/// differ in any of them, so that no channel's throughput exceeds the number of lanes. `None` if in all media
+/// lanes differ by a small factor only, or the [second moment](Medium::mixture_growth) of walks without them
+/// does not grow.
 #[must_use]
 pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
-    let lanes: Vec<_> = media.iter().filter_map(Medium::lane_extinctions).collect();
-    let largest = |medium: &Spectrum| (0..3).map(|lane| medium[lane]).fold(0.0, f32::max);
-    let least = |medium: &Spectrum| (0..3).map(|lane| medium[lane]).fold(f32::INFINITY, f32::min);
-    if lanes.iter().all(|medium| largest(medium) < LEAST_RATIO * least(medium)) {
+    let largest = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(0.0, f32::max);
+    let least = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(f32::INFINITY, f32::min);
+    let profits = |medium: &M| {
+        let differ = |lanes| largest(&lanes) >= LEAST_RATIO * least(&lanes);
+        medium.lane_extinctions().is_some_and(differ) && medium.mixture_growth() > 1.0
+    };
+    if !media.iter().any(profits) {
         return None;
     }
+    let lanes: Vec<_> = media.iter().filter_map(Medium::lane_extinctions).collect();
     let is_new =
         |lane: usize| (0..lane).all(|earlier| lanes.iter().any(|medium| medium[lane] != medium[earlier]));
     let drawn = [0, 1, 2].map(is_new);
@@ -352,6 +357,7 @@ mod tests {
         assert_eq!(of(&[medium([0.0; 3], [1.0, 1.1, 1.2])]), None, "hardly any difference");
         assert_eq!(of(&[medium([0.0; 3], [1.0, 4.0, 15.0])]), Some([third; 3]));
         assert_eq!(of(&[medium([0.0; 3], [1.0, 4.0, 1.0])]), Some([0.5, 0.5, 0.0]));
+        assert_eq!(of(&[medium([0.5, 0.1, 0.1], [0.1, 0.1, 0.2])]), None, "roulette ends walks sooner");
         // What only absorbs passes by the lane that gets farthest, if that is far enough.
         assert_eq!(of(&[medium([0.0, 0.0, 3.0], [1.0, 4.0, 0.0])]), Some([0.5, 0.5, 0.0]));
         assert_eq!(of(&[medium([0.0, 0.0, 0.5], [1.0, 4.0, 0.0])]), Some([third; 3]));

@@ -148,6 +148,14 @@ pub trait Medium: Send + Sync {
         None
     }
 
+    /// The largest factor, over the channels, by which the second moment of a walk grows per collision if all
+    /// its distances are drawn by [`sample_distance`](Self::sample_distance), roulette by
+    /// [`continuation`](Self::continuation) included (`docs/theory.md`, section 1.4). Up to one, walks need
+    /// no lanes, however long they are. The default, infinity, is for media of which it is unknown.
+    fn mixture_growth(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Transmittance and densities of a [`segment`](Self::segment), the densities for walks in each lane.
     fn segment_lanes(&self, segment: &RaySegment) -> SegmentDensity<[f64; 3]> {
         let SegmentDensity { transmittance, pass_probability, stop_at_end, stop_at_start } =

@@ -38,7 +38,7 @@ pub(crate) fn channel_probabilities(sigma_s: Spectrum, sigma_t: Spectrum) -> [f6
 }
 
 /// The second moment `M_c` of a channel, with the distance substituted by `u = 1 − e^{−σ_c t}`.
-fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum) -> f64 {
+pub(crate) fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum) -> f64 {
     let sigma = f64::from(sigma_t[channel]);
     let scattering = f64::from(sigma_s[channel]);
     if scattering == 0.0 {

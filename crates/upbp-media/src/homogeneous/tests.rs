@@ -367,6 +367,30 @@ fn roulette_follows_the_largest_albedo() {
     assert_eq!(at(&medium([0.0; 3], [0.0; 3])), MIN_CONTINUATION);
 }
 
+/// Squares of what a collision does to the throughput, over distances that are drawn.
+#[test]
+fn the_second_moment_grows_by_the_factor_that_is_told() {
+    const DRAWS: u32 = 1 << 17;
+    let mut random = Random(7);
+    for medium in [medium([0.1; 3], [0.9; 3]), medium([0.5, 0.1, 0.0], [1.0, 2.0, 4.0])] {
+        let survives = f64::from(medium.continuation(Vec3::ZERO));
+        let mut squares = [0.0; 3];
+        for _ in 0..DRAWS {
+            let endless = segment(0.0, f32::INFINITY);
+            let t =
+                medium.sample_distance(&endless, random.uniform(), random.uniform()).expect("a collision");
+            let density = medium.segment(&segment(0.0, t));
+            for (c, sum) in squares.iter_mut().enumerate() {
+                let scatters = f64::from(medium.sigma_s[c] * density.transmittance[c]);
+                *sum += (scatters / density.stop_at_end).powi(2) / survives;
+            }
+        }
+        let largest = squares.into_iter().fold(0.0, f64::max) / f64::from(DRAWS);
+        let told = medium.mixture_growth();
+        assert!((largest / told - 1.0).abs() < 0.02, "{medium:?}: {largest}, {told}");
+    }
+}
+
 #[test]
 fn mean_free_path_is_of_the_mean_extinction() {
     assert!((medium([0.5; 3], [0.5, 1.5, 2.5]).mean_free_path() - 0.5).abs() < 1e-6);
