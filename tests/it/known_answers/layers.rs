@@ -9,6 +9,8 @@ use upbp_testing::{Estimate, iterate, render, renderer};
 
 /// Part that merges may lose at boundaries, where a kernel sticks out of its medium.
 const BOUNDARY_LOSS: f64 = 0.005;
+/// What interpolation in the tables of rough glass may lose or add.
+const TABLES: f64 = 2e-3;
 /// Roundings of indices in the throughput of a path.
 const ROUNDING: f64 = 1e-5;
 /// Sets of techniques: camera sub-paths alone, connections, and everything.
@@ -187,31 +189,19 @@ fn rough_ball(alpha: f64, scattering: f64) -> ReadyScene {
     ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Facets scatter once, so that light is lost: the same share by all techniques, as the README of
-/// `upbp-scene` says.
+/// Facets lose nothing to each other: white by all techniques, up to the tables of what they send around.
 #[test]
-fn rough_glass_loses_what_is_said() {
-    let said = [
-        (0.01, [1.000, 0.999]),
-        (0.05, [0.993, 0.978]),
-        (0.1, [0.970, 0.931]),
-        (0.2, [0.890, 0.820]),
-        (0.3, [0.793, 0.718]),
-        (0.5, [0.614, 0.563]),
-        (0.7, [0.482, 0.456]),
-        (1.0, [0.355, 0.349]),
-    ];
-    for (alpha, shares) in said {
-        for (scattering, share) in [0.0, 2.0].into_iter().zip(shares) {
+fn rough_glass_is_white() {
+    for alpha in [0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0] {
+        for scattering in [0.0, 2.0] {
             let scene = rough_ball(alpha, scattering);
             for techniques in TECHNIQUES {
                 let iterations = if techniques == "all" { 24 } else { 64 };
                 let (found, _) = render(&scene, &settings(techniques), iterations);
                 let case = format!("alpha {alpha}, scattering {scattering}, {techniques}");
                 println!("{case}: {:.5} ± {:.5}", found.mean, found.error);
-                // The last digit of what is said, and what merges lose.
-                let slack = 1e-3 + if techniques == "all" { BOUNDARY_LOSS } else { 0.0 };
-                assert!((found.mean - share).abs() < 4.0 * found.error + slack, "{case}: {found:?}");
+                let slack = TABLES + if techniques == "all" { BOUNDARY_LOSS } else { 0.0 };
+                assert!((found.mean - 1.0).abs() < 4.0 * found.error + slack, "{case}: {found:?}");
             }
         }
     }

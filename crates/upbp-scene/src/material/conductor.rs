@@ -63,7 +63,7 @@ impl Bsdf for Conductor {
         let Some(half) = Self::half_vector(towards_light, towards_camera) else {
             return Spectrum::ZERO;
         };
-        let (eta_outside, _) = indices(towards_light, interface);
+        let [eta_outside, _] = indices(towards_light, interface);
         let reflectance = self.fresnel.reflectance(towards_light.dot(half).abs().min(1.0), eta_outside);
         let value = self.normals.density(half)
             * self.normals.shadowing_masking(towards_light, towards_camera)
@@ -90,7 +90,7 @@ impl Bsdf for Conductor {
         if pdf <= 0.0 || !pdf.is_finite() {
             return None;
         }
-        let (eta_outside, _) = indices(from, interface);
+        let [eta_outside, _] = indices(from, interface);
         let reflectance = self.fresnel.reflectance(above.dot(normal).clamp(0.0, 1.0), eta_outside);
         let unmasked = self.normals.shadowing_masking(from, to) / self.normals.masking(from);
         Some(BsdfSample {

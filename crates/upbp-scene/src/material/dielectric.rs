@@ -32,7 +32,7 @@ impl Bsdf for Dielectric {
         if from.z == 0.0 {
             return None;
         }
-        let (eta_from, eta_to) = indices(from, interface);
+        let [eta_from, eta_to] = indices(from, interface);
         let refraction = refraction(from.z.abs(), eta_from, eta_to);
         // Fresnel's shares are the same for the reversed path, so both densities are.
         if u_lobe < refraction.reflectance {

@@ -18,8 +18,8 @@ pub(super) fn continuation_by_albedo(albedo: Spectrum) -> f32 {
 }
 
 /// The indices of refraction on the side of `from` and on the other side.
-pub(super) fn indices(from: Vec3, interface: Interface) -> (f32, f32) {
-    if from.z > 0.0 { (interface.above, interface.below) } else { (interface.below, interface.above) }
+pub(super) fn indices(from: Vec3, interface: Interface) -> [f32; 2] {
+    if from.z > 0.0 { [interface.above, interface.below] } else { [interface.below, interface.above] }
 }
 
 /// The mirror image of a direction about z.

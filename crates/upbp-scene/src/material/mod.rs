@@ -9,6 +9,7 @@ mod fresnel;
 mod lambert;
 mod local;
 mod mirror;
+mod multiple_scattering;
 mod phong;
 mod rough_dielectric;
 mod trowbridge_reitz;

@@ -1,4 +1,5 @@
-//! The rough surface of a transparent body: small smooth interfaces with Trowbridge-Reitz normals.
+//! The rough surface of a transparent body: small smooth interfaces with Trowbridge-Reitz normals, and the
+//! light that they send to [each other](super::multiple_scattering).
 //!
 //! Source: Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007, equations 20
 //! and 21. Equation 21 compresses radiance: `f(l, c) / η_c² = f(c, l) / η_l²`.
@@ -9,6 +10,7 @@ use upbp_media::Spectrum;
 
 use super::fresnel::refraction;
 use super::local::indices;
+use super::multiple_scattering::Lobe;
 use super::trowbridge_reitz::TrowbridgeReitz;
 
 /// Relative difference of indices below which the surface passes light straight, whatever its
@@ -37,14 +39,7 @@ struct Facet {
 
 impl RoughDielectric {
     /// The facet that scatters from one direction to the other; none if its back would be seen.
-    fn facet(from: Vec3, to: Vec3, interface: Interface) -> Option<Facet> {
-        if from.z == 0.0 || to.z == 0.0 {
-            return None;
-        }
-        let (eta_from, eta_to) = indices(from, interface);
-        if is_matched(eta_from, eta_to) {
-            return None;
-        }
+    fn facet(from: Vec3, to: Vec3, [eta_from, eta_to]: [f32; 2]) -> Option<Facet> {
         let reflects = from.z * to.z > 0.0;
         let half = if reflects { from + to } else { eta_from * from + eta_to * to }.try_normalize()?;
         let normal = half * (half.z * from.z).signum();
@@ -63,8 +58,8 @@ impl RoughDielectric {
         Some(Facet { normal, reflectance, reflects, denominator: sum * sum })
     }
 
-    /// Value on the way from `from` to `to`, without the index that compresses radiance.
-    fn symmetric_value(self, from: Vec3, to: Vec3, facet: &Facet) -> f32 {
+    /// Value of single scattering, without the index that compresses radiance.
+    fn single_value(self, from: Vec3, to: Vec3, facet: &Facet) -> f32 {
         let spread = self.normals.density(facet.normal) * self.normals.shadowing_masking(from, to)
             / (from.z * to.z).abs();
         if facet.reflects {
@@ -74,37 +69,99 @@ impl RoughDielectric {
             (1.0 - facet.reflectance) * spread * cosines / facet.denominator
         }
     }
+
+    /// Density of single scattering.
+    fn single_pdf(self, from: Vec3, to: Vec3, facet: &Facet, eta_to: f32) -> f32 {
+        let visible = self.normals.visible_density(from, facet.normal);
+        let cos_to = to.dot(facet.normal).abs();
+        if facet.reflects {
+            facet.reflectance * visible / (4.0 * cos_to)
+        } else {
+            (1.0 - facet.reflectance) * visible * eta_to * eta_to * cos_to / facet.denominator
+        }
+    }
+
+    /// Value without the index that compresses radiance, and density; both zero at the horizon.
+    fn value_and_pdf(self, from: Vec3, to: Vec3, eta: [f32; 2]) -> [f32; 2] {
+        if from.z == 0.0 || to.z == 0.0 {
+            return [0.0; 2];
+        }
+        let [mut value, mut pdf] = Self::facet(from, to, eta).map_or([0.0; 2], |facet| {
+            [self.single_value(from, to, &facet), self.single_pdf(from, to, &facet, eta[1])]
+        });
+        if !(value.is_finite() && pdf.is_finite()) {
+            [value, pdf] = [0.0; 2];
+        }
+        if let Some(lobe) = Lobe::new(self.normals, eta) {
+            let share = lobe.share(from.z);
+            value += lobe.symmetric_value(from.z, to.z);
+            pdf = (1.0 - share) * pdf + share * lobe.pdf(from.z, to.z);
+        }
+        [value, pdf]
+    }
+
+    /// Draws a direction by single scattering.
+    fn sample_single(
+        self,
+        from: Vec3,
+        [eta_from, eta_to]: [f32; 2],
+        u_lobe: f32,
+        u: [f32; 2],
+    ) -> Option<Vec3> {
+        let side = Vec3::new(1.0, 1.0, from.z.signum());
+        let above = from * side;
+        let normal = self.normals.sample_visible(above, u)?;
+        let cos_from = above.dot(normal).clamp(0.0, 1.0);
+        let reflects = u_lobe < refraction(cos_from, eta_from, eta_to).reflectance;
+        Some(scattered(above, normal, [eta_from, eta_to], reflects)? * side)
+    }
+
+    /// The parts of the light from a direction with the cosine `mu` that a facet, drawn among those which it
+    /// sees, reflects and refracts out of the surface; `eta` is the index beyond over that on this side.
+    pub(super) fn scattered_once(self, mu: f32, eta: f32, u: [f32; 2]) -> [f32; 2] {
+        let above = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
+        let Some(normal) = self.normals.sample_visible(above, u) else { return [0.0; 2] };
+        let reflectance = refraction(above.dot(normal).clamp(0.0, 1.0), 1.0, eta).reflectance;
+        let leaves = |reflects| {
+            let to = scattered(above, normal, [1.0, eta], reflects);
+            to.map_or(0.0, |to| self.normals.shadowing_masking(above, to) / self.normals.masking(above))
+        };
+        [reflectance * leaves(true), (1.0 - reflectance) * leaves(false)]
+    }
 }
 
-fn is_matched(eta_from: f32, eta_to: f32) -> bool {
+/// The direction into which a facet reflects or refracts light from `above`, which has a positive z; none if
+/// that is not the side which such light has to leave to.
+fn scattered(above: Vec3, normal: Vec3, [eta_from, eta_to]: [f32; 2], reflects: bool) -> Option<Vec3> {
+    let cos_from = above.dot(normal).clamp(0.0, 1.0);
+    let to = if reflects {
+        2.0 * cos_from * normal - above
+    } else {
+        let ratio = eta_from / eta_to;
+        let cos_transmitted = refraction(cos_from, eta_from, eta_to).cos_transmitted;
+        (ratio * cos_from - cos_transmitted) * normal - ratio * above
+    };
+    to.try_normalize().filter(|to| to.z != 0.0 && (to.z > 0.0) == reflects)
+}
+
+fn is_matched([eta_from, eta_to]: [f32; 2]) -> bool {
     (eta_from - eta_to).abs() < MATCHED * eta_to
 }
 
 impl Bsdf for RoughDielectric {
     fn eval(&self, towards_light: Vec3, towards_camera: Vec3, interface: Interface) -> Spectrum {
-        let Some(facet) = Self::facet(towards_light, towards_camera, interface) else {
+        let eta @ [_, eta_camera] = indices(towards_light, interface);
+        if is_matched(eta) {
             return Spectrum::ZERO;
-        };
-        let value = self.symmetric_value(towards_light, towards_camera, &facet);
-        let (eta_camera, _) = indices(towards_camera, interface);
-        let compression = if facet.reflects { 1.0 } else { eta_camera * eta_camera };
-        let value = value * compression;
-        Spectrum::splat(if value.is_finite() { value } else { 0.0 })
+        }
+        let [value, _] = self.value_and_pdf(towards_light, towards_camera, eta);
+        let passes = towards_light.z * towards_camera.z < 0.0;
+        Spectrum::splat(value * compression(passes, eta_camera))
     }
 
     fn pdf(&self, from: Vec3, to: Vec3, interface: Interface) -> f32 {
-        let Some(facet) = Self::facet(from, to, interface) else {
-            return 0.0;
-        };
-        let (_, eta_to) = indices(from, interface);
-        let visible = self.normals.visible_density(from, facet.normal);
-        let cos_to = to.dot(facet.normal).abs();
-        let pdf = if facet.reflects {
-            facet.reflectance * visible / (4.0 * cos_to)
-        } else {
-            (1.0 - facet.reflectance) * visible * eta_to * eta_to * cos_to / facet.denominator
-        };
-        if pdf.is_finite() { pdf } else { 0.0 }
+        let eta = indices(from, interface);
+        if is_matched(eta) { 0.0 } else { self.value_and_pdf(from, to, eta)[1] }
     }
 
     fn sample(
@@ -118,8 +175,8 @@ impl Bsdf for RoughDielectric {
         if from.z == 0.0 {
             return None;
         }
-        let (eta_from, eta_to) = indices(from, interface);
-        if is_matched(eta_from, eta_to) {
+        let eta @ [eta_from, eta_to] = indices(from, interface);
+        if is_matched(eta) {
             return Some(BsdfSample {
                 to: -from,
                 weight: Spectrum::ONE,
@@ -128,34 +185,21 @@ impl Bsdf for RoughDielectric {
                 delta: true,
             });
         }
-        let side = Vec3::new(1.0, 1.0, from.z.signum());
-        let above = from * side;
-        let normal = self.normals.sample_visible(above, u)?;
-        let cos_from = above.dot(normal).clamp(0.0, 1.0);
-        let refraction = refraction(cos_from, eta_from, eta_to);
-        let reflects = u_lobe < refraction.reflectance;
-        let local = if reflects {
-            2.0 * cos_from * normal - above
-        } else {
-            let ratio = eta_from / eta_to;
-            (ratio * cos_from - refraction.cos_transmitted) * normal - ratio * above
+        let lobe = Lobe::new(self.normals, eta);
+        let share = lobe.as_ref().map_or(0.0, |lobe| lobe.share(from.z));
+        let to = match lobe {
+            Some(lobe) if u_lobe < share => lobe.sample(from, u_lobe / share, u),
+            _ => self.sample_single(from, eta, (u_lobe - share) / (1.0 - share), u)?,
         };
-        let to = local.try_normalize()? * side;
-        if (to.z * from.z > 0.0) != reflects {
-            return None;
-        }
-        let pdf = self.pdf(from, to, interface);
+        let [value, pdf] = self.value_and_pdf(from, to, eta);
         if pdf <= 0.0 {
             return None;
         }
-        let compression = match walk {
-            Walk::Camera if !reflects => (eta_from / eta_to).powi(2),
-            _ => 1.0,
-        };
-        let unmasked = self.normals.shadowing_masking(from, to) / self.normals.masking(from);
-        Some(BsdfSample {
+        let eta_camera = if walk == Walk::Camera { eta_from } else { eta_to };
+        let weight = value * compression(from.z * to.z < 0.0, eta_camera) * to.z.abs() / pdf;
+        weight.is_finite().then(|| BsdfSample {
             to,
-            weight: Spectrum::splat(compression * unmasked),
+            weight: Spectrum::splat(weight),
             pdf,
             pdf_reverse: self.pdf(to, from, interface),
             delta: false,
@@ -165,4 +209,9 @@ impl Bsdf for RoughDielectric {
     fn is_connectible(&self) -> bool {
         true
     }
+}
+
+/// What radiance gains where it passes to the side of the camera.
+fn compression(passes: bool, eta_camera: f32) -> f32 {
+    if passes { eta_camera * eta_camera } else { 1.0 }
 }

@@ -64,7 +64,7 @@ fn directions() -> impl Iterator<Item = Vec3> {
 
 /// Mean weight of samples: the share of the light that is scattered.
 fn albedo(material: &Material, from: Vec3, walk: Walk, interface: Interface) -> Spectrum {
-    let count = 20_000;
+    let count = 40_000;
     points(count)
         .filter_map(|(u_lobe, u)| material.sample(from, walk, interface, u_lobe, u))
         .map(|sample| sample.weight)
@@ -100,12 +100,18 @@ fn smooth_glass_loses_none_either() {
     }
 }
 
+/// What facets send to each other is interpolated from tables, worst at the horizon.
 #[test]
-fn slightly_rough_glass_loses_little() {
-    let glass = Material::RoughDielectric(RoughDielectric { normals: TrowbridgeReitz { alpha: 0.05 } });
-    for from in directions().filter(|from| from.z.abs() > 0.4) {
-        let albedo = albedo(&glass, from, Walk::Light, INTERFACES[1]);
-        assert!(albedo.r() > 0.98, "{from}: {albedo:?}");
+fn rough_glass_loses_nothing() {
+    for alpha in [0.003, 0.02, 0.05, 0.1, 0.17, 0.3, 0.4, 0.6, 0.85, 1.0] {
+        let glass = Material::RoughDielectric(RoughDielectric { normals: TrowbridgeReitz { alpha } });
+        for (above, below) in [(1.0, 1.5), (1.33, 1.0), (1.5, 1.33), (1.0, 1.05), (2.4, 1.0), (9.0, 0.2)] {
+            for from in directions() {
+                let albedo = albedo(&glass, from, Walk::Light, Interface { above, below }).r();
+                let allowed = if from.z.abs() < 0.1 { 0.04 } else { 0.012 };
+                assert!((albedo - 1.0).abs() < allowed, "{alpha}, {above} : {below}, {from}: {albedo}");
+            }
+        }
     }
 }
 
