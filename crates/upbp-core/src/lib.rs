@@ -21,8 +21,8 @@ pub use auto::technique_support::TechniqueSupport;
 pub use budget::{Canceller, Preparing, Stop};
 pub use error::{OutputError, RenderError, SettingsError, StateError};
 pub use files::{
-    Content, Output, check_outputs, check_writable, open_exr, open_file, read_text, remove_leftovers,
-    write_text,
+    Content, Output, abandon_files, check_outputs, check_writable, open_exr, open_file, read_text,
+    remove_leftovers, write_text,
 };
 pub use film::{
     Doubt, ErrorEstimate, ErrorMap, FeatureImages, Film, HalfImage, Image, IterationSet, MAX_ITERATIONS,

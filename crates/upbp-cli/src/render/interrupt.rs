@@ -1,6 +1,6 @@
 //! SIGINT, SIGTERM and SIGHUP: the first ends the render in order, the second ends the program.
 
-use upbp_core::Canceller;
+use upbp_core::{Canceller, abandon_files};
 
 use crate::exit::AT_ONCE;
 
@@ -11,6 +11,7 @@ pub(crate) fn install() -> Result<Canceller, ctrlc::Error> {
     ctrlc::set_handler(move || {
         if render.is_cancelled() {
             // A file in hand is written beside its place: the file that was there stays whole.
+            abandon_files();
             std::process::exit(AT_ONCE.into());
         }
         render.cancel();

@@ -171,17 +171,18 @@ fn a_signal_saves_and_says_try_again() {
     assert_eq!(unfinished(&folder), 0);
 }
 
+/// Whether it has asked for SIGINT and SIGTERM.
+#[cfg(target_os = "linux")]
+fn listens(child: &Child) -> bool {
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("it is there");
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a known name");
+    let caught = u64::from_str_radix(caught.trim(), 16).expect("a mask");
+    [2, 15].iter().all(|signal| caught >> (signal - 1) & 1 == 1)
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_second_signal_ends_at_once() {
-    /// Whether it has asked for SIGINT and SIGTERM.
-    fn listens(child: &Child) -> bool {
-        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("it is there");
-        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a known name");
-        let caught = u64::from_str_radix(caught.trim(), 16).expect("a mask");
-        [2, 15].iter().all(|signal| caught >> (signal - 1) & 1 == 1)
-    }
-
     let folder = prepared("second");
     // Iterations that take long, and a cancellation that has to wait for a row of pixels.
     let scene = SMALL.replace("width: 8", "width: 4000").replace("sigma_s: 0.5", "sigma_s: (500, 500, 500)");
@@ -203,6 +204,32 @@ fn a_second_signal_ends_at_once() {
     // Both may arrive as one, or the first may have been enough.
     assert!(matches!(code, Some(130 | 75)), "{code:?}: {text}");
     assert_eq!(unfinished(&folder), 0);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_second_signal_while_it_writes_leaves_nothing_unfinished() {
+    let folder = prepared("writing");
+    // Enough pixels for a file to be seen while it is written.
+    let scene = SMALL.replace("width: 8", "width: 1000").replace("height: 8", "height: 1000");
+    fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
+    for _ in 0..5 {
+        let mut child =
+            render(&folder, &["--techniques", "pt", "-o", "a.exr"]).spawn().expect("the program runs");
+        wait_until(&mut child, "it renders", |child| listens(child) && used(child) > 0.5);
+        signal(&child, "TERM");
+        while unfinished(&folder) == 0 && child.try_wait().expect("a status").is_none() {
+            sleep(Duration::from_millis(1));
+        }
+        signal(&child, "INT");
+        let (code, text) = end(&child.wait_with_output().expect("it ends"));
+        assert!(matches!(code, Some(130 | 75)), "{code:?}: {text}");
+        assert_eq!(unfinished(&folder), 0);
+        if code == Some(130) {
+            return;
+        }
+    }
+    panic!("no signal came while it wrote");
 }
 
 #[test]

@@ -7,4 +7,4 @@ mod whole;
 pub use input::{open_exr, open_file, read_text};
 pub use paths::{Content, Output, check_outputs};
 pub(crate) use whole::write_whole;
-pub use whole::{check_writable, remove_leftovers, write_text};
+pub use whole::{abandon_files, check_writable, remove_leftovers, write_text};

@@ -4,6 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::error::OutputError;
@@ -29,8 +30,7 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
         }
         let target = target(path)?;
         check_not_protected(&target)?;
-        let (temporary, _) = create_beside(&target)?;
-        fs::remove_file(temporary)
+        Unfinished::beside(&target).map(drop)
     };
     check().map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
@@ -50,20 +50,13 @@ pub(crate) fn write_whole(
     }
     let target = target(path).map_err(fail)?;
     check_not_protected(&target).map_err(fail)?;
-    let (temporary, file) = create_beside(&target).map_err(fail)?;
-    let written = (|| {
-        let mut writer = BufWriter::new(file);
-        content(&mut writer)?;
-        let file = writer.into_inner().map_err(|error| fail(error.into_error()))?;
-        file.sync_all().map_err(fail)?;
-        fs::rename(&temporary, &target).map_err(fail)?;
-        sync_folder(&target).map_err(fail)
-    })();
-    if written.is_err() {
-        // Best effort: the first error is the one to report. After the move there is nothing to remove.
-        let _ = fs::remove_file(&temporary);
-    }
-    written
+    let (unfinished, file) = Unfinished::beside(&target).map_err(fail)?;
+    let mut writer = BufWriter::new(file);
+    content(&mut writer)?;
+    let file = writer.into_inner().map_err(|error| fail(error.into_error()))?;
+    file.sync_all().map_err(fail)?;
+    unfinished.move_to(&target).map_err(fail)?;
+    sync_folder(&target).map_err(fail)
 }
 
 /// Writes a text as a whole or not at all.
@@ -75,6 +68,17 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
         let fail = |source| OutputError::Write { path: path.to_owned(), source };
         writer.write_all(text.as_bytes()).map_err(fail)
     })
+}
+
+/// Removes the files that this process has not finished, for one that is about to end. No file is written
+/// after that: who tries waits for the end of the process.
+pub fn abandon_files() {
+    let unfinished = unfinished_files();
+    for path in unfinished.iter() {
+        // Best effort: there is nobody left to tell.
+        let _ = fs::remove_file(path);
+    }
+    std::mem::forget(unfinished);
 }
 
 /// Removes what processes that were killed while they wrote `path` have left beside it, once it is an hour
@@ -134,12 +138,41 @@ pub(super) fn folder(path: &Path) -> &Path {
     }
 }
 
-/// A new file in the same folder, so that moving is a rename. Its name is one that no other process chooses,
-/// on this machine or on another that shares the folder.
-fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
-    let temporary = beside(path, mark())?;
-    let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-    Ok((temporary, file))
+/// Files that are being written.
+static UNFINISHED_FILES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished_files() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED_FILES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A new file in the folder of another, so that moving is a rename. Removed if it is not moved.
+struct Unfinished(PathBuf);
+
+impl Unfinished {
+    /// Creates a file under a name that no other process chooses, on this machine or on another that shares
+    /// the folder.
+    fn beside(path: &Path) -> io::Result<(Self, File)> {
+        let temporary = beside(path, mark())?;
+        let mut files = unfinished_files();
+        let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+        files.push(temporary.clone());
+        Ok((Self(temporary), file))
+    }
+
+    fn move_to(self, target: &Path) -> io::Result<()> {
+        // Not while all are abandoned.
+        let _files = unfinished_files();
+        fs::rename(&self.0, target)
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        let mut files = unfinished_files();
+        files.retain(|path| *path != self.0);
+        // Best effort: the first error is the one to report. After the move there is nothing to remove.
+        let _ = fs::remove_file(&self.0);
+    }
 }
 
 /// Whether the file system takes two names in one folder for the same, as where case does not count: it is
@@ -207,13 +240,13 @@ mod tests {
         assert_eq!(files(&folder), ["a.txt"]);
 
         // Of others' files and of young ones nothing is removed.
-        let (young, _) = create_beside(&path).unwrap();
-        let (old, file) = create_beside(&path).unwrap();
+        let (young, _) = Unfinished::beside(&path).unwrap();
+        let (old, file) = Unfinished::beside(&path).unwrap();
         file.set_modified(std::time::SystemTime::now() - 2 * LEFTOVER).unwrap();
         let other = folder.join("a.txt.mine.part");
         File::create(&other).unwrap().set_modified(std::time::UNIX_EPOCH).unwrap();
         remove_leftovers(&path);
-        assert!(young.exists() && other.exists() && path.exists() && !old.exists());
+        assert!(young.0.exists() && other.exists() && path.exists() && !old.0.exists());
         fs::remove_dir_all(&folder).unwrap();
     }
 
