@@ -14,8 +14,9 @@ use crate::plan::Plan;
 use crate::radius::Radius;
 use crate::settings::{CheckedSettings, LightPaths};
 
-/// Numbers of light sub-paths, relative to the full plan's.
-const LIGHT_PATHS: [f64; 3] = [0.0625, 0.25, 1.0];
+/// Numbers of light sub-paths, relative to the full plan's: more than one per pixel where what matters is
+/// found by them alone, as what the sun throws through water is.
+const LIGHT_PATHS: [f64; 5] = [0.0625, 0.25, 1.0, 4.0, 16.0];
 /// Numbers of light sub-paths with beams, relative to the full plan's.
 const BEAM_PATHS: [f64; 2] = [0.25, 1.0];
 /// Period of queries that only some iterations make.
@@ -26,8 +27,8 @@ const SAFEGUARD_OVERHEAD: f64 = 1.05;
 /// All plans that may be chosen: whatever settings do not fix.
 #[derive(Clone, Debug)]
 pub(super) struct Candidates {
-    /// All techniques, all light sub-paths, the widest radius: what pilot renders run, since they can tell
-    /// what less of anything would do.
+    /// All techniques, a light sub-path per pixel if there is room, the widest radius: what pilot renders
+    /// run, since they can tell what less of anything, or more light sub-paths, would do.
     pub(super) full: Plan,
     /// Techniques that stay on: some paths may have no other.
     always: TechniqueSet,
@@ -42,17 +43,19 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// The candidates beside a full plan.
+    /// The candidates beside a full plan, with at most `most` light sub-paths if these are more than its own.
     pub(super) fn new<S: Scene>(
         scene: &PreparedScene<'_, S>,
         settings: &CheckedSettings,
         support: &TechniqueSupport,
         statistics: &Statistics,
         full: Plan,
+        most: u32,
     ) -> Self {
         let counts = |full: u32, parts: &[f64], is_fixed: bool| {
             let count = |part: &f64| ((f64::from(full) * part) as u32).max(1);
-            if is_fixed { vec![full] } else { parts.iter().map(count).collect() }
+            let is_possible = |count: &u32| *count <= full.max(most);
+            if is_fixed { vec![full] } else { parts.iter().map(count).filter(is_possible).collect() }
         };
         let usual = full.radii.surf;
         let widest = if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };

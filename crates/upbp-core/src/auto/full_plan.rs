@@ -31,7 +31,8 @@ const LIGHT_TIME: f64 = 0.05;
 /// kernel that is small for the scene holds all that is lit, an iteration would never end.
 const CROWD: f64 = 1024.0;
 
-/// A plan with all of `techniques`, and with as many light sub-paths as settings, memory and time allow.
+/// A plan with all of `techniques`, and with a light sub-path per pixel, or as many as settings, memory and
+/// time allow.
 pub(super) fn full_plan<S: Scene>(
     scene: &PreparedScene<'_, S>,
     settings: &CheckedSettings,
@@ -45,12 +46,7 @@ pub(super) fn full_plan<S: Scene>(
     let wanted = match settings.light_paths {
         LightPaths::Count(count) => count,
         LightPaths::Auto => {
-            let in_time = budget
-                .stop
-                .seconds
-                .filter(|_| statistics.light_path_seconds > 0.0)
-                .map_or(f64::INFINITY, |seconds| LIGHT_TIME * seconds / statistics.light_path_seconds);
-            let most = in_time.min(crowding(scene, settings, techniques, statistics));
+            let most = in_time(statistics, budget).min(crowding(scene, settings, techniques, statistics));
             (most as u32).clamp(1, pixels)
         }
     };
@@ -63,6 +59,28 @@ pub(super) fn full_plan<S: Scene>(
     let part = (room.light_bytes as f64 / need.max(1.0)).min(1.0);
     let afford = |count: u32| ((f64::from(count) * part) as u32).max(1);
     plan_with(scene, settings, techniques, statistics, [wanted, wanted_beams].map(afford))
+}
+
+/// The most light sub-paths that memory and time allow, and that do not crowd kernels.
+pub(super) fn most_light_paths<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    statistics: &Statistics,
+    full: &Plan,
+    room: &Room,
+    budget: &Budget<'_>,
+) -> u32 {
+    // Beams are no more than in the full plan: so this is a little less than what there is room for.
+    let need = LightCounts::of(full, statistics).peak_bytes::<S::Bsdf>();
+    let in_room = f64::from(full.light_paths) * room.light_bytes as f64 / need.max(1.0);
+    let most = in_time(statistics, budget).min(crowding(scene, settings, full.techniques, statistics));
+    most.min(in_room) as u32
+}
+
+/// Light sub-paths that are traced in the part of a limit of time that is theirs in an iteration.
+fn in_time(statistics: &Statistics, budget: &Budget<'_>) -> f64 {
+    let seconds = budget.stop.seconds.filter(|_| statistics.light_path_seconds > 0.0);
+    seconds.map_or(f64::INFINITY, |seconds| LIGHT_TIME * seconds / statistics.light_path_seconds)
 }
 
 /// A plan with given numbers of light sub-paths, and of those with beams.

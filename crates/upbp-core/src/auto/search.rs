@@ -10,6 +10,10 @@ use crate::plan::Plan;
 
 /// Part of the product that a step must gain. Predictions are noisy, and the least of many is so by chance.
 pub(super) const GAIN: f64 = 0.05;
+/// Part of the product that four times as many light sub-paths as usual must gain. They leave less time for
+/// camera sub-paths, of whose variance stratification over iterations takes away more than a prediction
+/// knows.
+const GAIN_OF_MORE: f64 = 0.2;
 
 /// The best candidate that small steps from some sensible ones lead to.
 pub(super) struct Found {
@@ -40,11 +44,13 @@ impl Found {
 pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let cost = Cost::of(variance.pilot());
     let mut judge = Judge { variance, cost, known: Vec::new() };
+    let usual = candidates.full.light_paths;
     let [camera, paths, everything] = candidates.starts().map(|start| {
         let end = descend(&mut judge, start, candidates);
-        judge.judge(&candidates.light_paths(&end.plan)).into_iter().fold(end, Judged::or_better)
+        let counts = judge.judge(&candidates.light_paths(&end.plan));
+        counts.into_iter().fold(end, |a, b| a.or_better(b, usual))
     });
-    let least = camera.or_better(paths).or_better(everything);
+    let least = camera.or_better(paths, usual).or_better(everything, usual);
     let (gain, error) = least.gain_over(&camera);
     let best = if camera.plan.uses_light_paths() || !(gain <= error) { least } else { camera };
     let plan = finished(candidates.with_safeguard(best.plan, cost));
@@ -86,9 +92,11 @@ impl Judged {
     }
 
     /// Takes the other if its product is less: by [`GAIN`] for each time that it has a quarter of the light
-    /// sub-paths.
-    fn or_better(self, other: Self) -> Self {
-        let needed = (1.0 - GAIN).powf(log4_path_ratio(&self.plan, &other.plan));
+    /// sub-paths, up to the usual number, and by [`GAIN_OF_MORE`] for each time that it has four times as
+    /// many beyond it.
+    fn or_better(self, other: Self, usual: u32) -> Self {
+        let [fewer, more] = log4_path_ratios(&self.plan, &other.plan, usual);
+        let needed = (1.0 - GAIN).powf(fewer) * (1.0 - GAIN_OF_MORE).powf(-more);
         if other.product() < needed * self.product() { other } else { self }
     }
 
@@ -118,10 +126,15 @@ impl Judged {
     }
 }
 
-/// Light sub-paths of a plan over those of another, as a power of four; 0 unless both have some.
-fn log4_path_ratio(plan: &Plan, other: &Plan) -> f64 {
+/// Light sub-paths of a plan over those of another, as powers of four: of those up to `usual` each, 0 unless
+/// both have some, and of those beyond.
+fn log4_path_ratios(plan: &Plan, other: &Plan, usual: u32) -> [f64; 2] {
+    let count = |plan: &Plan| if plan.uses_light_paths() { plan.light_paths } else { usual };
     let both = plan.uses_light_paths() && other.uses_light_paths();
-    if both { (f64::from(plan.light_paths) / f64::from(other.light_paths)).log(4.0) } else { 0.0 }
+    let ratio = |a: u32, b: u32| (f64::from(a) / f64::from(b)).log(4.0);
+    let [count, others] = [plan, other].map(count);
+    let fewer = if both { ratio(count.min(usual), others.min(usual)) } else { 0.0 };
+    [fewer, ratio(count.max(usual), others.max(usual))]
 }
 
 /// Predictions of candidates, each made once.
@@ -184,14 +197,14 @@ mod tests {
     }
 
     #[test]
-    fn fewer_light_sub_paths_must_gain_more() {
+    fn other_numbers_of_light_sub_paths_must_gain_more() {
         let with = |techniques, light_paths, cost| {
             let judged = judged([1.0; GROUPS], cost);
             Judged { plan: Plan { techniques, light_paths, ..judged.plan }, ..judged }
         };
         let chosen = |a: Judged, b: Judged| {
-            let better = a.or_better(b);
-            assert_eq!(better.cost, b.or_better(a).cost, "whichever comes first");
+            let better = a.or_better(b, 1600);
+            assert_eq!(better.cost, b.or_better(a, 1600).cost, "whichever comes first");
             better.cost
         };
         let gain = 1.0 - GAIN;
@@ -199,6 +212,14 @@ mod tests {
         for (fewer, needed) in [(400, gain), (100, gain * gain)] {
             assert_eq!(chosen(all, with(TechniqueSet::BPT, fewer, 1.01 * needed)), 1.0);
             assert_eq!(chosen(all, with(TechniqueSet::BPT, fewer, 0.99 * needed)), 0.99 * needed);
+        }
+        // So must more than usual.
+        let gain = 1.0 - GAIN_OF_MORE;
+        for (more, needed) in [(6400, gain), (25600, gain * gain)] {
+            for other in [all, with(TechniqueSet::PT, 100, 1.0)] {
+                assert_eq!(chosen(other, with(TechniqueSet::BPT, more, 1.01 * needed)), 1.0);
+                assert_eq!(chosen(other, with(TechniqueSet::BPT, more, 0.99 * needed)), 0.99 * needed);
+            }
         }
         // What has none is compared as it is.
         assert_eq!(chosen(all, with(TechniqueSet::PT, 100, 0.99)), 0.99);
