@@ -93,6 +93,7 @@ impl AxisBox {
 
     /// Distances and faces at which the line enters and leaves. A face is `2·axis`, plus one on the upper
     /// side.
+    #[inline(always)]
     pub(super) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[(f64, u32); 2]> {
         let direction = direction.as_dvec3();
         let low = self.min.as_dvec3() - origin.as_dvec3();

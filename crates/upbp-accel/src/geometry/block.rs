@@ -7,8 +7,8 @@
 use glam::{DVec3, Vec3};
 
 use super::axis_box::AxisBox;
-use super::lane_ray::{LaneRay, Planes, ROUNDING, SLAB_ROUNDING};
-use super::quad::Quad;
+use super::lane_ray::{LaneRay, Planes, ROUNDING, SLAB_ROUNDING, SlabRay};
+use super::quad::{Plane, Quad};
 use super::sphere::Sphere;
 use super::triangle::RayShear;
 use crate::lanes::{WIDTH, Wide};
@@ -156,17 +156,14 @@ impl Block for Quads {
     };
 
     fn set(&mut self, lane: usize, quad: Quad) {
-        let [edge_u, edge_v] = [quad.edge_u(), quad.edge_v()].map(Vec3::as_dvec3);
-        let normal = edge_u.cross(edge_v);
-        let scale = normal.length_squared().recip();
-        let to_uv = [edge_v.cross(normal) * scale, normal.cross(edge_u) * scale];
+        let Plane { normal, to_uv } = *quad.plane();
         let put = |to: &mut [[f32; WIDTH]; 3], v: DVec3| {
             for axis in 0..3 {
                 to[axis][lane] = v[axis] as f32;
             }
         };
         put(&mut self.corner, quad.origin().as_dvec3());
-        put(&mut self.normal, normal * scale.sqrt());
+        put(&mut self.normal, normal.normalize());
         for (i, row) in to_uv.into_iter().enumerate() {
             put(&mut self.to_uv[i], row);
             // Denormal components have lost their digits.
@@ -174,7 +171,8 @@ impl Block for Quads {
             let known = (1e-30..1e30).contains(&size);
             self.size[i][lane] = if known { 2.0 * size as f32 } else { f32::INFINITY };
         }
-        self.diameter[lane] = 2.0 * (edge_u.abs() + edge_v.abs()).element_sum() as f32;
+        let edges = quad.edge_u().as_dvec3().abs() + quad.edge_v().as_dvec3().abs();
+        self.diameter[lane] = 2.0 * edges.element_sum() as f32;
     }
 
     /// Tests `t·cos` and the coordinates of the point in the plane, times `cos`, with `cos` made positive: a
@@ -290,7 +288,7 @@ impl Block for AxisBoxes {
     #[inline(always)]
     fn may_meet<W: Wide>(&self, wide: W, ray: &LaneRay<W>, (): &(), t_max: f32) -> u32 {
         let (start, end) = (wide.splat(f32::NEG_INFINITY), wide.splat(f32::INFINITY));
-        let [entry, exit] = ray.slabs(wide, &self.0, start, end);
+        let [entry, exit] = SlabRay::new(wide, ray).slabs(wide, &self.0, start, end);
         let (less, more) = (wide.splat(1.0 - SLAB_ROUNDING), wide.splat(1.0 + SLAB_ROUNDING));
         let (tiny, t_max) = (wide.splat(f32::MIN_POSITIVE), wide.splat(t_max));
         // Least and greatest distances, for such as are not negative.

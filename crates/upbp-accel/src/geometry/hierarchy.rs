@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::lane_ray::{LaneRay, Planes, SLAB_ROUNDING};
+use super::lane_ray::{LaneRay, Planes, SLAB_ROUNDING, SlabRay};
 use crate::lanes::{WIDTH, Wide, set_lanes};
 
 /// Kind of the primitives in a block.
@@ -131,26 +131,43 @@ impl Hierarchy {
         mut t_max: f32,
         mut visitor: impl Visitor,
     ) {
-        let mut roots = self.roots.iter();
+        for &root in &self.roots {
+            let end = if root.is_block() {
+                visitor.visit(wide, ray, root.as_block(), &mut t_max)
+            } else {
+                let slabs = SlabRay::new(wide, ray);
+                self.descend::<IN_ORDER, W>(root, wide, (ray, &slabs), &mut t_max, &mut visitor)
+            };
+            if end.is_break() {
+                return;
+            }
+        }
+    }
+
+    /// As [`traverse`](Self::traverse), below the node `root`.
+    #[inline(always)]
+    fn descend<const IN_ORDER: bool, W: Wide>(
+        &self,
+        root: Child,
+        wide: W,
+        (ray, slabs): (&LaneRay<W>, &SlabRay<W>),
+        t_max: &mut f32,
+        visitor: &mut impl Visitor,
+    ) -> ControlFlow<()> {
         let mut stack = Stack::new();
-        let mut next = None;
+        let mut next = Some(Entry::new(0.0, root));
         loop {
             let child = match next.take().or_else(|| stack.pop()) {
-                Some(entry) if entry.distance() * (1.0 - SLAB_ROUNDING) > t_max => continue,
+                Some(entry) if entry.distance() * (1.0 - SLAB_ROUNDING) > *t_max => continue,
                 Some(entry) => entry.child(),
-                None => match roots.next() {
-                    Some(&root) => root,
-                    None => return,
-                },
+                None => return ControlFlow::Continue(()),
             };
             if child.is_block() {
-                if visitor.visit(wide, ray, child.as_block(), &mut t_max).is_break() {
-                    return;
-                }
+                visitor.visit(wide, ray, child.as_block(), t_max)?;
                 continue;
             }
             let node = &self.nodes[child.index()];
-            let [near, far] = ray.slabs(wide, &node.boxes, ray.t_min, wide.splat(t_max));
+            let [near, far] = slabs.slabs(wide, &node.boxes, ray.t_min, wide.splat(*t_max));
             let far = wide.mul(far, wide.splat(1.0 + SLAB_ROUNDING));
             let far = wide.add(far, wide.splat(f32::MIN_POSITIVE));
             let met = wide.less_equal(near, far) & node.existing;

@@ -15,6 +15,11 @@ pub(super) struct LaneRay<W: Wide> {
     pub(super) origin: [W::F; 3],
     pub(super) direction: [W::F; 3],
     pub(super) t_min: W::F,
+}
+
+/// A ray in every lane, prepared for the slabs of boxes.
+pub(super) struct SlabRay<W: Wide> {
+    origin: [W::F; 3],
     inverse: [W::F; 3],
     /// Axes along which the direction is negative, as 0 or 1.
     negative: [usize; 3],
@@ -26,14 +31,20 @@ pub(super) type Planes = [[[f32; crate::lanes::WIDTH]; 2]; 3];
 impl<W: Wide> LaneRay<W> {
     #[inline(always)]
     pub(super) fn new(wide: W, ray: &Ray) -> Self {
-        let inverse = ray.direction.recip().to_array();
         Self {
             origin: wide.splat3(ray.origin.to_array()),
             direction: wide.splat3(ray.direction.to_array()),
             t_min: wide.splat(ray.t_min),
-            inverse: wide.splat3(inverse),
-            negative: [inverse[0], inverse[1], inverse[2]].map(|x| usize::from(x.is_sign_negative())),
         }
+    }
+}
+
+impl<W: Wide> SlabRay<W> {
+    #[inline(always)]
+    pub(super) fn new(wide: W, ray: &LaneRay<W>) -> Self {
+        let (zero, one) = (wide.splat(0.0), wide.splat(1.0));
+        let inverse = ray.direction.map(|x| wide.div(one, x));
+        Self { origin: ray.origin, inverse, negative: inverse.map(|x| usize::from(wide.less(x, zero) != 0)) }
     }
 
     /// The distances at which the ray enters and leaves each box, or its ends where they are nearer, each

@@ -14,6 +14,16 @@ pub struct Quad {
     edge_v: Vec3,
     normal: Vec3,
     area: f32,
+    plane: Plane,
+}
+
+/// The plane of a quad with its coordinates, in double precision, as intersections ask for them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Plane {
+    /// `edge_u × edge_v`.
+    pub(super) normal: DVec3,
+    /// The map from points relative to the corner to coordinates on the quad, per scene unit.
+    pub(super) to_uv: [DVec3; 2],
 }
 
 impl Quad {
@@ -28,7 +38,10 @@ impl Quad {
         if area <= 1e-7 * edge_u.as_dvec3().length() * edge_v.as_dvec3().length() {
             return Err(GeometryError::Degenerate { what: "a quad" });
         }
-        Ok(Self { origin, edge_u, edge_v, normal: (cross / area).as_vec3(), area: area as f32 })
+        let scale = cross.length_squared().recip();
+        let to_uv = [edge_v.as_dvec3().cross(cross) * scale, cross.cross(edge_u.as_dvec3()) * scale];
+        let plane = Plane { normal: cross, to_uv };
+        Ok(Self { origin, edge_u, edge_v, normal: (cross / area).as_vec3(), area: area as f32, plane })
     }
 
     pub(super) fn translated(self, by: Vec3) -> Self {
@@ -59,6 +72,10 @@ impl Quad {
         self.normal
     }
 
+    pub(super) fn plane(&self) -> &Plane {
+        &self.plane
+    }
+
     /// Surface area, square scene units.
     #[must_use]
     pub fn area(&self) -> f32 {
@@ -66,6 +83,7 @@ impl Quad {
     }
 
     /// A point distributed uniformly over the surface, and the normal; `u` in `[0, 1)²`.
+    #[inline]
     #[must_use]
     pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         let position = self.origin.as_dvec3()
@@ -77,11 +95,8 @@ impl Quad {
     /// The random numbers with which [`sample_area`](Self::sample_area) draws `point`, a point of the quad.
     #[must_use]
     pub fn area_coordinates(&self, point: Vec3) -> [f32; 2] {
-        let [edge_u, edge_v] = [self.edge_u, self.edge_v].map(Vec3::as_dvec3);
         let from_corner = point.as_dvec3() - self.origin.as_dvec3();
-        let normal = edge_u.cross(edge_v);
-        let scale = normal.length_squared().recip();
-        [from_corner.cross(edge_v), edge_u.cross(from_corner)].map(|part| (part.dot(normal) * scale) as f32)
+        self.plane.to_uv.map(|row| row.dot(from_corner) as f32)
     }
 
     /// The least and the greatest coordinates, rounded outwards.
@@ -97,13 +112,13 @@ impl Quad {
     /// The distance at which the line meets the quad, and the coordinates of that point on the quad.
     ///
     /// In double precision, so that neighbours have no gap beyond the difference of their corners.
+    #[inline(always)]
     pub(super) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<(f64, [f32; 2])> {
-        let [edge_u, edge_v] = [self.edge_u, self.edge_v].map(Vec3::as_dvec3);
+        let Plane { normal, to_uv } = &self.plane;
         let direction = direction.as_dvec3();
         let to_corner = self.origin.as_dvec3() - origin.as_dvec3();
-        let normal = edge_u.cross(edge_v);
-        let cosine = direction.dot(normal);
-        let height = to_corner.dot(normal);
+        let cosine = direction.dot(*normal);
+        let height = to_corner.dot(*normal);
         // A ray that starts in the plane does not meet it.
         let zero = 1e-26 * to_corner.length_squared() * normal.length_squared();
         if cosine == 0.0 || height * height <= zero {
@@ -111,9 +126,7 @@ impl Quad {
         }
         let t = height / cosine;
         let from_corner = direction * t - to_corner;
-        let scale = normal.length_squared().recip();
-        let u = from_corner.cross(edge_v).dot(normal) * scale;
-        let v = edge_u.cross(from_corner).dot(normal) * scale;
+        let [u, v] = to_uv.map(|row| row.dot(from_corner));
         let inside = (0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v);
         inside.then_some((t, [u as f32, v as f32]))
     }

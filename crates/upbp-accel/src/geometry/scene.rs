@@ -112,6 +112,7 @@ impl SceneGeometry {
     ///
     /// # Panics
     /// If the candidate does not belong to this scene.
+    #[inline]
     #[must_use]
     pub fn surface(&self, ray: &Ray, candidate: &Candidate) -> SurfacePoint {
         let along = ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(candidate.t);
@@ -145,6 +146,7 @@ impl SceneGeometry {
     ///
     /// # Panics
     /// If the candidate does not belong to this scene.
+    #[inline]
     #[must_use]
     pub fn is_entering(&self, ray: &Ray, candidate: &Candidate) -> bool {
         let normal = match self.shape(candidate.shape) {

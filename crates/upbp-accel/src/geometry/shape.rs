@@ -35,6 +35,7 @@ impl Shape {
     /// Draws a point uniformly over the surface; returns it with the geometric normal.
     ///
     /// `u` is uniform in `[0, 1)²`; the density is `1 / area()` per square scene unit.
+    #[inline]
     #[must_use]
     pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         match self {

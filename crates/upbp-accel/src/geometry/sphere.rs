@@ -91,6 +91,7 @@ impl Sphere {
     ///
     /// In double precision: with single precision a small sphere far away is missed, and the roots of a
     /// large one are off by more than the offset of secondary rays.
+    #[inline(always)]
     pub(super) fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<[f64; 2]> {
         let direction = direction.as_dvec3();
         let from_centre = origin.as_dvec3() - self.centre.as_dvec3();
