@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::emission_guide::EmissionGuide;
 use crate::emitter_tree::EmitterTree;
+use crate::random::Decision;
 use crate::receiver_shares::ReceiverShares;
 use crate::scene::{BoundingSphere, EmitterId};
 
@@ -43,16 +44,29 @@ impl EmitterChoice {
         })
     }
 
-    /// Chooses an emitter for `receiver` by two numbers in `[0, 1)`; with its probability.
+    /// Chooses an emitter for `receiver`; with its probability.
+    #[inline]
     pub(crate) fn next_event(
         &self,
         tree: Option<&EmitterTree>,
         receiver: Vec3,
+        decision: Decision,
+    ) -> Option<(EmitterId, f32)> {
+        match (&self.receivers, tree) {
+            (Some(shares), Some(tree)) => {
+                self.next_event_by_receiver(shares, tree, receiver, decision.pair())
+            }
+            _ => self.next_event.choose_by(decision),
+        }
+    }
+
+    fn next_event_by_receiver(
+        &self,
+        shares: &ReceiverShares,
+        tree: &EmitterTree,
+        receiver: Vec3,
         [u, fine]: [f32; 2],
     ) -> Option<(EmitterId, f32)> {
-        let (Some(shares), Some(tree)) = (&self.receivers, tree) else {
-            return self.next_event.choose(f64::from(u));
-        };
         // The second number begins where the first one ends: there may be a million emitters.
         let u = f64::from(u) + f64::from(fine) / f64::from(STEPS);
         let emitter = if u < EVERYWHERE {
@@ -230,6 +244,15 @@ impl Selection {
         let weights: Vec<f64> =
             (0..count).map(|i| trust * light(i) / sum + (1.0 - trust) * power(i)).collect();
         Self::new(&weights)
+    }
+
+    /// As [`choose`](Self::choose), by a number that is only asked for if there is a choice.
+    #[inline]
+    fn choose_by(&self, decision: Decision) -> Option<(EmitterId, f32)> {
+        if self.cumulative == [STEPS] {
+            return Some((EmitterId(0), 1.0));
+        }
+        self.choose(f64::from(decision.uniform()))
     }
 
     pub(crate) fn choose(&self, u: f64) -> Option<(EmitterId, f32)> {

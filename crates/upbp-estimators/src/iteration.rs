@@ -3,7 +3,8 @@
 use upbp_media::{Medium, MediumId};
 
 use crate::kernel::Kernel;
-use crate::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
+use crate::mis::{BeamExtent, Heuristic, MergeKind, MisPlan, VolumeMerges};
+use crate::path::Interaction;
 use crate::periods::MergePeriods;
 use crate::radius_field::RadiusField;
 use crate::roulette::Roulette;
@@ -70,6 +71,8 @@ pub struct IterationPlan {
     pub active: TechniqueSet,
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
+    /// Whether any of the techniques merges.
+    pub merges: bool,
     /// Whether camera sub-paths tell the [`Features`](crate::Features) of what they see first.
     pub features: bool,
 }
@@ -198,6 +201,7 @@ impl IterationPlan {
             periods,
             active: techniques.intersection(periods.active(choices.seed, choices.iteration)),
             mis,
+            merges,
             features: false,
         }
     }
@@ -245,6 +249,18 @@ impl IterationPlan {
         self.mis.merges_in(medium).of(technique) > 0.0 && self.active.has(technique)
     }
 
+    /// The merges that a path with this sine between its lines takes part in at a vertex, where kernel radii
+    /// have some scale.
+    #[inline]
+    pub(crate) fn merge_kind<B>(&self, vertex: &Interaction<B>, sin_theta: f64, scale: f32) -> MergeKind {
+        let scale = f64::from(scale);
+        match vertex {
+            _ if !self.merges => MergeKind::None,
+            Interaction::Surface(_) => MergeKind::Surface { scale },
+            Interaction::Medium(medium) => MergeKind::Medium { medium: *medium, sin_theta, scale },
+        }
+    }
+
     /// Factor of a photon in a merge: one over the number of light sub-paths, times the period of its
     /// queries.
     #[inline]
@@ -253,11 +269,10 @@ impl IterationPlan {
         self.periods.period(technique) as f32 / paths as f32
     }
 
-    /// Whether camera sub-paths are query beams beyond where they stop.
+    /// Whether camera sub-paths are query beams.
     #[must_use]
-    pub fn has_long_query_beams(&self) -> bool {
-        self.mis.query_beams == BeamExtent::Long
-            && (self.merges_by(Technique::Pb2d) || self.merges_by(Technique::Bb1d))
+    pub fn has_query_beams(&self) -> bool {
+        self.merges_by(Technique::Pb2d) || self.merges_by(Technique::Bb1d)
     }
 
     /// Whether light sub-paths are of any use.

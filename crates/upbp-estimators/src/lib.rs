@@ -35,7 +35,7 @@ pub use light_map::LightMap;
 pub use periods::MergePeriods;
 pub use prepared::{PrepareError, PreparedScene};
 pub use radius_field::{FootprintField, RadiusField};
-pub use random::{Stream, StreamKind, half};
+pub use random::{Decision, Stream, StreamKind, half};
 pub use roulette::{Roulette, Survival};
 pub use technique::{Layer, PerMerge, Technique, TechniqueSet, UnknownTechnique};
 pub use upbp_accel::{Ray, offset_origin};

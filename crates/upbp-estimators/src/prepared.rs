@@ -7,6 +7,7 @@ use upbp_media::{BodyId, Lanes, Medium, MediumStack, RaySegment, SegmentDensity}
 use crate::emission_guide::EmissionGuide;
 use crate::emitter_choice::{EmitterChoice, EmitterSample, EmitterShares, Selection};
 use crate::emitter_tree::EmitterTree;
+use crate::random::Decision;
 use crate::receiver_shares::{ClusterSample, ReceiverShares};
 use crate::scene::{BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, Scene};
 
@@ -306,8 +307,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 
     /// Chooses the emitter of a next event at `receiver`; returns its probability. `None` without light.
     #[must_use]
-    pub fn choose_next_event(&self, receiver: glam::Vec3, u: [f32; 2]) -> Option<(EmitterId, f32)> {
-        self.choice.next_event(self.tree.as_ref(), receiver, u)
+    pub fn choose_next_event(&self, receiver: glam::Vec3, decision: Decision) -> Option<(EmitterId, f32)> {
+        self.choice.next_event(self.tree.as_ref(), receiver, decision)
     }
 
     /// The probability of [`choose_next_event`](Self::choose_next_event); 0 if the emitter does not exist.

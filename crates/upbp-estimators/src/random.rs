@@ -44,7 +44,7 @@ pub enum StreamKind {
 /// A stream of uniform random numbers.
 #[derive(Clone, Debug)]
 pub struct Stream {
-    /// Number of the point in the sequences that this stream shares with others.
+    /// Number of the point in the sequences that this stream shares with others, the lowest bit first.
     point: u32,
     /// Key of all streams that are stratified among each other.
     family: u64,
@@ -79,31 +79,31 @@ impl Stream {
         // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in
         // common.
         let rest = Xoshiro256PlusPlus::seed_from_u64(mix(mix(common ^ of_iteration) ^ of_index));
-        Self { point, family, draws: 0, from_sequences, rest }
+        Self { point: point.reverse_bits(), family, draws: 0, from_sequences, rest }
+    }
+
+    /// The next decision: numbers that may not be needed.
+    #[inline]
+    pub fn decide(&mut self) -> Decision {
+        self.draws += 1;
+        if self.draws <= self.from_sequences {
+            let key = self.family.wrapping_add(u64::from(self.draws).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            Decision::InSequences { point: self.point, key }
+        } else {
+            Decision::Alone(self.rest.next_u64())
+        }
     }
 
     /// Uniform in `[0, 1)`, a multiple of 2⁻²⁴.
     #[inline]
     pub fn uniform(&mut self) -> f32 {
-        match self.next_decision() {
-            Some(key) => to_unit(scramble(order(self.point, key).reverse_bits(), (key >> 32) as u32)),
-            None => to_unit((self.rest.next_u64() >> 32) as u32),
-        }
+        self.decide().uniform()
     }
 
     /// Two uniform numbers in `[0, 1)`, stratified together.
+    #[inline]
     pub fn pair(&mut self) -> [f32; 2] {
-        if let Some(key) = self.next_decision() {
-            let point = order(self.point, key);
-            let other = key.wrapping_mul(0xd1b5_4a32_d192_ed03) >> 32;
-            [
-                to_unit(scramble(point.reverse_bits(), (key >> 32) as u32)),
-                to_unit(scramble(sobol(point), other as u32)),
-            ]
-        } else {
-            let bits = self.rest.next_u64();
-            [to_unit((bits >> 32) as u32), to_unit(bits as u32)]
-        }
+        self.decide().pair()
     }
 
     /// Uniform in `0..count`; 0 if `count` is 0.
@@ -120,13 +120,53 @@ impl Stream {
         // Not a random number where there is nothing to decide.
         if part > 0.0 { whole + u32::from(self.uniform() < part) } else { whole }
     }
+}
 
-    /// The key of the next decision, while decisions come from the sequences.
+/// Random numbers of a [`Stream`] that are computed only when they are asked for: often nothing depends on
+/// them, as where there is but one light to choose.
+#[derive(Clone, Copy, Debug)]
+pub enum Decision {
+    /// A point of the sequences.
+    InSequences {
+        /// The number of the point, the lowest bit first.
+        point: u32,
+        /// Key of the order and the scrambles, before it is mixed.
+        key: u64,
+    },
+    /// Random bits beyond the sequences.
+    Alone(u64),
+}
+
+impl Decision {
+    /// Uniform in `[0, 1)`, a multiple of 2⁻²⁴: the first of the [pair](Self::pair).
     #[inline]
-    fn next_decision(&mut self) -> Option<u64> {
-        self.draws += 1;
-        (self.draws <= self.from_sequences)
-            .then(|| mix(self.family.wrapping_add(u64::from(self.draws).wrapping_mul(0x9e37_79b9_7f4a_7c15))))
+    #[must_use]
+    pub fn uniform(self) -> f32 {
+        match self {
+            Self::InSequences { point, key } => {
+                let key = mix(key);
+                to_unit(scramble(order(point, key), (key >> 32) as u32).reverse_bits())
+            }
+            Self::Alone(bits) => to_unit((bits >> 32) as u32),
+        }
+    }
+
+    /// Two uniform numbers in `[0, 1)`, stratified together.
+    #[must_use]
+    pub fn pair(self) -> [f32; 2] {
+        let bits = match self {
+            Self::InSequences { point, key } => {
+                let key = mix(key);
+                let point = order(point, key);
+                let first = scramble(point, (key >> 32) as u32);
+                let other = key.wrapping_mul(0xd1b5_4a32_d192_ed03) >> 32;
+                let second = scramble(sobol(point), other as u32);
+                // Both at once.
+                (u64::from(second) << 32 | u64::from(first)).reverse_bits()
+            }
+            Self::Alone(bits) => bits,
+        };
+        [to_unit((bits >> 32) as u32), to_unit(bits as u32)]
     }
 }
 
@@ -137,41 +177,45 @@ pub const fn half(iteration: u64) -> (usize, u64) {
     ((iteration % 2) as usize, iteration / 2)
 }
 
+#[inline]
 fn to_unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// The number of the point that takes the place of `point`: a permutation that keeps aligned blocks of 2ᵏ
-/// together.
+/// The number of the point that takes the place of `point`, whose lowest bit comes first: a permutation that
+/// keeps aligned blocks of 2ᵏ together.
+#[inline]
 fn order(point: u32, key: u64) -> u32 {
-    scramble(point, key as u32)
+    scramble(point, key as u32).reverse_bits()
 }
 
-/// Owen scrambling: every bit is flipped or not by a hash of the bits above it.
-fn scramble(bits: u32, seed: u32) -> u32 {
-    // A hash in which each bit depends on lower ones only (Laine and Karras, constants after Vegdahl), on
-    // reversed bits.
-    let mut x = bits.reverse_bits();
+/// Owen scrambling: every bit is flipped or not by a hash of the bits below it. So numbers come, and leave,
+/// with the bit that counts most at the bottom.
+///
+/// The hash is that of Laine and Karras, with constants after Vegdahl.
+#[inline]
+fn scramble(mut x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(seed);
     x = x.wrapping_mul((seed >> 16) | 1);
     x ^= x.wrapping_mul(0x0552_6c56);
-    x ^= x.wrapping_mul(0x53a2_2864);
-    x.reverse_bits()
+    x ^ x.wrapping_mul(0x53a2_2864)
 }
 
-/// The second dimension of the Sobol sequence; the first is the reversal of the bits. Its matrix is Pascal's
-/// triangle modulo two, a Kronecker power of 2 × 2 matrices: one butterfly per bit of the bit number.
+/// The second dimension of the Sobol sequence, the bit that counts most at the bottom; the first is the
+/// number of the point itself. Its matrix is Pascal's triangle modulo two, a Kronecker power of 2 × 2
+/// matrices: one butterfly per bit of the bit number.
+#[inline]
 fn sobol(point: u32) -> u32 {
-    let mut x = point.reverse_bits();
-    x ^= (x & 0x0000_ffff) << 16;
-    x ^= (x & 0x00ff_00ff) << 8;
-    x ^= (x & 0x0f0f_0f0f) << 4;
-    x ^= (x & 0x3333_3333) << 2;
-    x ^= (x & 0x5555_5555) << 1;
-    x
+    let mut x = point;
+    x ^= x >> 16;
+    x ^= (x >> 8) & 0x00ff_00ff;
+    x ^= (x >> 4) & 0x0f0f_0f0f;
+    x ^= (x >> 2) & 0x3333_3333;
+    x ^ ((x >> 1) & 0x5555_5555)
 }
 
+#[inline]
 fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -198,9 +242,9 @@ mod tests {
     #[test]
     fn butterflies_are_the_direction_numbers() {
         for i in 0..32 {
-            assert_eq!(sobol(1 << i), sobol_by_definition(1 << i), "bit {i}");
+            assert_eq!(sobol(1 << i).reverse_bits(), sobol_by_definition(1 << i), "bit {i}");
         }
-        assert_eq!(sobol(0xdead_beef), sobol_by_definition(0xdead_beef));
+        assert_eq!(sobol(0xdead_beef).reverse_bits(), sobol_by_definition(0xdead_beef));
     }
 
     #[test]
@@ -296,6 +340,19 @@ mod tests {
                 (after(first), after(other))
             });
             assert!(z.abs() < 4.5, "correlation of {z} standard deviations after {draws} draws");
+        }
+    }
+
+    #[test]
+    fn what_nobody_asks_for_changes_nothing() {
+        let mut asked = Stream::new(7, 4, StreamKind::Camera, 3);
+        let mut lazy = asked.clone();
+        for draw in 0..2 * STRATIFIED_DRAWS {
+            let (first, second) = (asked.pair(), lazy.decide());
+            if draw % 3 == 0 {
+                assert_eq!(first, second.pair(), "draw {draw}");
+                assert_eq!(first[0], second.uniform(), "draw {draw}");
+            }
         }
     }
 

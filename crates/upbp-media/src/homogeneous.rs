@@ -212,7 +212,7 @@ fn sample_exponential(segment: &RaySegment, sigma: f32, u_distance: f32, rest: f
     let u_distance = f64::from(u_distance) + rest * LAST_BIT;
     // 1 − u is in (0, 1], so that the logarithm is finite. A channel without extinction gives ∞, or 0/0 for u
     // = 0: both fail the comparison and pass.
-    let free_path = -f64::ln_1p(-u_distance) / f64::from(sigma);
+    let free_path = -f64::ln(1.0 - u_distance) / f64::from(sigma);
     (free_path < segment.length_f64()).then(|| {
         // Whether the walk stops is decided above, in double precision, as `segment` reports it; the rounding
         // of the position must not undo it on a short segment far from the origin.

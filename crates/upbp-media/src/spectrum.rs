@@ -110,7 +110,8 @@ impl Spectrum {
     #[inline]
     #[must_use]
     pub fn is_black(self) -> bool {
-        self.0 == Vec3::ZERO
+        // Not all at once: of most, the first channel tells.
+        self.0.x == 0.0 && self.0.y == 0.0 && self.0.z == 0.0
     }
 
     /// Whether every channel is at least zero; NaN is not.

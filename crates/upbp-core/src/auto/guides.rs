@@ -116,7 +116,7 @@ pub(super) fn first<S: Scene>(
     let points = seen.specular.len().div_ceil(step);
     for (index, &point) in seen.specular.iter().step_by(step).enumerate() {
         let mut stream = Stream::new(plan.seed, plan.iteration, StreamKind::PilotLight, index as u64);
-        let Some((emitter, _)) = scene.choose_next_event(point, stream.pair()) else { continue };
+        let Some((emitter, _)) = scene.choose_next_event(point, stream.decide()) else { continue };
         let light = &scene.scene.emitters()[emitter.0 as usize];
         if let Some(incident) = light.sample_incident(scene.emission_bounds(), point, stream.pair()) {
             let end = LightEnd { emitter, point: incident.point, direction: -incident.towards_light };

@@ -99,6 +99,16 @@ fn check_bsdf_sample(
     };
     let value = bsdf.eval(light, camera, interface);
     require(is_light(value), "a value is finite and not negative", (case, value))?;
+    let at_once = bsdf.evaluate(from, sample.to, walk, interface);
+    let agrees = at_once.map_or(value.is_black(), |at_once| {
+        let [own, other] = [from, sample.to].map(|from| bsdf.continuation(from));
+        same_spectrum(at_once.value, value)
+            && same(at_once.pdf, forward)
+            && same(at_once.pdf_reverse, reverse)
+            && same(at_once.continuation, own)
+            && same(at_once.continuation_reverse, other)
+    });
+    require(agrees, "evaluate says what eval, pdf and continuation say", (case, at_once))?;
     let weight = value * (sample.to.z.abs() / sample.pdf);
     require(same_spectrum(weight, sample.weight), "weight is eval · |cos| / pdf", (case, weight))?;
     let index = |direction: Vec3| if direction.z > 0.0 { interface.above } else { interface.below };

@@ -221,7 +221,7 @@ proptest! {
         let mut counts = vec![0_u32; lamps.len()];
         let draws = 20_000;
         for _ in 0..draws {
-            let (emitter, probability) = choice.next_event(Some(&tree), receiver, stream.pair()).unwrap();
+            let (emitter, probability) = choice.next_event(Some(&tree), receiver, stream.decide()).unwrap();
             prop_assert_eq!(f64::from(probability), probabilities[emitter.0 as usize]);
             counts[emitter.0 as usize] += 1;
         }

@@ -31,6 +31,7 @@ pub(crate) enum Arrival<'a, B, L> {
     Lost,
 }
 
+#[inline]
 pub(crate) fn arrive<'a, S: Scene, L: Lanes>(
     scene: &S,
     edge_trace: &'a EdgeTrace<S::Bsdf, L>,
@@ -87,7 +88,7 @@ pub(crate) fn scatter<S: Scene, D: Densities, L: Lanes>(
         kind: if scattered.delta {
             MergeKind::None
         } else {
-            interaction.merge_kind(scattered.sin_theta, scale)
+            context.plan.merge_kind(interaction, scattered.sin_theta, scale)
         },
         distance_factor: mis.distance_factor,
         shares: mis.shares,

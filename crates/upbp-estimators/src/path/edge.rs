@@ -57,7 +57,7 @@ pub struct EdgeTrace<B, L: Lanes = f64> {
     pub hit: Option<Hit<B>>,
     /// The bodies at the start.
     start: MediumStack,
-    /// The bodies at the end: around the stop, or before the surface.
+    /// The bodies at the end, around the stop or before the surface, if the ray has crossed a boundary.
     end: MediumStack,
     /// The bodies behind the surface, if it bounds one.
     behind: MediumStack,
@@ -85,11 +85,16 @@ struct Flight<L: Lanes> {
     hero: L::Hero,
     /// The random numbers that decide in the current stretch.
     decision: Option<[f32; 2]>,
-    /// Distance to which the ray has to be followed if the current medium goes on.
-    max_distance: f32,
-    /// Distance where the walk stops if the current medium goes on; known only if the ray is followed to a
-    /// finite distance.
+    /// Distance where the walk stops if the current medium goes on; infinite if it never does, or if that is
+    /// not known yet, where the ray is followed to the surface anyway.
     stop: f32,
+}
+
+impl<L: Lanes> Flight<L> {
+    /// Distance to which the ray has to be followed if the current medium goes on.
+    fn max_distance(&self) -> f32 {
+        self.stop + DISTANCE_MARGIN * self.stop
+    }
 }
 
 impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
@@ -148,9 +153,17 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             self.crossings.push(correction);
             corrections += 1;
         }
-        if let Some((span, t)) = self.stop {
+        if let Some((span, t)) = self.stop
+            && !self.crossings.is_empty()
+        {
             self.end = self.stack_in(&self.spans[span], t);
         }
+    }
+
+    /// The bodies behind the last crossing so far. Most rays have none, and copy no list.
+    #[inline]
+    fn bodies(&self) -> &MediumStack {
+        if self.crossings.is_empty() { &self.start } else { &self.end }
     }
 
     /// Gives the ray up: there is nothing on it.
@@ -180,9 +193,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         self.spans.clear();
         self.stop = None;
         self.hit = None;
-        self.end.clone_from(&self.start);
-        let mut flight =
-            Flight::<L> { extent, hero, decision: None, max_distance: f32::INFINITY, stop: f32::INFINITY };
+        let mut flight = Flight::<L> { extent, hero, decision: None, stop: f32::INFINITY };
         let medium = medium_of(scene, &self.start);
         let mut span = MediumSpan { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
@@ -190,7 +201,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             return None;
         }
         let mut ray =
-            Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.max_distance };
+            Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.max_distance() };
         loop {
             self.found.clear();
             let hit = scene.trace(&ray, &mut self.found);
@@ -208,10 +219,10 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 None => self.found.len(),
             };
             for i in 0..before {
-                if self.found[i].t > flight.max_distance {
+                if self.found[i].t > flight.max_distance() {
                     break;
                 }
-                let correction = correction(&self.end, &self.found[i..=i], &self.crossings);
+                let correction = correction(self.bodies(), &self.found[i..=i], &self.crossings);
                 if correction.is_some() {
                     return correction;
                 }
@@ -221,21 +232,22 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 }
             }
             if let Some(hit) = hit
-                && known <= flight.max_distance
+                && known <= flight.max_distance()
             {
                 if let Some(boundary) = boundary {
                     // Into a body before out of one, as all crossings at a distance.
                     let place = if boundary.entering { before } else { self.found.len() };
                     self.found.insert(place, boundary);
                     let place = &self.found[before..];
-                    let correction = correction(&self.end, place, &self.crossings);
+                    let correction = correction(self.bodies(), place, &self.crossings);
                     if correction.is_some() {
                         return correction;
                     }
-                    self.behind.clone_from(&self.end);
+                    let Self { crossings, start, end, behind, .. } = self;
+                    behind.clone_from(if crossings.is_empty() { start } else { end });
                     cross_all(&mut self.behind, place);
                 }
-                if boundary.is_none_or(|boundary| is_surface(&self.end, &self.behind, &boundary)) {
+                if boundary.is_none_or(|boundary| is_surface(self.bodies(), &self.behind, &boundary)) {
                     if !self.close(scene, &mut span, &flight, known) {
                         self.hit = Some(hit);
                     }
@@ -248,9 +260,10 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                     }
                 }
                 ray.t_min = known * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
-            } else if flight.max_distance <= known {
-                let escapes = flight.max_distance == f32::INFINITY;
-                let correction = escapes.then(|| correction_of_escape(&self.end, &self.crossings)).flatten();
+            } else if flight.max_distance() <= known {
+                let escapes = flight.max_distance() == f32::INFINITY;
+                let correction =
+                    escapes.then(|| correction_of_escape(self.bodies(), &self.crossings)).flatten();
                 if correction.is_none() {
                     self.close(scene, &mut span, &flight, f32::INFINITY);
                 }
@@ -259,11 +272,12 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 // The medium has become thinner. A boundary at the end of what is known is still to come.
                 ray.t_min = known.next_down();
             }
-            ray.t_max = flight.max_distance;
+            ray.t_max = flight.max_distance();
         }
     }
 
     /// Begins `span`: draws the distance in its medium.
+    #[inline]
     fn enter<S: Scene<Bsdf = B>>(
         &self,
         scene: &S,
@@ -271,7 +285,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         flight: &mut Flight<L>,
         stream: &mut Stream,
     ) {
-        flight.max_distance = f32::INFINITY;
+        flight.stop = f32::INFINITY;
         if self.stop.is_some() || span.start == f32::NEG_INFINITY {
             return;
         }
@@ -285,13 +299,13 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             && let Some(t) = L::sample_distance(medium, &self.segment(span, f32::INFINITY), flight.hero, u)
             && t >= span.start
         {
-            flight.max_distance = t + DISTANCE_MARGIN * t;
             flight.stop = t;
         }
     }
 
     /// Ends `span` at `end`, a boundary, a surface or infinity, and decides whether the walk stops inside;
     /// whether that is all.
+    #[inline]
     fn close<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
@@ -308,10 +322,12 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             && let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize])
             && medium.scatters()
         {
-            // Decided for the segment as it is: the rounding of a distance far from the origin must not carry
-            // the stop over its end.
-            let t = if flight.max_distance < end {
+            // Next to its end, decided for the segment as it is: the rounding of a distance far from the
+            // origin must not carry the stop over the end.
+            let t = if flight.max_distance() < end {
                 Some(flight.stop)
+            } else if flight.stop < f32::INFINITY && flight.stop - DISTANCE_MARGIN * flight.stop > end {
+                None
             } else {
                 L::sample_distance(medium, &self.segment(span, end), flight.hero, u)
             };
@@ -330,6 +346,9 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         crossings: usize,
         stream: &mut Stream,
     ) -> bool {
+        if crossings == 1 {
+            self.end.clone_from(&self.start);
+        }
         let crossing = self.crossings[crossings - 1];
         if self.end.cross(crossing.interior, crossing.entering) != upbp_media::Crossing::Done {
             self.conflicts += 1;
@@ -437,7 +456,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     #[must_use]
     pub fn sides(&self) -> MediumInterface<'_> {
         let crosses = self.stop.is_none() && self.hit.as_ref().is_some_and(|hit| hit.interior.is_some());
-        MediumInterface { near: &self.end, far: if crosses { &self.behind } else { &self.end } }
+        MediumInterface { near: self.bodies(), far: if crosses { &self.behind } else { self.bodies() } }
     }
 }
 

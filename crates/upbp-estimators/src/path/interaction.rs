@@ -3,8 +3,7 @@
 use glam::Vec3;
 use upbp_media::{Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
 
-use crate::mis::MergeKind;
-use crate::random::Stream;
+use crate::random::{Decision, Stream};
 use crate::roulette::{Roulette, Survival};
 use crate::scene::{Bsdf, Hit, Interface, Scene, Walk};
 
@@ -97,6 +96,7 @@ fn sine(a: Vec3, b: Vec3) -> f64 {
 
 impl<B: Bsdf> Interaction<B> {
     /// The surface of a hit, between the bodies of `sides`. `None` if the surface is grazed.
+    #[inline]
     pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, sides: &MediumInterface<'_>) -> Option<Self> {
         let cos = direction.dot(hit.geometric_normal);
         if cos.abs() < MIN_COSINE {
@@ -147,16 +147,6 @@ impl<B: Bsdf> Interaction<B> {
         }
     }
 
-    /// The merges that a path with this pair of lines takes part in, by kernels of some scale.
-    #[inline]
-    pub(crate) fn merge_kind(&self, sin_theta: f64, scale: f32) -> MergeKind {
-        let scale = f64::from(scale);
-        match self {
-            Self::Surface(_) => MergeKind::Surface { scale },
-            Self::Medium(medium) => MergeKind::Medium { medium: *medium, sin_theta, scale },
-        }
-    }
-
     /// Evaluates the smooth scattering of `walk`, which came from `from` and goes to `to`; both directions
     /// point away from the vertex. `None` if nothing is scattered.
     pub fn evaluate<S: Scene<Bsdf = B>>(
@@ -173,9 +163,13 @@ impl<B: Bsdf> Interaction<B> {
             Self::Medium(medium) => {
                 let medium = &scene.media()[medium.0 as usize];
                 let phase = medium.phase().eval(-from, to);
+                let value = medium.sigma_s(position) * phase.value;
+                if value.is_black() {
+                    return None;
+                }
                 let rho = f64::from(phase.pdf) * f64::from(continuation(medium, position, roulette));
                 Some(Evaluation {
-                    value: medium.sigma_s(position) * phase.value,
+                    value,
                     rho_own: rho,
                     rho_opposite: rho,
                     cos: 1.0,
@@ -195,20 +189,20 @@ impl<B: Bsdf> Interaction<B> {
         from: Vec3,
         stream: &mut Stream,
     ) -> Option<Scattered> {
-        let u_continue = stream.uniform();
+        let goes_on = stream.decide();
         match self {
             Self::Surface(surface) => {
-                surface.scatter(survival, walk, from, u_continue, stream.uniform(), stream.pair())
+                surface.scatter(survival, walk, from, goes_on, stream.decide(), stream.decide())
             }
             Self::Medium(medium) => {
-                let u = stream.pair();
+                let turn = stream.decide();
                 let medium = &scene.media()[medium.0 as usize];
                 let albedo = continuation(medium, position, survival.roulette());
                 let probability = survival.probability(albedo);
-                if u_continue >= probability {
+                if ends(goes_on, probability) {
                     return None;
                 }
-                let sample = PhaseFunction::sample(medium.phase(), -from, u);
+                let sample = PhaseFunction::sample(medium.phase(), -from, turn.pair());
                 if sample.pdf == 0.0 {
                     return None;
                 }
@@ -229,6 +223,17 @@ impl<B: Bsdf> Interaction<B> {
     }
 }
 
+/// Whether a walk that survives with this probability ends.
+#[inline]
+fn ends(goes_on: Decision, probability: f32) -> bool {
+    probability < 1.0 && goes_on.uniform() >= probability
+}
+
+/// [`Bsdf::continuation`] as the walks take it.
+fn limited(continuation: f32, roulette: Roulette) -> f32 {
+    if roulette.is_on() { continuation.clamp(0.0, 1.0) } else { 1.0 }
+}
+
 fn continuation<M: Medium>(medium: &M, position: Vec3, roulette: Roulette) -> f32 {
     if roulette.is_on() { medium.continuation(position) } else { 1.0 }
 }
@@ -246,7 +251,7 @@ impl<B: Bsdf> SurfaceInteraction<B> {
     }
 
     fn continuation(&self, from: Vec3, roulette: Roulette) -> f32 {
-        if roulette.is_on() { self.bsdf.continuation(from).clamp(0.0, 1.0) } else { 1.0 }
+        limited(self.bsdf.continuation(from), roulette)
     }
 
     /// Cosine with the geometric normal if both normals agree on the side of `direction`, local `z` given.
@@ -259,21 +264,18 @@ impl<B: Bsdf> SurfaceInteraction<B> {
         let (local_from, local_to) = (self.local(from), self.local(to));
         let cos_from = self.agreeing_cosine(from, local_from.z)?;
         let cos_to = self.agreeing_cosine(to, local_to.z)?;
-        let (value, correction) = match walk {
-            Walk::Camera => (
-                self.bsdf.eval(local_to, local_from, self.interface),
-                // The geometry term has the geometric normal; the light's side is shaded with the other
-                // (section 1.6).
-                local_to.z / cos_to,
-            ),
-            Walk::Light => (self.bsdf.eval(local_from, local_to, self.interface), local_from.z / cos_from),
+        let bsdf = self.bsdf.evaluate(local_from, local_to, walk, self.interface)?;
+        // The geometry term has the geometric normal; the light's side is shaded with the other (section
+        // 1.6).
+        let correction = match walk {
+            Walk::Camera => local_to.z / cos_to,
+            Walk::Light => local_from.z / cos_from,
         };
-        let rho_own = self.bsdf.pdf(local_from, local_to, self.interface);
-        let rho_opposite = self.bsdf.pdf(local_to, local_from, self.interface);
+        let continuation = |of_bsdf: f32| f64::from(limited(of_bsdf, roulette));
         Some(Evaluation {
-            value: value * correction.abs(),
-            rho_own: f64::from(rho_own) * f64::from(self.continuation(local_from, roulette)),
-            rho_opposite: f64::from(rho_opposite) * f64::from(self.continuation(local_to, roulette)),
+            value: bsdf.value * correction.abs(),
+            rho_own: f64::from(bsdf.pdf) * continuation(bsdf.continuation),
+            rho_opposite: f64::from(bsdf.pdf_reverse) * continuation(bsdf.continuation_reverse),
             cos: f64::from(cos_to.abs()),
             sin_theta: 0.0,
         })
@@ -284,19 +286,19 @@ impl<B: Bsdf> SurfaceInteraction<B> {
         survival: &mut Survival,
         walk: Walk,
         from: Vec3,
-        u_continue: f32,
-        u_lobe: f32,
-        u: [f32; 2],
+        goes_on: Decision,
+        lobe: Decision,
+        turn: Decision,
     ) -> Option<Scattered> {
         let local_from = self.local(from);
         let cos_from = self.agreeing_cosine(from, local_from.z)?;
         let roulette = survival.roulette();
         let albedo = self.continuation(local_from, roulette);
         let probability = survival.probability(albedo);
-        if u_continue >= probability {
+        if ends(goes_on, probability) {
             return None;
         }
-        let sample = self.bsdf.sample(local_from, walk, self.interface, u_lobe, u)?;
+        let sample = self.bsdf.sample(local_from, walk, self.interface, lobe.uniform(), turn.pair())?;
         let direction = self.world(sample.to).normalize();
         let cos_to = self.agreeing_cosine(direction, sample.to.z)?;
         let mut weight = sample.weight / probability;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
-use upbp_media::{EdgeDensity, Lanes, MediumStack, RaySegment};
+use upbp_media::{EdgeDensity, Lanes, MediumId, MediumStack, RaySegment};
 
 use super::crossing::{correction, correction_of_escape, cross_all, has_surface, may_correct};
 use super::edge::medium_of;
@@ -56,8 +56,14 @@ pub fn clear_edge<S: Scene, L: Lanes>(
     if crossings.len() >= MAX_CROSSINGS {
         return None;
     }
-    // As along a walk, what the ray meets counts more than what was known where it starts.
     let escapes = target.distance == f32::INFINITY;
+    if crossings.is_empty() && (!escapes || stack.is_empty()) {
+        // Most edges: no list is copied.
+        let mut density = EdgeDensity::EMPTY;
+        push(scene, &mut density, &ray, medium_of(scene, stack), 0.0, ray.t_max);
+        return Some(density);
+    }
+    // As along a walk, what the ray meets counts more than what was known where it starts.
     let mut corrections = 0;
     while may_correct(corrections) {
         match accumulate(scene, stack.clone(), &ray, crossings, corrections, escapes) {
@@ -78,6 +84,25 @@ enum Edge<L> {
     Corrected(Crossing),
 }
 
+/// Appends the stretch of `ray` from `start` to `end` in a medium, or in vacuum.
+#[inline]
+fn push<S: Scene, L: Lanes>(
+    scene: &S,
+    density: &mut EdgeDensity<L>,
+    ray: &Ray,
+    medium: Option<MediumId>,
+    start: f32,
+    end: f32,
+) {
+    match medium {
+        Some(medium) => {
+            let segment = RaySegment { origin: ray.origin, direction: ray.direction, start, end };
+            density.push(&L::segment(&scene.media()[medium.0 as usize], &segment));
+        }
+        None => density.push_vacuum(),
+    }
+}
+
 fn accumulate<S: Scene, L: Lanes>(
     scene: &S,
     mut stack: MediumStack,
@@ -88,13 +113,6 @@ fn accumulate<S: Scene, L: Lanes>(
 ) -> Edge<L> {
     let mut density = EdgeDensity::<L>::EMPTY;
     let mut start = 0.0;
-    let mut push = |medium: Option<upbp_media::MediumId>, start: f32, end: f32| match medium {
-        Some(medium) => {
-            let segment = RaySegment { origin: ray.origin, direction: ray.direction, start, end };
-            density.push(&L::segment(&scene.media()[medium.0 as usize], &segment));
-        }
-        None => density.push_vacuum(),
-    };
     let mut started = false;
     let mut crossed = 0;
     for place in crossings.chunk_by(|a, b| a.t == b.t) {
@@ -113,7 +131,7 @@ fn accumulate<S: Scene, L: Lanes>(
             let t = place[0].t.max(start);
             // The first stretch counts even without a length.
             if t > start || !started {
-                push(medium, start, t);
+                push(scene, &mut density, ray, medium, start, t);
                 started = true;
             }
             start = t;
@@ -123,7 +141,7 @@ fn accumulate<S: Scene, L: Lanes>(
         return Edge::Corrected(correction);
     }
     if ray.t_max > start || !started {
-        push(medium_of(scene, &stack), start, ray.t_max);
+        push(scene, &mut density, ray, medium_of(scene, &stack), start, ray.t_max);
     }
     Edge::Clear(density)
 }

@@ -18,7 +18,7 @@ mod camera;
 mod emitter;
 mod hit;
 
-pub use bsdf::{Bsdf, BsdfSample, Interface, Walk};
+pub use bsdf::{Bsdf, BsdfEvaluation, BsdfSample, Interface, Walk};
 pub use camera::{Camera, CameraConnection, CameraRay, PixelRect};
 pub use emitter::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,

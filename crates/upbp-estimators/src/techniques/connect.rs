@@ -87,7 +87,7 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let camera_end = vertex.mis.end(
         mis,
         Walk::Camera,
-        vertex.interaction.merge_kind(camera_side.sin_theta, vertex.scale),
+        plan.merge_kind(&vertex.interaction, camera_side.sin_theta, vertex.scale),
         &light_walk,
         camera_side.rho_opposite,
         light_side.rho_own * camera_side.cos / distance2,
@@ -95,7 +95,7 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let light_end = light.mis.end(
         mis,
         Walk::Light,
-        light.interaction.merge_kind(light_side.sin_theta, light.scale),
+        plan.merge_kind(&light.interaction, light_side.sin_theta, light.scale),
         &camera_walk,
         light_side.rho_opposite,
         camera_side.rho_own * light_side.cos / distance2,

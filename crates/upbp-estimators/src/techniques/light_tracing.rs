@@ -34,9 +34,6 @@ pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Some(scattering) = vertex.evaluate(context, direction) else {
         return;
     };
-    if scattering.value.is_black() {
-        return;
-    }
     out.counters.shadow_rays += 1;
     let crosses = vertex.interaction.crosses(vertex.towards_light, direction);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
@@ -50,7 +47,7 @@ pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let mis = &plan.mis;
     let (passes, stops) = (density.pass_probability, density.backward(in_medium));
     let camera_walk = mis.other_walk(Walk::Camera, in_medium, passes, stops, &L::prior(&mis.lanes));
-    let interaction = vertex.interaction.merge_kind(scattering.sin_theta, vertex.scale);
+    let interaction = plan.merge_kind(&vertex.interaction, scattering.sin_theta, vertex.scale);
     let end = vertex.mis.end(mis, Walk::Light, interaction, &camera_walk, scattering.rho_opposite, ray_pdf);
     let weight = mis.light_tracing_weight(end);
     let value = vertex.throughput

@@ -39,7 +39,7 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let Context { prepared, plan } = *context;
     let (scene, mis) = (prepared.scene, &plan.mis);
-    let Some((emitter, probability)) = prepared.choose_next_event(vertex.position, stream.pair()) else {
+    let Some((emitter, probability)) = prepared.choose_next_event(vertex.position, stream.decide()) else {
         return;
     };
     let light = &scene.emitters()[emitter.0 as usize];
@@ -59,9 +59,6 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Some(scattering) = vertex.evaluate(context, direction) else {
         return;
     };
-    if scattering.value.is_black() {
-        return;
-    }
     out.counters.shadow_rays += 1;
     let crosses = vertex.interaction.crosses(vertex.towards_camera, direction);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
@@ -94,7 +91,7 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let end = vertex.mis.end(
         mis,
         Walk::Camera,
-        vertex.interaction.merge_kind(scattering.sin_theta, vertex.scale),
+        plan.merge_kind(&vertex.interaction, scattering.sin_theta, vertex.scale),
         &light_walk,
         scattering.rho_opposite,
         pdf_position / pdf * light_density,

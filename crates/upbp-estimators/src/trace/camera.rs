@@ -7,7 +7,7 @@ use crate::counters::Counters;
 use crate::features::Features;
 use crate::film_sample::{CameraWalk, Output};
 use crate::light_map::LightMap;
-use crate::mis::{Densities, Edge, EdgeMis};
+use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
     Arrival, Arrived, CameraEdge, CameraVertex, Context, Extent, Interaction, Scratch, arrive, ray_origin,
@@ -47,7 +47,9 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     observer.camera_end(ray.origin, ray.direction, ray.pdf);
     let mut out = Output { layers: &mut walk.layers, counters, observer };
     let emission = plan.mis.hit > 0.0 && prepared.has_emitting_media();
-    let to_surface = plan.has_long_query_beams() || emission || prepared.has_dense_media();
+    let query_beams = plan.has_query_beams();
+    let is_long = query_beams && plan.mis.query_beams == BeamExtent::Long;
+    let to_surface = is_long || emission || prepared.has_dense_media();
     let extent = if to_surface { Extent::ToSurface } else { Extent::ToStop };
     let mut stack = prepared.stack_at_camera(ray.origin);
     let mut origin = ray.origin;
@@ -68,9 +70,13 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, hero, &mut stream);
         out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
         let edge_trace = &scratch.edge_trace;
-        techniques::emission_along(context, edge_trace, &edge, &mut stream, &mut out);
-        techniques::pb2d(context, map, edge_trace, &edge, &mut out);
-        techniques::bb1d(context, map, edge_trace, &edge, &mut out);
+        if emission {
+            techniques::emission_along(context, edge_trace, &edge, &mut stream, &mut out);
+        }
+        if query_beams {
+            techniques::pb2d(context, map, edge_trace, &edge, &mut out);
+            techniques::bb1d(context, map, edge_trace, &edge, &mut out);
+        }
 
         let arrived = match arrive(scene, edge_trace) {
             Arrival::Vertex(arrived) => arrived,

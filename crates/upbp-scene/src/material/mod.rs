@@ -15,7 +15,7 @@ mod rough_dielectric;
 mod trowbridge_reitz;
 
 use glam::Vec3;
-use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
+use upbp_estimators::scene::{Bsdf, BsdfEvaluation, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
 pub use self::conductor::{Conductor, MetalFresnel};
@@ -88,6 +88,10 @@ impl Bsdf for Material {
         u: [f32; 2],
     ) -> Option<BsdfSample> {
         dispatch!(self, material => material.sample(from, walk, interface, u_lobe, u))
+    }
+
+    fn evaluate(&self, from: Vec3, to: Vec3, walk: Walk, interface: Interface) -> Option<BsdfEvaluation> {
+        dispatch!(self, material => material.evaluate(from, to, walk, interface))
     }
 
     fn is_connectible(&self) -> bool {

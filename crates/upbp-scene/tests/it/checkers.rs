@@ -3,8 +3,8 @@
 use glam::{Vec2, Vec3};
 use upbp_estimators::check::{check_bsdf, check_camera, check_emitter};
 use upbp_estimators::scene::{
-    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
-    EmitterPoint, HitDensities, Incident, Interface, PixelRect, Walk,
+    BoundingSphere, Bsdf, BsdfEvaluation, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter,
+    EmitterKind, EmitterPoint, HitDensities, Incident, Interface, PixelRect, Walk,
 };
 use upbp_media::Spectrum;
 use upbp_scene::light::ConstantEnvironment;
@@ -20,6 +20,7 @@ enum Fault {
     NotReciprocal,
     WrongLobe,
     Roulette,
+    OtherAtOnce,
 }
 
 #[derive(Clone, Copy)]
@@ -62,6 +63,23 @@ impl Bsdf for Faulty {
         Some(sample)
     }
 
+    fn evaluate(&self, from: Vec3, to: Vec3, walk: Walk, interface: Interface) -> Option<BsdfEvaluation> {
+        let Self(phong, fault) = *self;
+        let evaluation = phong.evaluate(from, to, walk, interface)?;
+        let pdf = self.pdf(from, to, interface);
+        let pdf_reverse = if fault == Fault::OtherAtOnce { pdf } else { self.pdf(to, from, interface) };
+        Some(BsdfEvaluation {
+            value: if walk == Walk::Light {
+                self.eval(from, to, interface)
+            } else {
+                self.eval(to, from, interface)
+            },
+            pdf,
+            pdf_reverse,
+            ..evaluation
+        })
+    }
+
     fn is_connectible(&self) -> bool {
         true
     }
@@ -81,6 +99,7 @@ fn faults_of_a_surface_are_found() {
         (Fault::NotReciprocal, "eval is reciprocal up to the squared index"),
         (Fault::WrongLobe, "frequencies follow the density"),
         (Fault::Roulette, "continuation is in (0, 1]"),
+        (Fault::OtherAtOnce, "evaluate says what eval, pdf and continuation say"),
     ];
     check_bsdf(&Faulty(phong, Fault::None), Interface::MATCHED).unwrap();
     for (fault, expected) in cases {
