@@ -88,7 +88,7 @@ pub(crate) struct Method {
     /// Most edges of a path between light and camera [default: 1000]
     #[arg(long, value_name = "K")]
     max_length: Option<u32>,
-    /// Light sub-paths per iteration [default: one per pixel, fewer where that pays or where
+    /// Light sub-paths per iteration [default: one per pixel, fewer or more where that pays, fewer where
     /// memory or time is short]
     #[arg(long, value_name = "N")]
     light_paths: Option<u32>,

@@ -15,8 +15,8 @@ pub use techniques::{Techniques, UnknownTechniques};
 /// A number of light sub-paths per iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LightPaths {
-    /// One light sub-path per pixel, within the memory budget; fewer where [`Techniques::Auto`] finds that
-    /// this pays.
+    /// One light sub-path per pixel, within the memory budget; fewer or more where [`Techniques::Auto`] finds
+    /// that this pays.
     #[default]
     Auto,
     /// A given number, within the memory budget.
