@@ -11,7 +11,7 @@
 use glam::Vec3;
 
 use crate::error::check_non_negative;
-use crate::mixture::{channel_probabilities, growth};
+use crate::mixture::{channel_probabilities, segment_growth};
 use crate::{MediaError, Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 
 /// Floor of [`Medium::continuation`]: keeps the probability positive where hardly anything scatters. A
@@ -265,13 +265,14 @@ impl Medium for Homogeneous {
     }
 
     fn mixture_growth(&self) -> f64 {
-        let alpha = match self.sampling {
-            Sampling::Chromatic { alpha, .. } => alpha,
-            // Any mixture of equal channels is the one exponential.
-            Sampling::Never | Sampling::Grey => [1.0 / 3.0; 3],
-        };
-        let growth = |channel| growth(channel, &alpha, self.sigma_s, self.sigma_t);
-        (0..3).map(growth).fold(0.0, f64::max) / f64::from(self.continuation(Vec3::ZERO))
+        match self.sampling {
+            Sampling::Chromatic { alpha, .. } => {
+                let continuation = f64::from(self.continuation(Vec3::ZERO));
+                segment_growth(&alpha, self.sigma_s, self.sigma_t, continuation)
+            }
+            // Nothing is divided by a density of other channels.
+            Sampling::Never | Sampling::Grey => 1.0,
+        }
     }
 
     #[inline]

@@ -268,17 +268,20 @@ impl Lanes for [f64; 3] {
 /// mixture that is drawn anew on each segment hardly grows. Not tuned.
 const LEAST_RATIO: f32 = 1.25;
 
+/// Factor by which the second moment may grow per segment without lanes, and be of no account.
+const LEAST_GROWTH: f64 = 1.01;
+
 /// The probability of each lane to be the hero of a walk through `media`: equal shares for all lanes that
 /// differ in any of them, so that no channel's throughput exceeds the number of lanes. `None` if in all media
 /// lanes differ by a small factor only, or the [second moment](Medium::mixture_growth) of walks without them
-/// does not grow.
+/// hardly grows.
 #[must_use]
 pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
     let largest = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(0.0, f32::max);
     let least = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(f32::INFINITY, f32::min);
     let profits = |medium: &M| {
         let differ = |lanes| largest(&lanes) >= LEAST_RATIO * least(&lanes);
-        medium.lane_extinctions().is_some_and(differ) && medium.mixture_growth() > 1.0
+        medium.lane_extinctions().is_some_and(differ) && medium.mixture_growth() > LEAST_GROWTH
     };
     if !media.iter().any(profits) {
         return None;
@@ -358,6 +361,8 @@ mod tests {
         assert_eq!(of(&[medium([0.0; 3], [1.0, 4.0, 15.0])]), Some([third; 3]));
         assert_eq!(of(&[medium([0.0; 3], [1.0, 4.0, 1.0])]), Some([0.5, 0.5, 0.0]));
         assert_eq!(of(&[medium([0.5, 0.1, 0.1], [0.1, 0.1, 0.2])]), None, "roulette ends walks sooner");
+        // Red passes for ever, but the mixture hardly ever draws its channel.
+        assert_eq!(of(&[medium([0.0, 1.0, 4.0], [0.0, 0.5, 0.5])]), Some([third; 3]));
         // What only absorbs passes by the lane that gets farthest, if that is far enough.
         assert_eq!(of(&[medium([0.0, 0.0, 3.0], [1.0, 4.0, 0.0])]), Some([0.5, 0.5, 0.0]));
         assert_eq!(of(&[medium([0.0, 0.0, 0.5], [1.0, 4.0, 0.0])]), Some([third; 3]));

@@ -148,10 +148,11 @@ pub trait Medium: Send + Sync {
         None
     }
 
-    /// The largest factor, over the channels, by which the second moment of a walk grows per collision if all
-    /// its distances are drawn by [`sample_distance`](Self::sample_distance), roulette by
-    /// [`continuation`](Self::continuation) included (`docs/theory.md`, section 1.4). Up to one, walks need
-    /// no lanes, however long they are. The default, infinity, is for media of which it is unknown.
+    /// The largest factor, over the channels and over lengths, by which the second moment of a walk grows on
+    /// a segment, which it passes or stops in, if distances are drawn by
+    /// [`sample_distance`](Self::sample_distance), roulette by [`continuation`](Self::continuation) included
+    /// (`docs/theory.md`, section 1.4). At least one, that of a segment without a length. If it is one, walks
+    /// need no lanes, however long they are. The default, infinity, is for media of which it is unknown.
     fn mixture_growth(&self) -> f64 {
         f64::INFINITY
     }

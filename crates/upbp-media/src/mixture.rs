@@ -38,7 +38,7 @@ pub(crate) fn channel_probabilities(sigma_s: Spectrum, sigma_t: Spectrum) -> [f6
 }
 
 /// The second moment `M_c` of a channel, with the distance substituted by `u = 1 − e^{−σ_c t}`.
-pub(crate) fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum) -> f64 {
+fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum) -> f64 {
     let sigma = f64::from(sigma_t[channel]);
     let scattering = f64::from(sigma_s[channel]);
     if scattering == 0.0 {
@@ -54,6 +54,46 @@ pub(crate) fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_
         })
         .sum();
     scattering * scattering / sigma * sum / f64::from(POINTS)
+}
+
+/// The largest second moment that any channel has after a segment of any length, on which walks pass or,
+/// with the probability `continuation`, go on from where they stop (`docs/theory.md`, section 1.4). At least
+/// one, that of a segment without a length.
+pub(crate) fn segment_growth(
+    alpha: &[f64; 3],
+    sigma_s: Spectrum,
+    sigma_t: Spectrum,
+    continuation: f64,
+) -> f64 {
+    let extinctions = [0, 1, 2].map(|c| f64::from(sigma_t[c]));
+    let positive = || extinctions.into_iter().filter(|sigma| *sigma > 0.0);
+    let shortest = 1e-3 / positive().fold(0.0, f64::max);
+    let longest = 1e3 / positive().fold(f64::INFINITY, f64::min);
+    if !(longest > shortest) {
+        return 1.0;
+    }
+    let step = (longest / shortest).powf(1.0 / f64::from(POINTS));
+    let of_channel = |channel: usize| {
+        let (sigma, scattering) = (extinctions[channel], f64::from(sigma_s[channel]));
+        // Relative to the transmittance of the channel, which may underflow.
+        let mixed = |length: f64, factor: &dyn Fn(usize) -> f64| -> f64 {
+            (0..3).map(|k| alpha[k] * factor(k) * ((sigma - extinctions[k]) * length).exp()).sum()
+        };
+        let stops = |length: f64| {
+            let density = mixed(length, &|k| extinctions[k]);
+            if scattering == 0.0 { 0.0 } else { scattering * scattering * (-sigma * length).exp() / density }
+        };
+        let (mut largest, mut stopped, mut before) = (1.0_f64, 0.0, 0.0);
+        for point in 0..=POINTS {
+            let length = shortest * step.powf(f64::from(point));
+            stopped += 0.5 * (length - before) * (stops(before) + stops(length));
+            let passes = (-sigma * length).exp() / mixed(length, &|_| 1.0);
+            largest = largest.max(stopped / continuation + passes);
+            before = length;
+        }
+        largest
+    };
+    (0..3).map(of_channel).fold(1.0, f64::max)
 }
 
 #[cfg(test)]
