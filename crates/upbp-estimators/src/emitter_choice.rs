@@ -246,7 +246,7 @@ impl Selection {
         Self::new(&weights)
     }
 
-    /// As [`choose`](Self::choose), by a number that is only asked for if there is a choice.
+    /// Chooses as [`choose`](Self::choose) does, by a number that is only asked for if there is a choice.
     #[inline]
     fn choose_by(&self, decision: Decision) -> Option<(EmitterId, f32)> {
         if self.cumulative == [STEPS] {

@@ -9,7 +9,7 @@ use upbp_testing::{Estimate, iterate, render, renderer};
 
 /// Part that merges may lose at boundaries, where a kernel sticks out of its medium.
 const BOUNDARY_LOSS: f64 = 0.005;
-/// What interpolation in the tables of rough glass may lose or add.
+/// Part that interpolation in the tables of rough glass may lose or add.
 const TABLES: f64 = 2e-3;
 /// Roundings of indices in the throughput of a path.
 const ROUNDING: f64 = 1e-5;

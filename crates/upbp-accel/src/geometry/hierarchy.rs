@@ -144,7 +144,7 @@ impl Hierarchy {
         }
     }
 
-    /// As [`traverse`](Self::traverse), below the node `root`.
+    /// The part of [`traverse`](Self::traverse) below the node `root`.
     #[inline(always)]
     fn descend<const IN_ORDER: bool, W: Wide>(
         &self,

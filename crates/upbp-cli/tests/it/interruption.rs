@@ -171,13 +171,18 @@ fn a_signal_saves_and_says_try_again() {
     assert_eq!(unfinished(&folder), 0);
 }
 
-/// Whether it has asked for SIGINT and SIGTERM.
+/// A render with camera sub-paths that has asked for SIGINT and SIGTERM, and is on its way.
 #[cfg(target_os = "linux")]
-fn listens(child: &Child) -> bool {
-    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("it is there");
-    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a known name");
-    let caught = u64::from_str_radix(caught.trim(), 16).expect("a mask");
-    [2, 15].iter().all(|signal| caught >> (signal - 1) & 1 == 1)
+fn rendering(folder: &Path) -> Child {
+    let listens = |child: &Child| {
+        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("it is there");
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a known name");
+        let caught = u64::from_str_radix(caught.trim(), 16).expect("a mask");
+        [2, 15].iter().all(|signal| caught >> (signal - 1) & 1 == 1)
+    };
+    let mut child = render(folder, &["--techniques", "pt", "-o", "a.exr"]).spawn().expect("the program runs");
+    wait_until(&mut child, "it renders", |child| listens(child) && used(child) > 0.5);
+    child
 }
 
 #[cfg(target_os = "linux")]
@@ -187,9 +192,7 @@ fn a_second_signal_ends_at_once() {
     // Iterations that take long, and a cancellation that has to wait for a row of pixels.
     let scene = SMALL.replace("width: 8", "width: 4000").replace("sigma_s: 0.5", "sigma_s: (500, 500, 500)");
     fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
-    let mut child =
-        render(&folder, &["--techniques", "pt", "-o", "a.exr"]).spawn().expect("the program runs");
-    wait_until(&mut child, "it renders", |child| listens(child) && used(child) > 0.5);
+    let mut child = rendering(&folder);
     let before = used(&child);
     signal(&child, "TERM");
     signal(&child, "INT");
@@ -214,9 +217,7 @@ fn a_second_signal_while_it_writes_leaves_nothing_unfinished() {
     let scene = SMALL.replace("width: 8", "width: 1000").replace("height: 8", "height: 1000");
     fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
     for _ in 0..5 {
-        let mut child =
-            render(&folder, &["--techniques", "pt", "-o", "a.exr"]).spawn().expect("the program runs");
-        wait_until(&mut child, "it renders", |child| listens(child) && used(child) > 0.5);
+        let mut child = rendering(&folder);
         signal(&child, "TERM");
         while unfinished(&folder) == 0 && child.try_wait().expect("a status").is_none() {
             sleep(Duration::from_millis(1));

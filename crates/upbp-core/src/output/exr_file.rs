@@ -69,7 +69,7 @@ pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::resu
 /// Writes an image as `R`, `G`, `B`, with nothing besides: float32.
 ///
 /// # Errors
-/// What the file system or the encoder says.
+/// The message of the file system or of the encoder.
 pub fn write_image(path: &Path, image: &Picture) -> std::result::Result<(), OutputError> {
     let mut channels = SmallVec::new();
     push(&mut channels, "", image);

@@ -211,7 +211,7 @@ impl Bsdf for RoughDielectric {
     }
 }
 
-/// What radiance gains where it passes to the side of the camera.
+/// Factor of radiance that passes the surface to the side of the camera, or stays on its side.
 fn compression(passes: bool, eta_camera: f32) -> f32 {
     if passes { eta_camera * eta_camera } else { 1.0 }
 }

@@ -100,7 +100,7 @@ fn smooth_glass_loses_none_either() {
     }
 }
 
-/// What facets send to each other is interpolated from tables, worst at the horizon.
+/// Light that facets send to each other is interpolated from tables, worst at the horizon.
 #[test]
 fn rough_glass_loses_nothing() {
     for alpha in [0.003, 0.02, 0.05, 0.1, 0.17, 0.3, 0.4, 0.6, 0.85, 1.0] {
