@@ -1,7 +1,7 @@
 //! Readers of files, with files that are nearly right and with noise: an error or a result, never a
 //! panic.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use proptest::prelude::*;
@@ -76,20 +76,29 @@ fn change(text: &str, changes: &[(usize, usize, usize, bool)]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Reads an image. A file for each thread: tests run at the same time.
+/// Reads an image.
 fn read_image(bytes: &[u8]) {
-    let name = format!("image_{:?}.exr", std::thread::current().id());
-    upbp_testing::readers::read_image(bytes, &Path::new(env!("CARGO_TARGET_TMPDIR")).join(name));
+    let path = file();
+    upbp_testing::readers::read_image(bytes, &path);
+    let _ = std::fs::remove_file(path);
+}
+
+/// A file for each thread of each process: tests run at the same time.
+fn file() -> PathBuf {
+    let name = format!("image_{}_{:?}.exr", std::process::id(), std::thread::current().id());
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
 
 /// A good image.
 fn image() -> &'static [u8] {
     static IMAGE: OnceLock<Vec<u8>> = OnceLock::new();
     IMAGE.get_or_init(|| {
-        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("seed.exr");
+        let path = file();
         exr::prelude::write_rgb_file(&path, 8, 4, |x, y| (x as f32, y as f32, 1.0_f32))
             .expect("a writable folder");
-        std::fs::read(&path).expect("the file")
+        let bytes = std::fs::read(&path).expect("the file");
+        let _ = std::fs::remove_file(path);
+        bytes
     })
 }
 
@@ -186,7 +195,7 @@ fn a_good_state_is_sealed_already() {
 
 #[test]
 fn images_larger_than_their_file_are_refused() {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("vast.exr");
+    let path = file();
     let name = b"dataWindow\0box2i\0\x10\0\0\0";
     let window =
         image().windows(name.len()).position(|part| part == name).expect("a data window") + name.len();
@@ -200,6 +209,7 @@ fn images_larger_than_their_file_are_refused() {
     assert!(error.to_string().contains(expected), "{error}");
     let error = upbp_scene::light::EnvironmentImage::load(&path).expect_err("gigabytes");
     assert!(format!("{error:?}").contains(expected), "{error:?}");
+    let _ = std::fs::remove_file(path);
 }
 
 #[test]

@@ -81,6 +81,6 @@ fn bash_takes_its_completions() {
     }
     let script = "source ./upbp && COMP_WORDS=(upbp render --tar) COMP_CWORD=2 && _upbp upbp --tar render && echo ${COMPREPLY[@]}";
     let output =
-        Command::new("/bin/bash").args(["-c", script]).current_dir(folder).output().expect("bash runs");
+        Command::new("/bin/bash").args(["-c", script]).current_dir(&*folder).output().expect("bash runs");
     assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "--target-error");
 }

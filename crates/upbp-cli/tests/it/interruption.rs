@@ -10,7 +10,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, SystemTime};
 
-use crate::program::{SMALL, command, folder};
+use crate::program::{Folder, SMALL, command, folder};
 use upbp_core::State;
 use upbp_testing::processor;
 
@@ -22,7 +22,7 @@ fn render(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-fn prepared(name: &str) -> std::path::PathBuf {
+fn prepared(name: &str) -> Folder {
     let folder = folder(name);
     fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
     folder

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::OnceLock;
 
-use crate::program::{self, SMALL, command};
+use crate::program::{self, Folder, SMALL, command};
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::test_runner::{Config, TestRunner};
@@ -75,14 +75,14 @@ fn originals() -> &'static Snapshot {
         render(&[&share("1..2", "b.state")[..], &["-o", "b.png"]].concat());
         fs::copy(folder.join("ref.exr"), folder.join("kept.exr")).expect("a copy");
         let files = snapshot(&folder);
-        let name = |path: PathBuf| path.strip_prefix(&folder).expect("in the folder").to_owned();
+        let name = |path: PathBuf| path.strip_prefix(&*folder).expect("in the folder").to_owned();
         files.into_iter().map(|(path, bytes)| (name(path), bytes)).collect()
     })
 }
 
 /// Makes a folder with [`originals`], other names for some, and one that is read-only.
-fn prepared(name: &str) -> PathBuf {
-    let folder = program::folder(name).canonicalize().expect("the folder");
+fn prepared(name: &str) -> Folder {
+    let folder = program::folder(name);
     fs::create_dir(folder.join("sub")).expect("a folder");
     for (name, bytes) in originals() {
         fs::write(folder.join(name), bytes).expect("a writable folder");
@@ -404,7 +404,7 @@ fn random_commands_keep_what_they_read() {
             prop_assert_eq!(found, Some(*expected), "{:?}: {}", path, said());
         }
         for path in changed.iter().copied().chain(new) {
-            let name = path.strip_prefix(&folder).expect("in the folder").display().to_string();
+            let name = path.strip_prefix(&*folder).expect("in the folder").display().to_string();
             let now = after.get(path);
             // Each is of the kind of its name, and what was there was so, too.
             let found = now.and_then(|bytes| kind(bytes));

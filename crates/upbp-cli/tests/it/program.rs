@@ -1,6 +1,7 @@
 //! The program, run as a process.
 
 use std::fs;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -25,10 +26,29 @@ pub(crate) fn command(name: &str, folder: &Path, arguments: &[&str]) -> Command 
     command
 }
 
-/// A folder of its own for each test.
-pub(crate) fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+/// A folder that is removed with what is in it, unless the test fails.
+pub(crate) struct Folder(PathBuf);
+
+/// A folder of its own for each test of each process: the same tests may run elsewhere at this moment.
+pub(crate) fn folder(name: &str) -> Folder {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).expect("a writable target folder");
-    folder
+    Folder(folder.canonicalize().expect("the folder"))
+}
+
+impl Deref for Folder {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
 }

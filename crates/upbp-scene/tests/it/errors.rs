@@ -1,5 +1,7 @@
 //! Messages about wrong scene files, as a user reads them.
 
+use std::path::Path;
+
 use upbp_scene::{ReadyScene, SceneError};
 
 const CAMERA: &str = "camera: Perspective(origin: (0, 1, 4), target: (0, 1, 0), fov_degrees: 40),";
@@ -323,8 +325,7 @@ fn all_problems_are_reported_at_once() {
 #[cfg(unix)]
 #[test]
 fn devices_and_pipes_are_refused() {
-    let pipe = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("pipe");
-    let _ = std::fs::remove_file(&pipe);
+    let pipe = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("pipe-{}", std::process::id()));
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for path in ["/dev/zero", "/dev/urandom", pipe.to_str().unwrap()] {
         let expected = "expected a regular file, found a device, a pipe or a socket";
@@ -337,16 +338,18 @@ fn devices_and_pipes_are_refused() {
         assert_eq!(scene.to_string(), format!("{path}: cannot be read"));
         assert_eq!(std::error::Error::source(&scene).unwrap().to_string(), expected);
     }
+    std::fs::remove_file(&pipe).unwrap();
 }
 
 #[test]
 fn meshes_that_are_none_are_refused_by_line() {
-    let folder = env!("CARGO_TARGET_TMPDIR");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("meshes-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
     let read = |name: &str, bytes: &[u8]| {
-        std::fs::write(std::path::Path::new(folder).join(name), bytes).unwrap();
+        std::fs::write(folder.join(name), bytes).unwrap();
         let rest =
             format!("{MATERIALS} {LIGHT} shapes: [(geometry: Mesh(file: \"{name}\"), material: \"white\")]");
-        ReadyScene::from_ron_str(&format!("(version: 1, {CAMERA} {rest})"), folder)
+        ReadyScene::from_ron_str(&format!("(version: 1, {CAMERA} {rest})"), &folder)
     };
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     let marked = read("marked.obj", format!("\u{feff}{corners}f 1 2 3\n").as_bytes());
@@ -355,6 +358,7 @@ fn meshes_that_are_none_are_refused_by_line() {
     assert!(garbage.contains("garbage.obj`: line 2: expected a statement about polygons"), "{garbage}");
     let points = read("points.obj", corners.as_bytes()).unwrap_err().to_string();
     assert!(points.ends_with("points.obj`: line 3: the file ends without a face (`f`)"), "{points}");
+    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 #[test]
