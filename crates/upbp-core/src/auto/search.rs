@@ -13,7 +13,7 @@ pub(super) const GAIN: f64 = 0.05;
 /// Part of the product that four times as many light sub-paths as usual must gain. They leave less time for
 /// camera sub-paths, of whose variance stratification over iterations takes away more than a prediction
 /// knows.
-const GAIN_OF_MORE: f64 = 0.2;
+const GAIN_OF_MORE: f64 = 0.1;
 
 /// The best candidate that small steps from some sensible ones lead to.
 pub(super) struct Found {

@@ -26,6 +26,12 @@ use pairs::{Looks, View};
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
 
+/// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it
+/// finds more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened
+/// to meet is mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest
+/// too.
+const TRUSTED: f32 = 4.0;
+
 /// Parts that a variance is given in, so that its own error can be told.
 pub(super) const GROUPS: usize = 8;
 
@@ -39,6 +45,8 @@ struct Counts {
     active: ByTechnique<f64>,
     /// The number of the roulette.
     roulette: usize,
+    /// Times as rarely that a path may be found and be charged for just that.
+    trusted: f32,
     /// The fewest light sub-paths that merges come from: those with beams, if there are any.
     light_paths: f64,
 }
@@ -52,6 +60,7 @@ impl Counts {
             paths: [Technique::Surf, Technique::Bb1d].map(|technique| pilot.relative_paths(technique, plan)),
             active: [1.0; TECHNIQUES],
             roulette: pilot.roulette(plan),
+            trusted: TRUSTED,
             light_paths: f64::from(if plan.techniques.intersects(BEAMS) {
                 plan.beam_paths
             } else {
@@ -125,10 +134,26 @@ impl Variance {
 
     /// Variances of blocks of pixels, times their pixels, mean over [sides](crate::film::BLOCK_SIDES) of
     /// blocks: what pixels have in common counts once for each of them.
+    ///
+    /// What more light sub-paths than the pilot render's bring is told by rare paths at their face value: the
+    /// charge for them guards against techniques that a pilot render knows too little of, and numbers of
+    /// light sub-paths are no such techniques.
     pub(super) fn over_scales(&self, plan: &Plan) -> [f64; GROUPS] {
-        let counts = Counts::of(plan, &self.pilot);
-        let mut variance = self.with(&counts);
-        let view = View::new(&self.pilot, &self.looks, &counts);
+        let usual = self.pilot.plan.light_paths;
+        if plan.light_paths <= usual {
+            return self.over_scales_with(&Counts::of(plan, &self.pilot));
+        }
+        let fewer = Plan { light_paths: usual, ..*plan };
+        let [more, at_usual] = [plan, &fewer].map(|plan| {
+            let counts = Counts { trusted: f32::INFINITY, ..Counts::of(plan, &self.pilot) };
+            self.over_scales_with(&counts).iter().sum::<f64>()
+        });
+        self.over_scales(&fewer).map(|variance| finite_or_infinite(variance * more / at_usual))
+    }
+
+    fn over_scales_with(&self, counts: &Counts) -> [f64; GROUPS] {
+        let mut variance = self.with(counts);
+        let view = View::new(&self.pilot, &self.looks, counts);
         for shared in &self.pilot.shared {
             variance[group(shared.cell as usize)] += view.in_common(shared) / self.pilot.cells as f64;
         }

@@ -10,12 +10,6 @@ use crate::auto::pilot_render::PilotRender;
 use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
 use crate::auto::roulette::{COUNT, relative_pass_probability};
 
-/// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it
-/// finds more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened
-/// to meet is mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest
-/// too.
-const TRUSTED: f32 = 4.0;
-
 /// The samples of a pilot render, ready for the predictions of many plans.
 pub(super) struct Looks {
     /// By look, those after most albedos first.
@@ -94,6 +88,7 @@ pub(super) struct View<'a> {
     roulette: usize,
     /// Samples of each technique relative to the pilot render's plan.
     relative: [f32; TECHNIQUES],
+    trusted: f32,
     /// Pairs of samples of one query that count beside those of independent samples: it is made for both or
     /// for none.
     common: [f32; TECHNIQUES],
@@ -113,6 +108,7 @@ impl<'a> View<'a> {
             looks,
             roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
+            trusted: counts.trusted,
             common: counts.active.map(|p| (1.0 / p - 1.0) as f32),
             more: [0, 1].map(|i| (pilot.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
             periodic: counts.active.iter().any(|p| *p < 1.0),
@@ -195,7 +191,7 @@ impl<'a> View<'a> {
         // Not one after the other, and one division: the search has nothing else to wait for.
         let (camera, merges) = ((a + b) + c, ((e + f) + (g + h)) + i);
         let inverse = 1.0 / ((camera + d) + merges);
-        Share { splats: d, merges, inverse, charge: inverse * (inverse / TRUSTED).max(1.0).sqrt() }
+        Share { splats: d, merges, inverse, charge: inverse * (inverse / self.trusted).max(1.0).sqrt() }
     }
 }
 

@@ -89,6 +89,7 @@ fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts
         paths: [paths; 2],
         active: [1.0; TECHNIQUES],
         roulette: PILOT,
+        trusted: TRUSTED,
         light_paths: 1.0,
     };
     for (technique, number) in relative {
@@ -260,6 +261,26 @@ fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
 }
 
 #[test]
+fn more_light_sub_paths_help_by_their_number_and_fewer_hurt_by_more() {
+    // One of ten such splats is light tracing's own; the others, the plan's techniques do not have.
+    let mut pilot = PilotRender { samples: Vec::new(), ends: vec![0; 2 * (SIDE * SIDE) as usize], ..pilot() };
+    let mut shares = [0.0; TECHNIQUES];
+    shares[Technique::LightTracing as usize] = 0.1;
+    shares[Technique::Bb1d as usize] = 0.9;
+    let splat =
+        Sample { technique: Technique::LightTracing, merged: None, albedos: 1.0, value: Vec3::ONE, shares };
+    pilot.splats = (0..SIDE * SIDE).map(|cell| (cell, splat)).collect();
+    pilot.plan = planned(16);
+    let variance = Variance::of(pilot);
+    let of = |light_paths| {
+        let techniques = TechniqueSet::EMPTY.with(Technique::LightTracing);
+        variance.over_scales(&Plan { techniques, light_paths, ..planned(16) }).iter().sum::<f64>()
+    };
+    assert!((of(64) / of(16) - 0.25).abs() < 1e-4, "{} {}", of(64), of(16));
+    assert!((of(4) / of(16) - 8.0).abs() < 1e-4, "{} {}", of(4), of(16));
+}
+
+#[test]
 fn no_part_is_more_than_the_largest() {
     let mut parts = vec![1.0; 1000];
     parts.extend([1e6, 1e3]);
@@ -377,7 +398,7 @@ proptest! {
         let periodic: [bool; TECHNIQUES] = periodic;
         let active: [f64; TECHNIQUES] = std::array::from_fn(|i| if periodic[i] { 0.25 } else { 1.0 });
         let counts =
-            Counts { relative: active.map(|p| 0.5 + p), paths, active, roulette: PILOT, light_paths: 1.0 };
+            Counts { relative: active.map(|p| 0.5 + p), paths, active, ..counts([], 1.0) };
         let mut expected = 0.0;
         for a in &own {
             for b in &other {
@@ -407,7 +428,8 @@ proptest! {
         let active: [f64; TECHNIQUES] = std::array::from_fn(|i| {
             if periodic[i] && Technique::ALL[i].merges() { 0.25 } else { 1.0 }
         });
-        let counts = Counts { relative: active.map(|p| 0.5 + p), paths, active, roulette, light_paths: 1.0 };
+        let relative = active.map(|p| 0.5 + p);
+        let counts = Counts { relative, paths, active, roulette, ..counts([], 1.0) };
         let expected = products(&samples, thinning, &counts);
         let pilot = PilotRender { cells: 1, passes: 1, ends: vec![samples.len() as u32], samples, thinning, ..pilot() };
         let looks = pairs::Looks::new(&pilot);
