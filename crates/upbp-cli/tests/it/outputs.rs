@@ -80,9 +80,15 @@ fn originals() -> &'static Snapshot {
     })
 }
 
-/// Makes a folder with [`originals`], other names for some, and one that is read-only.
+/// Makes a folder of which [`fill`] says what is in it.
 fn prepared(name: &str) -> Folder {
     let folder = program::folder(name);
+    fill(&folder);
+    folder
+}
+
+/// Writes [`originals`] into a folder, with other names for some, and one that is read-only.
+fn fill(folder: &Path) {
     fs::create_dir(folder.join("sub")).expect("a folder");
     for (name, bytes) in originals() {
         fs::write(folder.join(name), bytes).expect("a writable folder");
@@ -100,7 +106,6 @@ fn prepared(name: &str) -> Folder {
     let mut protected = fs::metadata(folder.join("kept.exr")).expect("the file").permissions();
     protected.set_readonly(true);
     fs::set_permissions(folder.join("kept.exr"), protected).expect("permissions");
-    folder
 }
 
 /// Runs, and checks that it was refused with all of `words` and left everything as it was.
@@ -391,7 +396,8 @@ fn random_commands_keep_what_they_read() {
             .map(|(file, kind)| (folder.join(file).canonicalize().ok(), kind));
         let written: Vec<_> = written.collect();
         if after != before {
-            prepared("commands");
+            folder.clear();
+            fill(&folder);
         }
         let said = || format!("{code:?}: {text}");
         prop_assert!(matches!(code, Some(0 | 2)) && !text.contains("panicked"), "{}", said());

@@ -32,9 +32,18 @@ pub(crate) struct Folder(PathBuf);
 /// A folder of its own for each test of each process: the same tests may run elsewhere at this moment.
 pub(crate) fn folder(name: &str) -> Folder {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
-    let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).expect("a writable target folder");
-    Folder(folder.canonicalize().expect("the folder"))
+    let folder = Folder(folder.canonicalize().expect("the folder"));
+    folder.clear();
+    folder
+}
+
+impl Folder {
+    /// Removes what is in it.
+    pub(crate) fn clear(&self) {
+        fs::remove_dir_all(&self.0).expect("a writable folder");
+        fs::create_dir(&self.0).expect("a writable target folder");
+    }
 }
 
 impl Deref for Folder {
