@@ -38,9 +38,11 @@ pub(crate) trait Wide: Copy {
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
     fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    #[cfg_attr(not(feature = "geometry"), expect(dead_code, reason = "only geometry needs it"))]
     fn abs(self, a: Self::F) -> Self::F;
     fn sqrt(self, a: Self::F) -> Self::F;
     /// `a`, negated where the sign bit of `by` is set.
+    #[cfg_attr(not(feature = "geometry"), expect(dead_code, reason = "only geometry needs it"))]
     fn flip_sign(self, a: Self::F, by: Self::F) -> Self::F;
     /// `a > b ? a : b`, thus `b` if either is NaN.
     fn greater_of(self, a: Self::F, b: Self::F) -> Self::F;

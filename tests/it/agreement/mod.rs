@@ -1,5 +1,6 @@
 //! Different ways to compute a picture give the same picture.
 
+mod audit;
 mod boundaries;
 mod channels;
 mod far_away;
