@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::Vec2;
 use upbp_media::{BodyId, Lanes, Medium, MediumStack, RaySegment, SegmentDensity};
 
 use crate::emission_guide::EmissionGuide;
@@ -79,19 +80,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             }
         }
         volumes.sort_unstable();
-        let camera_stack = camera
-            .is_pinhole()
-            .then(|| {
-                let centre = glam::Vec2::new(
-                    crop.x as f32 + 0.5 * crop.width as f32,
-                    crop.y as f32 + 0.5 * crop.height as f32,
-                );
-                // Ahead of the pinhole, which may stand on a boundary.
-                camera.ray(centre, [0.5; 2]).map(|ray| {
-                    scene.stack_at(upbp_accel::offset_origin(ray.origin, ray.direction, ray.direction))
-                })
-            })
-            .flatten();
+        let camera_stack = camera.is_pinhole().then(|| stack_of_pinhole(scene)).flatten();
         let emitting_media = scene.media().iter().any(Medium::emits);
         let dense = |medium: &S::Medium| !(medium.mean_free_path() > DENSE * bounds.radius);
         let dense_media = scene.media().iter().any(|medium| medium.scatters() && dense(medium));
@@ -395,6 +384,15 @@ fn from_infinity<S: Scene, L: Lanes>(scene: &S, bounds: &BoundingSphere) -> Segm
         RaySegment { origin: bounds.centre, direction: glam::Vec3::Z, start: 0.0, end: f32::INFINITY };
     let medium = scene.outside().map(|medium| &scene.media()[medium.0 as usize]);
     medium.map_or(SegmentDensity::VACUUM, |medium| L::segment(medium, &everything))
+}
+
+/// The bodies in which a pinhole camera is, if its ray through the middle of the film can be had.
+fn stack_of_pinhole<S: Scene>(scene: &S) -> Option<MediumStack> {
+    let crop = scene.camera().crop();
+    let centre = Vec2::new(crop.x as f32 + 0.5 * crop.width as f32, crop.y as f32 + 0.5 * crop.height as f32);
+    let ray = scene.camera().ray(centre, [0.5; 2])?;
+    // Ahead of the pinhole, which may stand on a boundary.
+    Some(scene.stack_at(upbp_accel::offset_origin(ray.origin, ray.direction, ray.direction)))
 }
 
 /// The tree over the emitters that can be chosen by `power`.

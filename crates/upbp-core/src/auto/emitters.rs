@@ -188,30 +188,12 @@ fn measure<S: Scene, L: Lanes>(
     let emission_probability = |emitter| f64::from(scene.emission_probability(emitter));
     let mut emission = Vec::new();
 
-    let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
-    let kind = StreamKind::PilotLight;
-    let pieces =
-        in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_, f64, L>, Seen)| {
-            let observer: &mut DynObserver<'_, S::Bsdf> = seen;
-            trace_light_path(&context, kind, index, scratch, out, observer);
-            true
-        })?;
-    let mut starts = vec![None; paths as usize];
-    let (mut vertices, mut beams) = (Vec::new(), Vec::new());
     let mut seen = Seen::default();
-    for (out, own) in pieces {
-        vertices.extend(out.vertices);
-        beams.extend(out.beams);
-        seen.append(own);
-    }
+    let map = light_sub_paths::<_, L>(&context, &mut seen, halt)?;
+    let mut starts = vec![None; plan.light_paths as usize];
     for &(path, end) in &seen.starts {
         starts[path as usize] = Some((end, 0.0));
     }
-    let map = if plan.stores_vertices() || plan.stores_beams() {
-        LightMap::build(plan, vertices, beams)
-    } else {
-        LightMap::empty()
-    };
     let mut by_path = |seen: &[(u32, Contribution)], scale| {
         for &(path, contribution) in seen {
             if let Some((end, light)) = &mut starts[path as usize] {
@@ -247,6 +229,34 @@ fn measure<S: Scene, L: Lanes>(
     guides.starts = starts.into_iter().flatten().collect();
     let probabilities = (0..emitters).map(|i| emission_probability(EmitterId(i as u32))).collect();
     Some(Measured { emission: EmitterShares::of(probabilities, &emission), next_events, guides })
+}
+
+/// What light sub-paths of a plan leave; what they contribute by themselves goes to `seen`.
+fn light_sub_paths<S: Scene, L: Lanes>(
+    context: &Context<'_, S>,
+    seen: &mut Seen,
+    halt: &Halt<'_>,
+) -> Option<LightMap<S::Bsdf, f64, L>> {
+    let plan = context.plan;
+    let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
+    let kind = StreamKind::PilotLight;
+    let pieces =
+        in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_, f64, L>, Seen)| {
+            let observer: &mut DynObserver<'_, S::Bsdf> = seen;
+            trace_light_path(context, kind, index, scratch, out, observer);
+            true
+        })?;
+    let (mut vertices, mut beams) = (Vec::new(), Vec::new());
+    for (out, own) in pieces {
+        vertices.extend(out.vertices);
+        beams.extend(out.beams);
+        seen.append(own);
+    }
+    Some(if plan.stores_vertices() || plan.stores_beams() {
+        LightMap::build(plan, vertices, beams)
+    } else {
+        LightMap::empty()
+    })
 }
 
 /// Contributions that sub-paths of one piece of work made.

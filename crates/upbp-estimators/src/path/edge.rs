@@ -235,17 +235,10 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 && known <= flight.max_distance()
             {
                 if let Some(boundary) = boundary {
-                    // Into a body before out of one, as all crossings at a distance.
-                    let place = if boundary.entering { before } else { self.found.len() };
-                    self.found.insert(place, boundary);
-                    let place = &self.found[before..];
-                    let correction = correction(self.bodies(), place, &self.crossings);
+                    let correction = self.look_behind(before, boundary);
                     if correction.is_some() {
                         return correction;
                     }
-                    let Self { crossings, start, end, behind, .. } = self;
-                    behind.clone_from(if crossings.is_empty() { start } else { end });
-                    cross_all(&mut self.behind, place);
                 }
                 if boundary.is_none_or(|boundary| is_surface(self.bodies(), &self.behind, &boundary)) {
                     if !self.close(scene, &mut span, &flight, known) {
@@ -262,18 +255,34 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 ray.t_min = known * (1.0 + 4.0 * f32::EPSILON) + f32::MIN_POSITIVE;
             } else if flight.max_distance() <= known {
                 let escapes = flight.max_distance() == f32::INFINITY;
-                let correction =
-                    escapes.then(|| correction_of_escape(self.bodies(), &self.crossings)).flatten();
-                if correction.is_none() {
+                let correction = escapes.then(|| correction_of_escape(self.bodies(), &self.crossings));
+                if correction.flatten().is_none() {
                     self.close(scene, &mut span, &flight, f32::INFINITY);
                 }
-                return correction;
+                return correction.flatten();
             } else {
                 // The medium has become thinner. A boundary at the end of what is known is still to come.
                 ray.t_min = known.next_down();
             }
             ray.t_max = flight.max_distance();
         }
+    }
+
+    /// Puts `boundary` among what was found at its distance, from the one `before` on, and tells which bodies
+    /// are behind all of that; or the correction that there must be first.
+    #[inline]
+    fn look_behind(&mut self, before: usize, boundary: Crossing) -> Option<Crossing> {
+        // Into a body before out of one, as all crossings at a distance.
+        let place = if boundary.entering { before } else { self.found.len() };
+        self.found.insert(place, boundary);
+        let place = &self.found[before..];
+        let correction = correction(self.bodies(), place, &self.crossings);
+        if correction.is_none() {
+            let Self { crossings, start, end, behind, .. } = self;
+            behind.clone_from(if crossings.is_empty() { start } else { end });
+            cross_all(behind, place);
+        }
+        correction
     }
 
     /// Begins `span`: draws the distance in its medium.

@@ -1,12 +1,14 @@
 //! Next event estimation: a camera vertex and a point chosen on a light.
 
+use glam::Vec3;
 use upbp_media::{BodyId, Lanes, MediumStack};
 
 use crate::film_sample::Output;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, ray_origin};
+use crate::prepared::PreparedScene;
 use crate::random::Stream;
-use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
+use crate::scene::{Crossing, Emitter, EmitterId, EmitterKind, Incident, Scene, Walk};
 use crate::technique::Technique;
 
 /// Connects `vertex` to as many points on lights as the plan says.
@@ -39,23 +41,12 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let Context { prepared, plan } = *context;
     let (scene, mis) = (prepared.scene, &plan.mis);
-    let Some((emitter, probability)) = prepared.choose_next_event(vertex.position, stream.decide()) else {
-        return;
-    };
-    let light = &scene.emitters()[emitter.0 as usize];
-    let Some(incident) = light.sample_incident(prepared.emission_bounds(), vertex.position, stream.pair())
+    let Some(Chosen { emitter, light, probability, incident, cos_light }) =
+        choose(prepared, vertex.position, stream)
     else {
         return;
     };
-    let kind = light.kind();
-    let direction = incident.towards_light;
-    let cos_light = match kind {
-        EmitterKind::Area => -incident.point.normal.dot(direction),
-        _ => 1.0,
-    };
-    if !(cos_light >= MIN_COSINE && incident.pdf > 0.0) || incident.radiance.is_black() {
-        return;
-    }
+    let (kind, direction) = (light.kind(), incident.towards_light);
     let Some(scattering) = vertex.evaluate(context, direction) else {
         return;
     };
@@ -112,6 +103,34 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         weight,
         value,
     });
+}
+
+/// A point on a light, as a receiver sees it.
+struct Chosen<'a, E> {
+    emitter: EmitterId,
+    light: &'a E,
+    /// Of choosing this light.
+    probability: f32,
+    incident: Incident,
+    /// 1 where the light is no surface.
+    cos_light: f32,
+}
+
+/// Chooses a point on a light, unless it sends nothing to the receiver.
+fn choose<'a, S: Scene>(
+    prepared: &PreparedScene<'a, S>,
+    receiver: Vec3,
+    stream: &mut Stream,
+) -> Option<Chosen<'a, S::Emitter>> {
+    let (emitter, probability) = prepared.choose_next_event(receiver, stream.decide())?;
+    let light = &prepared.scene.emitters()[emitter.0 as usize];
+    let incident = light.sample_incident(prepared.emission_bounds(), receiver, stream.pair())?;
+    let cos_light = match light.kind() {
+        EmitterKind::Area => -incident.point.normal.dot(incident.towards_light),
+        _ => 1.0,
+    };
+    let shines = cos_light >= MIN_COSINE && incident.pdf > 0.0 && !incident.radiance.is_black();
+    shines.then_some(Chosen { emitter, light, probability, incident, cos_light })
 }
 
 /// Whether `body` counts at the end of an edge that starts in the bodies of `stack`.
