@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::emitter_choice::Selection;
+use crate::emitter_selection::Selection;
 use crate::scene::{BoundingSphere, Emitter, EmitterBounds, EmitterId};
 
 /// The least part of its intensity that a node is taken to send anywhere: bounds are the host's word.

@@ -4,6 +4,7 @@ pub mod check;
 mod counters;
 mod emission_guide;
 mod emitter_choice;
+mod emitter_selection;
 mod emitter_tree;
 mod features;
 mod film_sample;
@@ -26,7 +27,8 @@ pub mod trace;
 
 pub use counters::Counters;
 pub use emission_guide::{EmissionGuide, EmissionSample};
-pub use emitter_choice::{EmitterChoice, EmitterSample, EmitterShares};
+pub use emitter_choice::EmitterChoice;
+pub use emitter_selection::{EmitterSample, EmitterShares};
 pub use features::Features;
 pub use film_sample::CameraWalk;
 pub use iteration::{IterationChoices, IterationPlan, Kernels, PathLengths};

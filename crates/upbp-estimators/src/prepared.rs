@@ -6,7 +6,8 @@ use glam::Vec2;
 use upbp_media::{BodyId, Lanes, Medium, MediumStack, RaySegment, SegmentDensity};
 
 use crate::emission_guide::EmissionGuide;
-use crate::emitter_choice::{EmitterChoice, EmitterSample, EmitterShares, Selection};
+use crate::emitter_choice::EmitterChoice;
+use crate::emitter_selection::{EmitterSample, EmitterShares, Selection};
 use crate::emitter_tree::EmitterTree;
 use crate::random::Decision;
 use crate::receiver_shares::{ClusterSample, ReceiverShares};

@@ -9,7 +9,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::emitter_choice::{EmitterSample, EmitterShares};
+use crate::emitter_selection::{EmitterSample, EmitterShares};
 use crate::scene::EmitterId;
 
 /// Shares are multiples of one over this.

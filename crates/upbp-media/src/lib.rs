@@ -3,6 +3,7 @@
 mod basis;
 mod error;
 mod homogeneous;
+mod lane_values;
 mod lanes;
 mod medium;
 mod mixture;
@@ -19,6 +20,7 @@ pub use glam;
 pub use self::basis::orthonormal_basis;
 pub use self::error::MediaError;
 pub use self::homogeneous::Homogeneous;
+pub use self::lane_values::LaneValues;
 pub use self::lanes::{Lanes, lane_probabilities};
 pub use self::medium::Medium;
 pub use self::nested_bodies::{BodyId, Crossing, Interior, MediumId, MediumStack};

@@ -8,7 +8,7 @@
 
 use glam::Vec3;
 
-use crate::{Lanes, Spectrum};
+use crate::{LaneValues, Spectrum};
 
 /// The half-open interval `[start, end)` of a ray that lies inside one medium.
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -50,7 +50,7 @@ impl RaySegment {
 }
 
 /// Transmittance and sampling densities of one segment, for both directions of walking; densities in each of
-/// the [`Lanes`] `L`.
+/// the [lanes](LaneValues) `L`.
 #[derive(Copy, Clone, Debug, PartialEq)]
 pub struct SegmentDensity<L = f64> {
     /// Transmittance `T` of the segment per channel, in `[0, 1]`.
@@ -65,7 +65,7 @@ pub struct SegmentDensity<L = f64> {
     pub stop_at_start: L,
 }
 
-impl<L: Lanes> SegmentDensity<L> {
+impl<L: LaneValues> SegmentDensity<L> {
     /// A segment of vacuum: everything passes.
     pub const VACUUM: Self = Self::passing(Spectrum::ONE);
 
@@ -104,7 +104,7 @@ pub struct EdgeDensity<L = f64> {
     started: bool,
 }
 
-impl<L: Lanes> EdgeDensity<L> {
+impl<L: LaneValues> EdgeDensity<L> {
     /// An edge without segments: everything passes, nothing stops.
     pub const EMPTY: Self = Self {
         transmittance: Spectrum::ONE,
@@ -172,7 +172,7 @@ impl<L: Lanes> EdgeDensity<L> {
     }
 }
 
-impl<L: Lanes> Default for EdgeDensity<L> {
+impl<L: LaneValues> Default for EdgeDensity<L> {
     fn default() -> Self {
         Self::EMPTY
     }

@@ -5,6 +5,7 @@
 
 mod conductor;
 mod dielectric;
+mod facet;
 mod fresnel;
 mod lambert;
 mod local;

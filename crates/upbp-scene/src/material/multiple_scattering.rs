@@ -20,8 +20,9 @@ use std::sync::OnceLock;
 
 use glam::Vec3;
 
+use super::facet::scattered;
+use super::fresnel::refraction;
 use super::local::sample_cosine;
-use super::rough_dielectric::RoughDielectric;
 use super::trowbridge_reitz::TrowbridgeReitz;
 
 /// Nodes along the root of the roughness, from 0 to 1.
@@ -75,7 +76,7 @@ impl Row {
         if alpha == 0.0 {
             return Self { missing: [0.0; COSINES], mean: 0.0, passed: 1.0 };
         }
-        let glass = RoughDielectric { normals: TrowbridgeReitz { alpha } };
+        let normals = TrowbridgeReitz { alpha };
         let eta = (1.0 + contrast) / (1.0 - contrast);
         let at = |place: f32| {
             // The horizon itself sees no facet from the front.
@@ -83,7 +84,7 @@ impl Row {
             let mut sums = [0.0; 2];
             for i in 0..FACETS {
                 let u = [i, i * FIBONACCI % FACETS].map(|k| (k as f32 + 0.5) / FACETS as f32);
-                let parts = glass.scattered_once(mu, eta, u);
+                let parts = scattered_once(normals, mu, eta, u);
                 sums = [sums[0] + parts[0], sums[1] + parts[1]];
             }
             sums.map(|sum| sum / FACETS as f32)
@@ -191,4 +192,17 @@ impl Lobe {
         let side = if cos_from * cos_to > 0.0 { 1.0 - self.passes } else { self.passes };
         side * cos_to.abs() * FRAC_1_PI
     }
+}
+
+/// The parts of the light from a direction with the cosine `mu` that a facet, drawn among those which it
+/// sees, reflects and refracts out of the surface; `eta` is the index beyond over that on this side.
+fn scattered_once(normals: TrowbridgeReitz, mu: f32, eta: f32, u: [f32; 2]) -> [f32; 2] {
+    let above = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
+    let Some(normal) = normals.sample_visible(above, u) else { return [0.0; 2] };
+    let reflectance = refraction(above.dot(normal).clamp(0.0, 1.0), 1.0, eta).reflectance;
+    let leaves = |reflects| {
+        let to = scattered(above, normal, [1.0, eta], reflects);
+        to.map_or(0.0, |to| normals.shadowing_masking(above, to) / normals.masking(above))
+    };
+    [reflectance * leaves(true), (1.0 - reflectance) * leaves(false)]
 }

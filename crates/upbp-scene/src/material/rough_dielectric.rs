@@ -8,6 +8,7 @@ use glam::Vec3;
 use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
+use super::facet::scattered;
 use super::fresnel::refraction;
 use super::local::indices;
 use super::multiple_scattering::Lobe;
@@ -115,33 +116,6 @@ impl RoughDielectric {
         let reflects = u_lobe < refraction(cos_from, eta_from, eta_to).reflectance;
         Some(scattered(above, normal, [eta_from, eta_to], reflects)? * side)
     }
-
-    /// The parts of the light from a direction with the cosine `mu` that a facet, drawn among those which it
-    /// sees, reflects and refracts out of the surface; `eta` is the index beyond over that on this side.
-    pub(super) fn scattered_once(self, mu: f32, eta: f32, u: [f32; 2]) -> [f32; 2] {
-        let above = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
-        let Some(normal) = self.normals.sample_visible(above, u) else { return [0.0; 2] };
-        let reflectance = refraction(above.dot(normal).clamp(0.0, 1.0), 1.0, eta).reflectance;
-        let leaves = |reflects| {
-            let to = scattered(above, normal, [1.0, eta], reflects);
-            to.map_or(0.0, |to| self.normals.shadowing_masking(above, to) / self.normals.masking(above))
-        };
-        [reflectance * leaves(true), (1.0 - reflectance) * leaves(false)]
-    }
-}
-
-/// The direction into which a facet reflects or refracts light from `above`, which has a positive z; none if
-/// that is not the side which such light has to leave to.
-fn scattered(above: Vec3, normal: Vec3, [eta_from, eta_to]: [f32; 2], reflects: bool) -> Option<Vec3> {
-    let cos_from = above.dot(normal).clamp(0.0, 1.0);
-    let to = if reflects {
-        2.0 * cos_from * normal - above
-    } else {
-        let ratio = eta_from / eta_to;
-        let cos_transmitted = refraction(cos_from, eta_from, eta_to).cos_transmitted;
-        (ratio * cos_from - cos_transmitted) * normal - ratio * above
-    };
-    to.try_normalize().filter(|to| to.z != 0.0 && (to.z > 0.0) == reflects)
 }
 
 fn is_matched([eta_from, eta_to]: [f32; 2]) -> bool {

@@ -1,0 +1,181 @@
+//! A discrete distribution over emitters, by their power and by the light that they were seen to bring.
+
+use serde::{Deserialize, Serialize};
+
+use crate::random::Decision;
+use crate::scene::EmitterId;
+
+/// Light that each emitter was seen to bring, as
+/// [`choose_emitters_by`](crate::PreparedScene::choose_emitters_by) takes it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EmitterShares {
+    /// Light by emitter, in any unit; emitters that are left out bring nothing.
+    pub light: Vec<f64>,
+    /// Samples that this was measured with.
+    pub samples: f64,
+}
+
+/// A contribution of some emitter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmitterSample {
+    /// The emitter.
+    pub emitter: EmitterId,
+    /// The contribution before weighting, divided by the probability that the emitter was chosen with.
+    pub light: f64,
+    /// All other techniques, relative to this one if it chose the emitter with a probability of one.
+    pub others: f64,
+}
+
+impl EmitterShares {
+    /// The light that each emitter would bring and nothing else would find, if emitters were chosen in
+    /// proportion to just that: contributions times the square of their weights. The `probabilities` of
+    /// emitters are where the search for these begins.
+    #[must_use]
+    pub fn of(mut probabilities: Vec<f64>, samples: &[EmitterSample]) -> Self {
+        let mut light = vec![0.0; probabilities.len()];
+        for _ in 0..ROUNDS {
+            light.fill(0.0);
+            for sample in samples {
+                let emitter = sample.emitter.0 as usize;
+                let weight = probabilities[emitter] / (probabilities[emitter] + sample.others);
+                if weight > 0.0 {
+                    light[emitter] += sample.light * weight * weight;
+                }
+            }
+            let sum: f64 = light.iter().sum();
+            if !(sum > 0.0 && sum.is_finite()) {
+                break;
+            }
+            for (probability, light) in probabilities.iter_mut().zip(&light) {
+                *probability = light / sum;
+            }
+        }
+        Self { light, samples: samples.len() as f64 }
+    }
+}
+
+/// Steps towards probabilities that reproduce themselves.
+const ROUNDS: u32 = 16;
+
+/// Power keeps at least this share of a choice.
+const POWER_SHARE: f64 = 0.1;
+
+/// Samples per emitter from which on a measured share counts more than power.
+const TELLING_SAMPLES: f64 = 16.0;
+
+/// Even part of the choice by which lights are measured: what power alone never chooses is not learnt.
+const EVEN: f64 = 0.5;
+
+/// Random numbers are multiples of 2⁻²⁴.
+pub(crate) const STEPS: u32 = 1 << 24;
+
+/// No light gets less than this part of an even share: it may be all that some corner of the scene sees.
+const LEAST_OF_EVEN_SHARE: f64 = 0.01;
+
+/// A discrete distribution over emitters.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(crate) struct Selection {
+    /// Running sums of the probabilities, in units of the random numbers: what is chosen with these has
+    /// exactly the probability that it is said to have, and whatever shines is chosen at all.
+    cumulative: Vec<u32>,
+}
+
+impl Selection {
+    pub(crate) fn new(powers: &[f64]) -> Self {
+        let total: f64 = powers.iter().sum();
+        let mut waiting = powers.iter().filter(|power| **power > 0.0).count();
+        let least = LEAST_OF_EVEN_SHARE / waiting as f64;
+        let share = |power: f64| if power > 0.0 { (power / total).max(least) } else { 0.0 };
+        let shares: f64 = powers.iter().copied().map(share).sum();
+        let (mut sum, mut end) = (0.0, 0_u32);
+        let cumulative = powers
+            .iter()
+            .map(|&power| {
+                if power > 0.0 {
+                    sum += share(power);
+                    waiting -= 1;
+                    let last = STEPS.saturating_sub(waiting as u32);
+                    let next = ((sum / shares * f64::from(STEPS)).round() as u32).max(end + 1);
+                    end = if waiting == 0 { STEPS } else { next.min(last) };
+                }
+                end
+            })
+            .collect();
+        Self { cumulative }
+    }
+
+    /// The even distribution over the emitters that this one can choose, mixed with this one.
+    pub(crate) fn spread(&self) -> Self {
+        let count = self.cumulative.len();
+        let power = |i: usize| f64::from(self.probability(EmitterId(i as u32)));
+        let shining = (0..count).filter(|&i| power(i) > 0.0).count() as f64;
+        let weight = |i| if power(i) > 0.0 { (1.0 - EVEN) * power(i) + EVEN / shining } else { 0.0 };
+        Self::new(&(0..count).map(weight).collect::<Vec<_>>())
+    }
+
+    /// Whether this is a distribution over the emitters that `power` can choose.
+    pub(crate) fn fits(&self, power: &Self) -> bool {
+        let steps = |selection: &Self| {
+            let starts = std::iter::once(0).chain(selection.cumulative.iter().copied());
+            starts.zip(selection.cumulative.clone()).map(|(start, end)| end.cmp(&start)).collect::<Vec<_>>()
+        };
+        self.cumulative.last() == power.cumulative.last() && steps(self) == steps(power)
+    }
+
+    /// The distribution without some of the emitters.
+    pub(crate) fn without(&self, is_left_out: impl Fn(EmitterId) -> bool) -> Self {
+        let probability = |id| if is_left_out(id) { 0.0 } else { f64::from(self.probability(id)) };
+        let rest: Vec<f64> = (0..self.cumulative.len()).map(|i| probability(EmitterId(i as u32))).collect();
+        Self::new(&rest)
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.cumulative.last().is_none_or(|&end| end == 0)
+    }
+
+    /// The distribution with a part that follows `shares`, the larger the more samples they stand on.
+    pub(crate) fn blend(&self, shares: &EmitterShares) -> Self {
+        let count = self.cumulative.len();
+        let power = |i: usize| f64::from(self.probability(EmitterId(i as u32)));
+        let light = |i: usize| match shares.light.get(i) {
+            Some(&light) if light > 0.0 && power(i) > 0.0 => light,
+            _ => 0.0,
+        };
+        let sum: f64 = (0..count).map(light).sum();
+        if !(sum > 0.0 && sum.is_finite()) {
+            return self.clone();
+        }
+        let evidence = shares.samples / TELLING_SAMPLES;
+        let trust = (1.0 - POWER_SHARE) * evidence / (evidence + count as f64);
+        let weights: Vec<f64> =
+            (0..count).map(|i| trust * light(i) / sum + (1.0 - trust) * power(i)).collect();
+        Self::new(&weights)
+    }
+
+    /// Chooses as [`choose`](Self::choose) does, by a number that is only asked for if there is a choice.
+    #[inline]
+    pub(crate) fn choose_by(&self, decision: Decision) -> Option<(EmitterId, f32)> {
+        if self.cumulative == [STEPS] {
+            return Some((EmitterId(0), 1.0));
+        }
+        self.choose(f64::from(decision.uniform()))
+    }
+
+    pub(crate) fn choose(&self, u: f64) -> Option<(EmitterId, f32)> {
+        let target = ((u * f64::from(STEPS)) as u32).min(STEPS - 1);
+        let index = self.cumulative.partition_point(|&end| end <= target);
+        let emitter = EmitterId(u32::try_from(index).ok()?);
+        (index < self.cumulative.len()).then(|| (emitter, self.probability(emitter)))
+    }
+
+    pub(crate) fn probability(&self, emitter: EmitterId) -> f32 {
+        let index = emitter.0 as usize;
+        let Some(&end) = self.cumulative.get(index) else { return 0.0 };
+        let start = if index == 0 { 0 } else { self.cumulative[index - 1] };
+        end.saturating_sub(start) as f32 / STEPS as f32
+    }
+}
+
+#[cfg(test)]
+mod tests;
