@@ -3,9 +3,9 @@
 
 #[cfg(feature = "geometry")]
 mod geometry;
-mod lanes;
 mod lookup;
 mod ray;
+mod simd;
 
 pub use glam;
 

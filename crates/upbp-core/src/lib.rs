@@ -1,13 +1,13 @@
 #![doc = include_str!("../README.md")]
 
 mod auto;
-mod budget;
+mod deadline;
 mod error;
 mod files;
 mod film;
 mod output;
 mod plan;
-mod radius;
+mod radius_schedule;
 mod render;
 mod report;
 mod settings;
@@ -18,7 +18,7 @@ pub use glam;
 pub use upbp_media as media;
 
 pub use auto::technique_support::TechniqueSupport;
-pub use budget::{Canceller, Preparing, Stop};
+pub use deadline::{Canceller, Preparing, Stop};
 pub use error::{OutputError, RenderError, SettingsError, StateError};
 pub use files::{
     Content, Output, abandon_files, check_outputs, check_writable, open_exr, open_file, read_text,
@@ -30,7 +30,7 @@ pub use film::{
 };
 pub use output::{Metadata, ToneCurve, ToneMapping, read_exr, write_exr, write_image, write_png};
 pub use plan::{FrozenPlan, Plan};
-pub use radius::{Radii, Radius, RadiusSchedule};
+pub use radius_schedule::{Radii, Radius, RadiusSchedule};
 pub use render::{Outcome, Progress, Renderer, Start, StopReason};
 pub use report::Report;
 pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTechniques};

@@ -8,7 +8,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use upbp_estimators::{EmitterChoice, FootprintField, MergePeriods, Roulette, Technique, TechniqueSet};
 
-use crate::radius::RadiusSchedule;
+use crate::radius_schedule::RadiusSchedule;
 
 /// Samples of a technique that a camera vertex may have on average.
 pub(crate) const PER_VERTEX: RangeInclusive<f32> = 0.001..=1000.0;

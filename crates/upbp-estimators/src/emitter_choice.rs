@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use crate::emission_guide::EmissionGuide;
 use crate::emitter_selection::{STEPS, Selection};
 use crate::emitter_tree::EmitterTree;
+use crate::emitters_by_receiver::ReceiverShares;
 use crate::random::Decision;
-use crate::receiver_shares::ReceiverShares;
 use crate::scene::{BoundingSphere, EmitterId};
 
 /// The probabilities of emitters: part of a plan, so that iterations on all machines choose alike.

@@ -3,9 +3,9 @@
 use upbp_media::{Medium, MediumId};
 
 use crate::kernel::Kernel;
+use crate::merge_periods::MergePeriods;
 use crate::mis::{BeamExtent, Heuristic, MergeKind, MisPlan, VolumeMerges};
 use crate::path::Interaction;
-use crate::periods::MergePeriods;
 use crate::radius_field::RadiusField;
 use crate::roulette::Roulette;
 use crate::scene::Scene;

@@ -3,15 +3,15 @@
 //! Distances are drawn from a mixture of the channels' exponentials, anew on every segment: `S = Σ α_c
 //! e^{−σ_c ℓ}`, `p = Σ α_c σ_c e^{−σ_c ℓ}`. The estimate divides by the mixture, so that the throughput of a
 //! segment never exceeds `1/α_c`, whatever the ratio of the channels. The probabilities `α` are those of
-//! `mixture.rs`. A purely absorbing medium is passed with probability one.
+//! `channel_mixture.rs`. A purely absorbing medium is passed with probability one.
 //!
 //! Source: `docs/theory.md`, section 1.4, policy B. Oracles: quadrature and
 //! `tests::grey_equals_the_mixture_of_three_equal_channels`.
 
 use glam::Vec3;
 
+use crate::channel_mixture::{channel_probabilities, segment_growth};
 use crate::error::check_non_negative;
-use crate::mixture::{channel_probabilities, segment_growth};
 use crate::{MediaError, Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 
 /// Floor of [`Medium::continuation`]: keeps the probability positive where hardly anything scatters. A

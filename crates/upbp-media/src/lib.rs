@@ -1,13 +1,13 @@
 #![doc = include_str!("../README.md")]
 
 mod basis;
+mod channel_mixture;
 mod error;
 mod homogeneous;
 mod lane_values;
 mod lanes;
 mod medium;
-mod mixture;
-mod nested_bodies;
+mod medium_stack;
 mod phase;
 mod segment;
 mod spectrum;
@@ -23,7 +23,7 @@ pub use self::homogeneous::Homogeneous;
 pub use self::lane_values::LaneValues;
 pub use self::lanes::{Lanes, lane_probabilities};
 pub use self::medium::Medium;
-pub use self::nested_bodies::{BodyId, Crossing, Interior, MediumId, MediumStack};
+pub use self::medium_stack::{BodyId, Crossing, Interior, MediumId, MediumStack};
 pub use self::phase::{
     Asymmetry, Blend, Draine, PerChannel, PhaseFunction, PhaseSample, PhaseValue, Tabulated,
 };

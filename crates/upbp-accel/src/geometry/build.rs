@@ -15,7 +15,7 @@ use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 
 use super::hierarchy::{Child, Hierarchy, Kind, Node};
-use crate::lanes::WIDTH;
+use crate::simd::WIDTH;
 
 /// Primitives up to which a scene has no tree: every ray is tested against all.
 const SMALL: usize = 48;

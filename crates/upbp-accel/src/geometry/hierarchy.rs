@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 
 use super::lane_ray::{LaneRay, Planes, SLAB_ROUNDING, SlabRay};
-use crate::lanes::{WIDTH, Wide, set_lanes};
+use crate::simd::{WIDTH, Wide, set_lanes};
 
 /// Kind of the primitives in a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

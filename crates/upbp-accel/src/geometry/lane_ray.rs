@@ -1,7 +1,7 @@
 //! A ray, prepared for tests against eight boxes or primitives at once.
 
-use crate::lanes::Wide;
 use crate::ray::Ray;
+use crate::simd::Wide;
 
 /// Rounding errors that the tests of primitives allow for, as a multiple of the greatest magnitude in a
 /// computation: three to four times what sums of products of vectors can lose.
@@ -26,7 +26,7 @@ pub(super) struct SlabRay<W: Wide> {
 }
 
 /// The least and the greatest coordinates of eight boxes, by axis.
-pub(super) type Planes = [[[f32; crate::lanes::WIDTH]; 2]; 3];
+pub(super) type Planes = [[[f32; crate::simd::WIDTH]; 2]; 3];
 
 impl<W: Wide> LaneRay<W> {
     #[inline(always)]

@@ -3,7 +3,6 @@
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
 
 mod axis_box;
-mod block;
 mod build;
 mod error;
 mod hierarchy;
@@ -11,12 +10,13 @@ mod hit;
 mod lane_ray;
 mod mesh;
 mod primitive;
+mod primitive_block;
 mod quad;
 mod scene;
 mod shape;
 mod sphere;
 mod triangle;
-mod volume;
+mod volume_sampling;
 
 pub use axis_box::AxisBox;
 pub use error::GeometryError;
@@ -26,4 +26,4 @@ pub use quad::Quad;
 pub use scene::SceneGeometry;
 pub use shape::Shape;
 pub use sphere::Sphere;
-pub use volume::ShapeVolume;
+pub use volume_sampling::ShapeVolume;

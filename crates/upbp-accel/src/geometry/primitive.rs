@@ -3,16 +3,16 @@
 use std::ops::ControlFlow;
 
 use super::axis_box::AxisBox;
-use super::block::{AxisBoxes, Block, Quads, Spheres, TriangleRay, Triangles};
 use super::build::Boxed;
 use super::hierarchy::{BlockRef, Child, Kind};
 use super::hit::{Candidate, ShapeId};
 use super::lane_ray::LaneRay;
+use super::primitive_block::{AxisBoxes, Block, Quads, Spheres, TriangleRay, Triangles};
 use super::quad::Quad;
 use super::shape::Shape;
 use super::sphere::Sphere;
-use crate::lanes::{WIDTH, Wide, set_lanes};
 use crate::ray::Ray;
+use crate::simd::{WIDTH, Wide, set_lanes};
 
 /// The name of a primitive: a shape, and its triangle.
 #[derive(Clone, Copy, Debug, Default)]

@@ -14,8 +14,8 @@ use super::lane_ray::LaneRay;
 use super::primitive::{Name, Primitives, Probe};
 use super::shape::Shape;
 use super::sphere::Sphere;
-use crate::lanes::{Task, Wide, run};
 use crate::ray::Ray;
+use crate::simd::{Task, Wide, run};
 
 /// The shapes of a scene, ready for rays.
 #[derive(Clone, Debug)]

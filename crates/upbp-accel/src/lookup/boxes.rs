@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::lanes::{TO_WHOLE, Task, WIDTH, Wide, run};
+use crate::simd::{TO_WHOLE, Task, WIDTH, Wide, run};
 
 /// The box around some items: least and greatest corner.
 pub(super) type Bounds = (Vec3, Vec3);

@@ -6,8 +6,8 @@
 
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
 
-mod approach;
 mod boxes;
+mod closest_approach;
 mod point_tree;
 mod query;
 mod radius;
@@ -18,7 +18,7 @@ mod split;
 mod split_choice;
 mod tree;
 
-pub use approach::{ClosestApproach, PARALLEL_SIN2, Segment, closest_approach};
+pub use closest_approach::{ClosestApproach, PARALLEL_SIN2, Segment, closest_approach};
 pub use point_tree::PointTree;
 pub use radius::{GrowingRadius, SearchRadius};
 pub use segment_tree::SegmentTree;

@@ -9,8 +9,8 @@ use super::radius::{GrowingAlong, RadiusAlong, SearchRadius};
 use super::region::{Ball, ThickRay};
 use super::sort::Item;
 use super::tree::PackedTree;
-use crate::lanes::{WIDTH, Wide};
 use crate::ray::Ray;
+use crate::simd::{WIDTH, Wide};
 
 /// Eight points: two cache lines if payloads are small. An unused lane is NaN, which no comparison accepts.
 #[derive(Clone, Copy, Debug)]

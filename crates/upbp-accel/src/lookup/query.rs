@@ -7,7 +7,7 @@
 use super::boxes::Boxes;
 use super::region::Region;
 use super::tree::{MAX_LEVELS, PackedTree};
-use crate::lanes::{Task, WIDTH, Wide, run, set_lanes};
+use crate::simd::{Task, WIDTH, Wide, run, set_lanes};
 
 /// The greatest number of blocks or leaves that wait to be looked at.
 const WAITING: usize = 24;

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use crate::lanes::Wide;
 use crate::ray::Ray;
+use crate::simd::Wide;
 
 /// The radius of a search around a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::boxes::Boxes;
 use super::radius::RadiusAlong;
-use crate::lanes::Wide;
 use crate::ray::Ray;
+use crate::simd::Wide;
 
 /// Rounding of the tests on items, as a multiple of the greatest distance in their computation: an item that
 /// its own test accepts in single precision must not be lost by its box.

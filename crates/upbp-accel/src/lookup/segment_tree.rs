@@ -3,16 +3,16 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::approach::{ClosestApproach, Segment, closest_approach};
 use super::boxes::Exact;
+use super::closest_approach::{ClosestApproach, Segment, closest_approach};
 use super::query::Query;
 use super::radius::{GrowingAlong, RadiusAlong, SearchRadius};
 use super::region::{Ball, ThickRay};
 use super::sort::Item;
 use super::split::{Piece, SplitParams, split};
 use super::tree::PackedTree;
-use crate::lanes::{WIDTH, Wide};
 use crate::ray::Ray;
+use crate::simd::{WIDTH, Wide};
 
 /// Eight pieces. The data by which most pieces fail is in the first three cache lines. An unused lane is NaN,
 /// which no comparison accepts.

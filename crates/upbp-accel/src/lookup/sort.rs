@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use crate::lanes::{TO_WHOLE, Task, WIDTH, Wide, run};
+use crate::simd::{TO_WHOLE, Task, WIDTH, Wide, run};
 
 /// A place with data, before it has its place in a tree.
 pub(super) type Item<T> = (Vec3, T);

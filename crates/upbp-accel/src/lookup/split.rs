@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::approach::Segment;
+use super::closest_approach::Segment;
 
 /// Limits of the split of long segments into pieces.
 #[derive(Clone, Copy, Debug, PartialEq)]

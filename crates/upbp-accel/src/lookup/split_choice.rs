@@ -2,14 +2,14 @@
 
 use std::cell::Cell;
 
-use super::approach::Segment;
 use super::boxes::Boxes;
+use super::closest_approach::Segment;
 use super::query::Query;
 use super::region::{Region, ThickRay};
 use super::segment_tree::{Block, SegmentTree};
 use super::split::SplitParams;
-use crate::lanes::Wide;
 use crate::ray::Ray;
+use crate::simd::Wide;
 
 impl SplitParams {
     /// Segments per sampled one.

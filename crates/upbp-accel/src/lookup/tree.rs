@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::boxes::{Bounds, Boxes, Exact, union};
 use super::sort::{Buckets, Item, split, split_few};
-use crate::lanes::WIDTH;
+use crate::simd::WIDTH;
 
 /// Items of a leaf, of all its blocks.
 const LEAF: usize = WIDTH * WIDTH;

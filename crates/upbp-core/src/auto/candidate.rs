@@ -11,7 +11,7 @@ use super::roulette;
 use super::statistics::Statistics;
 use super::technique_support::TechniqueSupport;
 use crate::plan::Plan;
-use crate::radius::Radius;
+use crate::radius_schedule::Radius;
 use crate::settings::{CheckedSettings, LightPaths};
 
 /// Numbers of light sub-paths, relative to the full plan's: more than one per pixel where what matters is
@@ -199,7 +199,7 @@ mod tests {
     use std::collections::VecDeque;
 
     use super::*;
-    use crate::radius::RadiusSchedule;
+    use crate::radius_schedule::RadiusSchedule;
     use upbp_estimators::RadiusField;
 
     #[test]

@@ -22,9 +22,9 @@ use upbp_media::Lanes;
 
 use super::full_plan::{iteration_plan, plan_with};
 use super::guides::{self, Evidence, Starts};
-use super::pieces::{in_pieces, pixel};
+use super::parallel_walks::{in_pieces, pixel};
 use super::statistics;
-use crate::budget::{Budget, Halt};
+use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
 use crate::settings::CheckedSettings;
 

@@ -5,13 +5,13 @@ use upbp_estimators::{
     IterationChoices, IterationPlan, MergePeriods, PathLengths, PreparedScene, Technique, TechniqueSet,
 };
 
-use super::memory::{LightCounts, Room};
+use super::memory_limit::{LightCounts, Room};
 use super::photon_distances::Neighbours;
 use super::roulette::usual_roulette;
 use super::statistics::Statistics;
-use crate::budget::Budget;
+use crate::deadline::Budget;
 use crate::plan::Plan;
-use crate::radius::{Radius, RadiusSchedule};
+use crate::radius_schedule::{Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
 
 /// The techniques with photon beams.

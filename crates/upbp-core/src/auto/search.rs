@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::candidate::{Candidates, finished};
 use super::cost::Cost;
 use super::variance::{GROUPS, Variance};
-use crate::budget::Stop;
+use crate::deadline::Stop;
 use crate::plan::Plan;
 
 /// Part of the product that a step must gain. Predictions are noisy, and the least of many is so by chance.
@@ -168,7 +168,7 @@ mod tests {
     use upbp_estimators::{MergePeriods, RadiusField, Roulette, TechniqueSet};
 
     use super::*;
-    use crate::radius::RadiusSchedule;
+    use crate::radius_schedule::RadiusSchedule;
 
     fn judged(variance: [f64; GROUPS], cost: f64) -> Judged {
         let radii = RadiusSchedule {

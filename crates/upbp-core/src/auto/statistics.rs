@@ -13,11 +13,11 @@ use upbp_estimators::{
 };
 use upbp_media::Lanes;
 
-use super::footprint;
+use super::parallel_walks::{in_pieces, pixel};
 use super::photon_distances::{Nearest, Neighbours, median};
-use super::pieces::{in_pieces, pixel};
+use super::pixel_footprint;
 use super::roulette::usual_roulette;
-use crate::budget::{Allowance, Clock, Halt};
+use crate::deadline::{Allowance, Clock, Halt};
 use crate::error::RenderError;
 use crate::settings::CheckedSettings;
 
@@ -97,7 +97,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
         let plan = plan(light.paths);
         let queries = Queries::trace::<_, L>(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?;
         let field = if settings.radii.are_auto(techniques) {
-            footprint::field(scene.scene.camera(), &queries.first)
+            pixel_footprint::field(scene.scene.camera(), &queries.first)
         } else {
             RadiusField::Uniform
         };

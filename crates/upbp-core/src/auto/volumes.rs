@@ -15,9 +15,9 @@ use upbp_estimators::{
 };
 
 use super::full_plan::{iteration_plan, plan_with};
-use super::pieces::{in_pieces, pixel};
+use super::parallel_walks::{in_pieces, pixel};
 use super::statistics::Statistics;
-use crate::budget::{Budget, Halt};
+use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
 use crate::media::Medium;
 use crate::settings::CheckedSettings;

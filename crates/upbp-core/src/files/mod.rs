@@ -1,10 +1,10 @@
 //! Files: reading those that others made, and writing whole ones.
 
+mod atomic_write;
 mod input;
-mod paths;
-mod whole;
+mod output_paths;
 
+pub(crate) use atomic_write::write_whole;
+pub use atomic_write::{abandon_files, check_writable, remove_leftovers, write_text};
 pub use input::{open_exr, open_file, read_text};
-pub use paths::{Content, Output, check_outputs};
-pub(crate) use whole::write_whole;
-pub use whole::{abandon_files, check_writable, remove_leftovers, write_text};
+pub use output_paths::{Content, Output, check_outputs};

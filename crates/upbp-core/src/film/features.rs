@@ -7,7 +7,7 @@ use upbp_estimators::Features;
 
 use super::Image;
 use super::exact_sum::{self, Sum3};
-use super::interleave::set_of;
+use super::pixel_sets::set_of;
 
 /// Means of what the camera sees first, on surfaces that are not mirrors or glass, and in media.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +93,7 @@ mod tests {
     use upbp_estimators::scene::PixelRect;
 
     use super::*;
-    use crate::film::{Film, Pixel, interleave};
+    use crate::film::{Film, Pixel, pixel_sets};
     use upbp_estimators::TechniqueSet;
 
     const RECT: PixelRect = PixelRect { x: 0, y: 0, width: 2, height: 1 };
@@ -112,7 +112,7 @@ mod tests {
             [at(0.5, Vec3::NEG_Z, Some(3.0)), Features::NONE],
         ];
         let add = |film: &mut Film, i: usize| {
-            film.add_part(i as u64, interleave::ALL, &[Pixel::BLACK; 2], &iterations[i]);
+            film.add_part(i as u64, pixel_sets::ALL, &[Pixel::BLACK; 2], &iterations[i]);
         };
         let film = || Film::new(RECT, TechniqueSet::BPT).with_features();
         let (mut whole, mut halves) = (film(), [film(), film()]);

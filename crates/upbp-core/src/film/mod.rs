@@ -3,8 +3,8 @@
 mod error_estimate;
 pub(crate) mod exact_sum;
 mod features;
-pub(crate) mod interleave;
 mod iterations;
+pub(crate) mod pixel_sets;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -17,8 +17,8 @@ pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap, HalfImage};
 use exact_sum::Sum3;
 pub use features::FeatureImages;
 use features::FeatureSums;
-use interleave::{SETS, set_of, stand_ins};
 pub use iterations::{IterationSet, MAX_ITERATIONS};
+use pixel_sets::{SETS, set_of, stand_ins};
 
 /// A pixel of one iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +57,7 @@ pub struct Film {
     /// Sums of what the camera sees first, if they are kept.
     features: Option<FeatureSums>,
     iterations: IterationSet,
-    /// Iterations that are there in part, with the number of [sets of pixels](interleave) that are.
+    /// Iterations that are there in part, with the number of [sets of pixels](pixel_sets) that are.
     parts: BTreeMap<u64, u32>,
 }
 
@@ -208,7 +208,7 @@ impl Film {
     /// If `pixels` has another size than the film, or the film holds some of the iteration already, or its
     /// index is not below [`MAX_ITERATIONS`].
     pub fn add(&mut self, iteration: u64, pixels: &[Pixel]) -> u64 {
-        self.add_part(iteration, interleave::ALL, pixels, &[])
+        self.add_part(iteration, pixel_sets::ALL, pixels, &[])
     }
 
     /// Adds the pixels of some sets: those that follow on what is there of the iteration. Features count if

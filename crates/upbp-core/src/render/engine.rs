@@ -13,9 +13,9 @@ use upbp_media::Lanes;
 
 use super::passes::{Buffers, Lists, add_splats, camera_pass, light_pass};
 use crate::auto;
-use crate::auto::memory::LightCounts;
+use crate::auto::memory_limit::LightCounts;
 use crate::auto::statistics::Statistics;
-use crate::budget::{Clock, Halt};
+use crate::deadline::{Clock, Halt};
 use crate::film::Pixel;
 use crate::plan::Plan;
 use crate::settings::Settings;

@@ -13,10 +13,10 @@ use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, Features, Layer, LightMap, StreamKind};
 use upbp_media::Lanes;
 
-use crate::auto::memory::LightCounts;
-use crate::budget::Halt;
+use crate::auto::memory_limit::LightCounts;
+use crate::deadline::Halt;
 use crate::film::Pixel;
-use crate::film::interleave::set_of;
+use crate::film::pixel_sets::set_of;
 
 /// Light sub-paths per piece of work.
 const LIGHT_CHUNK: u32 = 64;

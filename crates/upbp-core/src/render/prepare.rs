@@ -7,7 +7,7 @@ use upbp_estimators::{LightMap, PreparedScene};
 
 use super::engine::{Engine, SceneEngine};
 use crate::auto;
-use crate::budget::{Budget, Canceller, Preparing, Stop};
+use crate::deadline::{Budget, Canceller, Preparing, Stop};
 use crate::error::RenderError;
 use crate::film::Film;
 use crate::plan::FrozenPlan;

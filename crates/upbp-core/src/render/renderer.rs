@@ -11,7 +11,7 @@ use super::passes::Buffers;
 use super::prepare::{Prepared, Start, prepare};
 use super::stop::{Outcome, Progress, StopReason};
 use crate::auto::technique_support::TechniqueSupport;
-use crate::budget::{Canceller, Clock, Halt, Stop};
+use crate::deadline::{Canceller, Clock, Halt, Stop};
 use crate::error::{RenderError, StateError};
 use crate::film::{ErrorEstimate, Film, MAX_ITERATIONS, Pixel};
 use crate::report::Report;

@@ -8,7 +8,7 @@ use upbp_estimators::mis::{BeamExtent, Heuristic};
 
 use crate::error::SettingsError;
 use crate::plan::PER_VERTEX;
-use crate::radius::{Radii, Radius};
+use crate::radius_schedule::{Radii, Radius};
 
 pub use techniques::{Techniques, UnknownTechniques};
 

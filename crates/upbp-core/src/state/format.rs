@@ -23,7 +23,7 @@ use super::{Identity, Record, State};
 use crate::error::StateError;
 use crate::film::Film;
 use crate::film::exact_sum::{self, MAX_ENCODED, Sum3};
-use crate::film::interleave::SETS;
+use crate::film::pixel_sets::SETS;
 use crate::film::{IterationSet, MAX_ITERATIONS};
 
 /// First bytes of every state file.

@@ -2,7 +2,7 @@ use glam::Vec3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::receiver_shares::ClusterSample;
+use crate::emitters_by_receiver::ClusterSample;
 use crate::scene::{
     BoundingSphere, Emission, Emitter, EmitterBounds, EmitterKind, EmitterPoint, HitDensities, Incident,
 };

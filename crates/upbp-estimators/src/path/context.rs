@@ -4,7 +4,7 @@ use upbp_media::Lanes;
 
 use super::edge::EdgeTrace;
 use crate::iteration::IterationPlan;
-use crate::prepared::PreparedScene;
+use crate::prepared_scene::PreparedScene;
 use crate::scene::{Crossing, Scene};
 
 /// The scene and the plan of an iteration.

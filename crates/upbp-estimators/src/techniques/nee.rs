@@ -6,7 +6,7 @@ use upbp_media::{BodyId, Lanes, MediumStack};
 use crate::film_sample::Output;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, ray_origin};
-use crate::prepared::PreparedScene;
+use crate::prepared_scene::PreparedScene;
 use crate::random::Stream;
 use crate::scene::{Crossing, Emitter, EmitterId, EmitterKind, Incident, Scene, Walk};
 use crate::technique::Technique;

@@ -11,7 +11,7 @@ use crate::path::{
     Arrival, Arrived, Context, EdgeSource, EdgeTrace, Extent, LightChunk, LightVertex, MIN_COSINE,
     MediumSpan, PhotonBeam, Scratch, arrive, ray_origin, scatter,
 };
-use crate::prepared::PreparedScene;
+use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
 use crate::scene::{Emitter, EmitterKind, Scene, Walk};

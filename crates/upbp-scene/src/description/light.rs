@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::single;
+use super::single_value;
 use super::value::{BeamAngle, Colour, CutoffAngle, Degrees, Positive, Vector, is_default};
 
 /// A light. Surfaces that shine are [shapes](super::Shape) with an emission.
@@ -42,7 +42,7 @@ pub enum Light {
         irradiance: Colour,
     },
     /// A constant environment: the same radiance, W m⁻² sr⁻¹, from all directions, infinitely far away.
-    #[serde(deserialize_with = "single::radiance")]
+    #[serde(deserialize_with = "single_value::radiance")]
     Constant(Colour),
     /// An environment given by an image: radiance from all directions, infinitely far away.
     Image {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::single;
+use super::single_value;
 use super::value::{Colour, Ior, NonNegative, Reflectance, Roughness};
 
 /// A surface material.
@@ -10,7 +10,7 @@ use super::value::{Colour, Ior, NonNegative, Reflectance, Roughness};
 #[serde(deny_unknown_fields)]
 pub enum Material {
     /// A matt surface, by its albedo; both sides reflect.
-    #[serde(deserialize_with = "single::reflectance")]
+    #[serde(deserialize_with = "single_value::reflectance")]
     Lambert(Reflectance),
     /// A matt surface with a glossy lobe; both sides reflect.
     Phong {
@@ -22,7 +22,7 @@ pub enum Material {
         exponent: NonNegative,
     },
     /// A perfectly smooth metal, by its reflectance; both sides reflect.
-    #[serde(deserialize_with = "single::reflectance")]
+    #[serde(deserialize_with = "single_value::reflectance")]
     Mirror(Reflectance),
     /// Rough metal by its complex index of refraction; both sides reflect.
     Conductor {
@@ -41,7 +41,7 @@ pub enum Material {
         reflectance: Reflectance,
     },
     /// Smooth glass: bounds a body.
-    #[serde(deserialize_with = "single::ior")]
+    #[serde(deserialize_with = "single_value::ior")]
     Dielectric {
         /// Index of refraction of the body.
         ior: Ior,

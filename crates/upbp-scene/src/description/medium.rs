@@ -4,7 +4,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use upbp_media::{PhaseFunction, Spectrum};
 
-use super::single;
+use super::single_value;
 use super::value::{Asymmetries, Asymmetry, Colour, Diameter, NonNegative, Positive, Share, is_default};
 
 /// A participating medium, in a body or around everything.
@@ -42,7 +42,7 @@ pub enum Phase {
     Rayleigh,
     /// The function of Henyey and Greenstein, by its mean cosine: above 0 forward, below 0 backward. It may
     /// differ between the channels.
-    #[serde(deserialize_with = "single::asymmetries")]
+    #[serde(deserialize_with = "single_value::asymmetries")]
     HenyeyGreenstein(Asymmetries),
     /// Two lobes of Henyey and Greenstein.
     TwoLobes {
@@ -59,7 +59,7 @@ pub enum Phase {
         alpha: NonNegative,
     },
     /// Water droplets in air, by their diameter in micrometres.
-    #[serde(deserialize_with = "single::diameter")]
+    #[serde(deserialize_with = "single_value::diameter")]
     Droplets(Diameter),
     /// A table of angles in degrees and values, linear in the cosine between them.
     #[serde(deserialize_with = "rows")]
@@ -84,11 +84,11 @@ pub enum Phase {
 }
 
 fn parts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(Positive, Phase)>, D::Error> {
-    single::read(deserializer, &["parts"])
+    single_value::read(deserializer, &["parts"])
 }
 
 fn rows<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(f32, Colour)>, D::Error> {
-    let rows: Vec<(f32, Colour)> = single::read(deserializer, &["rows"])?;
+    let rows: Vec<(f32, Colour)> = single_value::read(deserializer, &["rows"])?;
     tabulated(&rows).map_err(D::Error::custom)?;
     Ok(rows)
 }

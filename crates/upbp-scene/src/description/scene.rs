@@ -6,7 +6,7 @@ use super::camera::{Camera, Film};
 use super::light::Light;
 use super::material::Material;
 use super::medium::Medium;
-use super::named::Named;
+use super::named_map::Named;
 use super::shape::Shape;
 use super::value::Version;
 

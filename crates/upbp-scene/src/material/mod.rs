@@ -5,12 +5,12 @@
 
 mod conductor;
 mod dielectric;
+mod energy_compensation;
 mod facet;
 mod fresnel;
 mod lambert;
 mod local;
 mod mirror;
-mod multiple_scattering;
 mod phong;
 mod rough_dielectric;
 mod trowbridge_reitz;

@@ -1,5 +1,5 @@
 //! The rough surface of a transparent body: small smooth interfaces with Trowbridge-Reitz normals, and the
-//! light that they send to [each other](super::multiple_scattering).
+//! light that they send to [each other](super::energy_compensation).
 //!
 //! Source: Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007, equations 20
 //! and 21. Equation 21 compresses radiance: `f(l, c) / η_c² = f(c, l) / η_l²`.
@@ -8,10 +8,10 @@ use glam::Vec3;
 use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
+use super::energy_compensation::Lobe;
 use super::facet::scattered;
 use super::fresnel::refraction;
 use super::local::indices;
-use super::multiple_scattering::Lobe;
 use super::trowbridge_reitz::TrowbridgeReitz;
 
 /// Relative difference of indices below which the surface passes light straight, whatever its

@@ -8,7 +8,7 @@ use rand_xoshiro::rand_core::SeedableRng as _;
 use super::super::{Quad, TriangleMesh};
 use super::*;
 use crate::geometry::triangle::RayShear;
-use crate::lanes::Plain;
+use crate::simd::Plain;
 
 struct Random(Xoshiro256PlusPlus);
 

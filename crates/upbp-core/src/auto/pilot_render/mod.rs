@@ -19,9 +19,9 @@ use upbp_estimators::{
 use upbp_media::Lanes;
 
 use super::full_plan::iteration_plan;
-use super::pieces::{PIECE, in_pieces};
+use super::parallel_walks::{PIECE, in_pieces};
 use super::roulette;
-use crate::budget::Halt;
+use crate::deadline::Halt;
 use crate::plan::Plan;
 use crate::settings::CheckedSettings;
 use grid::Grid;

@@ -7,8 +7,8 @@
 //! one vertex share its error, and those of one light sub-path share that of their own.
 
 mod limits;
-mod pairs;
-mod shared;
+mod sample_pairs;
+mod shared_sub_paths;
 #[cfg(test)]
 mod tests;
 
@@ -21,7 +21,7 @@ use super::pilot_render::recorder::{ByTechnique, Sample, TECHNIQUES};
 use super::pilot_render::{PilotRender, Shared};
 use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
-use pairs::{Looks, View};
+use sample_pairs::{Looks, View};
 
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;

@@ -10,7 +10,7 @@ use super::*;
 use crate::auto::pilot_render::grid::Grid;
 use crate::auto::pilot_render::{PASSES, Work};
 use crate::auto::roulette::{self, COUNT, OF_PILOT, PILOT, relative_pass_probability};
-use crate::radius::RadiusSchedule;
+use crate::radius_schedule::RadiusSchedule;
 
 const SIDE: u32 = 128;
 
@@ -409,7 +409,7 @@ proptest! {
             }
         }
         let pilot = PilotRender { thinning, samples: Vec::new(), ends: Vec::new(), cells: 0, ..pilot() };
-        let looks = pairs::Looks::new(&pilot);
+        let looks = sample_pairs::Looks::new(&pilot);
         let shared = Shared { cell: 0, weight, samples: [own, other] };
         let found = View::new(&pilot, &looks, &counts).in_common(&shared);
         prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
@@ -432,7 +432,7 @@ proptest! {
         let counts = Counts { relative, paths, active, roulette, ..counts([], 1.0) };
         let expected = products(&samples, thinning, &counts);
         let pilot = PilotRender { cells: 1, passes: 1, ends: vec![samples.len() as u32], samples, thinning, ..pilot() };
-        let looks = pairs::Looks::new(&pilot);
+        let looks = sample_pairs::Looks::new(&pilot);
         let found = View::new(&pilot, &looks, &counts).look(0).products;
         prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
     }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use upbp_estimators::Technique;
 
-use super::pairs::View;
+use super::sample_pairs::View;
 use crate::auto::pilot_render::Shared;
 use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
 

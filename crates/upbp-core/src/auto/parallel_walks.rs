@@ -7,7 +7,7 @@ use upbp_estimators::path::Scratch;
 use upbp_estimators::scene::PixelRect;
 use upbp_media::Lanes;
 
-use crate::budget::Halt;
+use crate::deadline::Halt;
 
 /// Sub-paths per piece of work.
 pub(super) const PIECE: usize = 16;

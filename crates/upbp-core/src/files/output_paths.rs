@@ -5,7 +5,7 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use self::platform::{FileId, file_id, is_block_device, is_character_device};
-use super::whole::{folder, is_one_name, target};
+use super::atomic_write::{folder, is_one_name, target};
 use crate::error::OutputError;
 
 /// Kinds of files. One that is there and holds something else is not overwritten.

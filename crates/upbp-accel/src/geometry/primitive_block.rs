@@ -11,7 +11,7 @@ use super::lane_ray::{LaneRay, Planes, ROUNDING, SLAB_ROUNDING, SlabRay};
 use super::quad::{Plane, Quad};
 use super::sphere::Sphere;
 use super::triangle::RayShear;
-use crate::lanes::{WIDTH, Wide};
+use crate::simd::{WIDTH, Wide};
 
 /// Up to eight primitives of a kind. What unused lanes hold is of no matter.
 pub(super) trait Block: Copy {

@@ -9,8 +9,8 @@ use crate::emission_guide::EmissionGuide;
 use crate::emitter_choice::EmitterChoice;
 use crate::emitter_selection::{EmitterSample, EmitterShares, Selection};
 use crate::emitter_tree::EmitterTree;
+use crate::emitters_by_receiver::{ClusterSample, ReceiverShares};
 use crate::random::Decision;
-use crate::receiver_shares::{ClusterSample, ReceiverShares};
 use crate::scene::{BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, Scene};
 
 /// A [`Scene`] with all that is derived from it once.
