@@ -21,7 +21,7 @@ use super::pilot_render::recorder::{ByTechnique, Sample, TECHNIQUES};
 use super::pilot_render::{PilotRender, Shared};
 use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
-use sample_pairs::{Looks, View};
+use sample_pairs::{Excess, Looks, View};
 
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
@@ -29,7 +29,7 @@ const LEAST_PART: f64 = 0.05;
 /// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it
 /// finds more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened
 /// to meet is mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest
-/// too.
+/// too, unless there are so many that the plan [would have met some itself](Doubt).
 const TRUSTED: f32 = 4.0;
 
 /// Parts that a variance is given in, so that its own error can be told.
@@ -164,20 +164,24 @@ impl Variance {
         let pilot = &self.pilot;
         let mut view = View::new(pilot, &self.looks, counts);
         let mut groups = [Moments::default(); GROUPS];
+        let mut doubt = Doubt::default();
         for cell in 0..pilot.cells {
-            groups[group(cell)].add(&self.of_cell(cell, &mut view));
+            groups[group(cell)].add(&self.of_cell(cell, &mut view, &mut doubt));
         }
         let mut variance = groups.map(|moments| moments.variance(counts.light_paths) / pilot.cells as f64);
         for (cell, splat) in &pilot.splats {
+            let group = group(*cell as usize);
+            let share = view.share(&splat.shares);
             let square = pilot.second_moment(splat) as f32;
-            let second_moment = f64::from(view.share(&splat.shares).single(square));
-            variance[group(*cell as usize)] += pilot.per_splat() * second_moment;
+            variance[group] += pilot.per_splat() * f64::from(share.single(square));
+            doubt.add(group, pilot.per_splat(), &share.excess(square));
         }
-        variance.map(finite_or_infinite)
+        let charges = doubt.charges();
+        std::array::from_fn(|group| finite_or_infinite(variance[group] + charges[group]))
     }
 
     /// Moments of the samples of a cell.
-    fn of_cell(&self, cell: usize, view: &mut View<'_>) -> Moments {
+    fn of_cell(&self, cell: usize, view: &mut View<'_>, doubt: &mut Doubt) -> Moments {
         let passes = self.pilot.passes as f64;
         let mut moments = Moments::default();
         let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
@@ -186,6 +190,7 @@ impl Variance {
             moments.single += look.single / passes;
             moments.light += look.light / passes;
             moments.pairs += look.products / passes;
+            doubt.add(group(cell), 1.0 / (passes * self.pilot.cells as f64), &look.excess);
             sum += look.sum;
             squares += look.sum.length_squared();
         }
@@ -227,6 +232,33 @@ impl Moments {
         let of_light = self.light - self.mean_square / light_paths;
         let least = LEAST_PART * (self.single - self.light) + of_light;
         (self.single + self.pairs - self.mean_square).max(least).max(LEAST_PART * self.single)
+    }
+}
+
+/// Charges for samples that a plan finds rarely, and how much they are to be believed.
+///
+/// If there are so many that the plan itself would have met some in the place of the pilot render, their mean
+/// says what there is.
+#[derive(Default)]
+struct Doubt {
+    charges: [f64; GROUPS],
+    /// Sum of squares of the charges for what one sub-path found, each times how rarely the plan finds it.
+    squares: f64,
+}
+
+impl Doubt {
+    /// Charges a group for what one sub-path found, `weight` its part in the picture.
+    fn add(&mut self, group: usize, weight: f64, excess: &Excess) {
+        self.charges[group] += weight * excess.charge;
+        self.squares += weight * weight * excess.charge * excess.by_rarity;
+    }
+
+    /// The charges, divided by the number of such samples, weighted by what they are charged, that the plan
+    /// would have met itself, if that is more than one.
+    fn charges(&self) -> [f64; GROUPS] {
+        let sum: f64 = self.charges.iter().sum();
+        let met = (sum * sum / self.squares).max(1.0);
+        self.charges.map(|charge| charge / met)
     }
 }
 

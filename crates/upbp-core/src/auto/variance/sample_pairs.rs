@@ -76,6 +76,8 @@ pub(super) struct Look {
     pub(super) single: f64,
     /// The part of `single` that is due to light sub-paths: to splats and merges.
     pub(super) light: f64,
+    /// What is charged beyond `single` for samples that the plan finds rarely.
+    pub(super) excess: Excess,
     /// Products of all pairs of different samples.
     pub(super) products: f64,
     /// All samples.
@@ -139,6 +141,7 @@ impl<'a> View<'a> {
             let rarity = seen.rarity[self.roulette];
             result.single += f64::from(rarity * share.single(seen.square));
             result.light += f64::from(rarity * share.light(seen.square));
+            result.excess.add(&share.excess(rarity * seen.square));
             let weight = self.relative[i] * share.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
@@ -191,7 +194,7 @@ impl<'a> View<'a> {
         // Not one after the other, and one division: the search has nothing else to wait for.
         let (camera, merges) = ((a + b) + c, ((e + f) + (g + h)) + i);
         let inverse = 1.0 / ((camera + d) + merges);
-        Share { splats: d, merges, inverse, charge: inverse * (inverse / self.trusted).max(1.0).sqrt() }
+        Share { splats: d, merges, inverse, trusted: self.trusted }
     }
 }
 
@@ -201,21 +204,42 @@ pub(super) struct Share {
     merges: f32,
     /// One over the sum of all.
     inverse: f32,
-    /// Factor of second moments: the same, and more where the plan finds next to nothing.
-    charge: f32,
+    trusted: f32,
 }
 
 impl Share {
     /// The part in the second moment of single samples of one whose square is `square`.
     #[inline]
     pub(super) fn single(&self, square: f32) -> f32 {
-        square * self.charge
+        square * self.inverse
     }
 
     /// The part of it that is due to splats and merges.
     #[inline]
     fn light(&self, square: f32) -> f32 {
-        square * self.charge * ((self.splats + self.merges) * self.inverse)
+        square * self.inverse * ((self.splats + self.merges) * self.inverse)
+    }
+
+    /// What such a sample is charged beyond its part.
+    #[inline]
+    pub(super) fn excess(&self, square: f32) -> Excess {
+        let charge = f64::from(square * self.inverse * ((self.inverse / self.trusted).max(1.0).sqrt() - 1.0));
+        Excess { charge, by_rarity: charge * f64::from(self.inverse) }
+    }
+}
+
+/// Charges for samples that a plan finds more rarely than it can be [trusted](super::TRUSTED) with.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Excess {
+    pub(super) charge: f64,
+    /// The same, each times how much more rarely the plan finds the sample than the pilot render does.
+    pub(super) by_rarity: f64,
+}
+
+impl Excess {
+    pub(super) fn add(&mut self, more: &Self) {
+        self.charge += more.charge;
+        self.by_rarity += more.by_rarity;
     }
 }
 

@@ -260,24 +260,39 @@ fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
     assert!(prediction.with(&counts).iter().sum::<f64>().is_infinite());
 }
 
-#[test]
-fn more_light_sub_paths_help_by_their_number_and_fewer_hurt_by_more() {
-    // One of ten such splats is light tracing's own; the others, the plan's techniques do not have.
+/// Variances by light tracing with some numbers of light sub-paths, from a splat in each cell. Of `rare` ones
+/// one of ten is light tracing's own, the others are of techniques that the plan does not have.
+fn by_splats(rare: u32) -> impl Fn(u32) -> f64 {
     let mut pilot = PilotRender { samples: Vec::new(), ends: vec![0; 2 * (SIDE * SIDE) as usize], ..pilot() };
-    let mut shares = [0.0; TECHNIQUES];
-    shares[Technique::LightTracing as usize] = 0.1;
-    shares[Technique::Bb1d as usize] = 0.9;
-    let splat =
-        Sample { technique: Technique::LightTracing, merged: None, albedos: 1.0, value: Vec3::ONE, shares };
-    pilot.splats = (0..SIDE * SIDE).map(|cell| (cell, splat)).collect();
+    let splat = |cell| {
+        let own = if cell < rare { 0.1 } else { 1.0 };
+        let mut shares = [0.0; TECHNIQUES];
+        shares[Technique::LightTracing as usize] = own;
+        shares[Technique::Bb1d as usize] = 1.0 - own;
+        Sample { technique: Technique::LightTracing, merged: None, albedos: 1.0, value: Vec3::ONE, shares }
+    };
+    pilot.splats = (0..SIDE * SIDE).map(|cell| (cell, splat(cell))).collect();
     pilot.plan = planned(16);
     let variance = Variance::of(pilot);
-    let of = |light_paths| {
+    move |light_paths| {
         let techniques = TechniqueSet::EMPTY.with(Technique::LightTracing);
         variance.over_scales(&Plan { techniques, light_paths, ..planned(16) }).iter().sum::<f64>()
-    };
-    assert!((of(64) / of(16) - 0.25).abs() < 1e-4, "{} {}", of(64), of(16));
-    assert!((of(4) / of(16) - 8.0).abs() < 1e-4, "{} {}", of(4), of(16));
+    }
+}
+
+#[test]
+fn rare_samples_are_charged_more_unless_the_plan_would_have_met_some() {
+    for (rare, met_by_16, met_by_4) in [(8, 1.0, 1.0), (400, 40.0, 10.0), (SIDE * SIDE, 1638.4, 409.6)] {
+        let of = by_splats(rare);
+        assert!((of(64) / of(16) - 0.25).abs() < 1e-2, "{rare}: {} {}", of(64), of(16));
+        let sum = |relative: f64, met: f64| {
+            let rarity = 10.0 / relative;
+            let charge = ((rarity / f64::from(TRUSTED)).sqrt() - 1.0) / met;
+            f64::from(SIDE * SIDE - rare) / relative + f64::from(rare) * rarity * (1.0 + charge)
+        };
+        let expected = sum(0.25, met_by_4) / sum(1.0, met_by_16);
+        assert!((of(4) / of(16) / expected - 1.0).abs() < 1e-3, "{rare}: {} {}", of(4), of(16));
+    }
 }
 
 #[test]
