@@ -85,15 +85,24 @@ impl Candidates {
 
     /// Plans to begin with, the simplest first: camera sub-paths alone, paths alone, everything.
     pub(super) fn starts(&self) -> [Plan; 3] {
-        let usual = self.usual();
-        let with = |set: TechniqueSet| set.union(self.always).intersection(usual.techniques);
+        let everything = self.with_techniques(self.full.techniques);
+        let with = |set: TechniqueSet| self.with_techniques(set.union(self.always));
         // What stays on only for the sake of paths that were not seen is to cost little.
-        let camera = Plan { techniques: with(TechniqueSet::PT), light_paths: self.light_paths[0], ..usual };
-        let mut paths = Plan { techniques: with(TechniqueSet::BPT.union(self.safeguard)), ..usual };
+        let camera = Plan { light_paths: self.light_paths[0], ..with(TechniqueSet::PT) };
+        let mut paths = with(TechniqueSet::BPT.union(self.safeguard));
         for technique in self.safeguard.without(self.always).iter() {
             paths = with_period(paths, technique, PERIOD);
         }
-        [camera, paths, usual].map(possible)
+        [camera, paths, everything].map(possible)
+    }
+
+    /// The usual plan with those of some techniques that can be had, and the roulette that suits them.
+    fn with_techniques(&self, set: TechniqueSet) -> Plan {
+        let usual = self.usual();
+        let techniques = set.intersection(usual.techniques);
+        let suitable = roulette::usual_roulette(techniques);
+        let roulette = if self.roulettes.contains(&suitable) { suitable } else { usual.roulette };
+        Plan { techniques, roulette, ..usual }
     }
 
     /// All candidates that differ from a plan in one thing.
