@@ -7,19 +7,20 @@ use upbp_scene::{ReadyScene, SceneDescription};
 
 fn shipped() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/scenes");
-    let mut files: Vec<PathBuf> = [root.clone(), root.join("reference"), root.join("suite")]
-        .iter()
-        .flat_map(|folder| std::fs::read_dir(folder).unwrap())
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "ron"))
-        .collect();
+    let mut files: Vec<PathBuf> =
+        [root.clone(), root.join("reference"), root.join("suite"), root.join("held_out")]
+            .iter()
+            .flat_map(|folder| std::fs::read_dir(folder).unwrap())
+            .map(|entry| entry.unwrap().path())
+            .filter(|path| path.extension().is_some_and(|extension| extension == "ron"))
+            .collect();
     files.sort();
     files
 }
 
 #[test]
 fn all_load_and_satisfy_the_contract() {
-    assert!(shipped().len() >= 20);
+    assert!(shipped().len() >= 26);
     for path in shipped() {
         let scene = ReadyScene::load(&path).unwrap_or_else(|error| panic!("{error}"));
         check_scene(&scene).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
