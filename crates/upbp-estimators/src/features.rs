@@ -34,17 +34,19 @@ impl Features {
         throughput: Spectrum,
         distance: f32,
     ) -> Self {
-        let (albedo, normal) = match interaction {
+        let (tint, albedo, normal) = match interaction {
             Interaction::Surface(surface) => {
                 let albedo = surface.bsdf.albedo(surface.local(from));
-                (albedo, surface.shading_normal * surface.shading_normal.dot(from).signum())
+                (throughput, albedo, surface.shading_normal * surface.shading_normal.dot(from).signum())
             }
             Interaction::Medium(medium) => {
                 let medium = &scene.media()[medium.0 as usize];
-                (medium.sigma_s(position) / medium.sigma_t(position), Vec3::ZERO)
+                let sigma_t = medium.sigma_t(position);
+                // Throughput is per length there: transmittance over the density of stops.
+                (throughput * sigma_t, medium.sigma_s(position) / sigma_t, Vec3::ZERO)
             }
         };
-        Self { albedo: bounded(throughput) * bounded(albedo), normal, distance: Some(distance) }
+        Self { albedo: bounded(tint) * bounded(albedo), normal, distance: Some(distance) }
     }
 
     /// With the light that is seen before anything scatters.

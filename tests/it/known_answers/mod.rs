@@ -14,7 +14,7 @@
 //! | `infinite_point_source_moments` | 4 | moments of the stored photons |
 //! | `canonical_variance` | all | [`canonical_variance`] |
 //!
-//! Bodies in layers, in a white furnace of their own: [`layers`].
+//! Bodies in layers, in a white furnace of their own: [`layers`]. Layers for denoisers: [`features`].
 //!
 //! Not covered: the furnace with a density grid (no such medium); half-spaces of albedo 1, whose finite slabs
 //! converge as 1/τ only (`slab_RT` has slabs of albedo 1).
@@ -23,6 +23,7 @@
 
 mod ball;
 mod canonical_variance;
+mod features;
 mod furnace;
 mod glowing_ball;
 mod halfspace;

@@ -1,6 +1,6 @@
 //! [`check_medium`]: densities of a medium describe its sampling.
 
-use upbp_media::{Medium, RaySegment, SegmentDensity};
+use upbp_media::{Medium, RaySegment, SegmentDensity, Spectrum};
 
 use super::{Check, DRAWS, Random, is_light, require};
 use crate::scene::BoundingSphere;
@@ -8,11 +8,12 @@ use crate::scene::BoundingSphere;
 /// Segments that are looked at.
 const SEGMENTS: usize = 16;
 
-/// Cells of the histogram of distances.
+/// Cells of the histogram of distances, equally likely.
 const CELLS: usize = 8;
 
 /// Checks the contract of [`Medium`] on random segments inside `bounds`: ranges of all values, that walks
-/// pass and stop as often as `segment` says, and that transmittance is a product over pieces.
+/// pass and stop as often as `segment` says, in each lane as often as `segment_lanes` says, and that
+/// transmittance is a product over pieces.
 pub fn check_medium(medium: &impl Medium, bounds: &BoundingSphere) -> Check {
     let mut random = Random(13);
     let path = medium.mean_free_path();
@@ -25,7 +26,10 @@ pub fn check_medium(medium: &impl Medium, bounds: &BoundingSphere) -> Check {
         let segment = RaySegment { origin, direction, start, end: start + length };
         check_coefficients(medium, &segment)?;
         check_product(medium, &segment)?;
-        check_distances(medium, &segment, &mut random)?;
+        check_distances(&Walks { medium, lane: None }, &segment, &mut random)?;
+        for lane in 0..3 {
+            check_distances(&Walks { medium, lane: Some(lane) }, &segment, &mut random)?;
+        }
     }
     Ok(())
 }
@@ -48,69 +52,124 @@ fn check_coefficients(medium: &impl Medium, segment: &RaySegment) -> Check {
     require(medium.emits() || emitted.is_black(), "what emits says so", (segment, emitted))
 }
 
-fn density(medium: &impl Medium, segment: &RaySegment) -> Result<SegmentDensity, super::ContractViolation> {
-    let density = medium.segment(segment);
-    let case = (segment, density);
-    let fraction = |x: f64| (0.0..=1.0).contains(&x);
-    let transmits = density.transmittance.to_array().iter().all(|&t| fraction(t.into()));
-    require(transmits, "transmittance is in [0, 1]", case)?;
-    require(fraction(density.pass_probability), "the probability to pass is in [0, 1]", case)?;
-    let stops = [density.stop_at_start, density.stop_at_end];
-    require(stops.iter().all(|p| p.is_finite() && *p >= 0.0), "densities are finite and not negative", case)?;
-    let passes = !medium.scatters();
-    require(
-        !passes || (density.pass_probability == 1.0 && stops == [0.0; 2]),
-        "nothing stops a walk that is never scattered",
-        case,
-    )?;
-    Ok(density)
+/// The walks through a medium, or those in one of its lanes.
+struct Walks<'a, M> {
+    medium: &'a M,
+    lane: Option<usize>,
+}
+
+impl<M: Medium> Walks<'_, M> {
+    fn sample_distance(&self, segment: &RaySegment, u: [f32; 2]) -> Option<f32> {
+        match self.lane {
+            Some(lane) => self.medium.sample_lane(segment, lane, u),
+            None => self.medium.sample_distance(segment, u[0], u[1]),
+        }
+    }
+
+    fn density(&self, segment: &RaySegment) -> Result<SegmentDensity, super::ContractViolation> {
+        let whole = self.medium.segment(segment);
+        let density = match self.lane {
+            Some(lane) => {
+                let lanes = self.medium.segment_lanes(segment);
+                SegmentDensity {
+                    transmittance: lanes.transmittance,
+                    pass_probability: lanes.pass_probability[lane],
+                    stop_at_end: lanes.stop_at_end[lane],
+                    stop_at_start: lanes.stop_at_start[lane],
+                }
+            }
+            None => whole,
+        };
+        let case = (segment, self.lane, density);
+        let fraction = |x: f64| (0.0..=1.0).contains(&x);
+        let transmits = density.transmittance.to_array().iter().all(|&t| fraction(t.into()));
+        require(transmits, "transmittance is in [0, 1]", case)?;
+        let is_same = (0..3).all(|c| (density.transmittance[c] - whole.transmittance[c]).abs() <= 1e-5);
+        require(is_same, "lanes pass what the medium passes", case)?;
+        require(fraction(density.pass_probability), "the probability to pass is in [0, 1]", case)?;
+        let stops = [density.stop_at_start, density.stop_at_end];
+        let are_usable = stops.iter().all(|p| p.is_finite() && *p >= 0.0);
+        require(are_usable, "densities are finite and not negative", case)?;
+        let passes = !self.medium.scatters();
+        require(
+            !passes || (density.pass_probability == 1.0 && stops == [0.0; 2]),
+            "nothing stops a walk that is never scattered",
+            case,
+        )?;
+        Ok(density)
+    }
 }
 
 fn check_product(medium: &impl Medium, segment: &RaySegment) -> Check {
     let middle = 0.5 * (segment.start + segment.end);
-    let whole = density(medium, segment)?.transmittance;
-    let parts = density(medium, &RaySegment { end: middle, ..*segment })?.transmittance
-        * density(medium, &RaySegment { start: middle, ..*segment })?.transmittance;
+    let walks = Walks { medium, lane: None };
+    let whole = walks.density(segment)?.transmittance;
+    let parts = walks.density(&RaySegment { end: middle, ..*segment })?.transmittance
+        * walks.density(&RaySegment { start: middle, ..*segment })?.transmittance;
     let agrees = (0..3).all(|c| (whole[c] - parts[c]).abs() <= 1e-4);
     require(agrees, "transmittance is the product over pieces", (segment, whole, parts))
 }
 
-fn check_distances(medium: &impl Medium, segment: &RaySegment, random: &mut Random) -> Check {
-    let end = |cell: usize| {
-        let share = cell as f32 / CELLS as f32;
-        if cell == CELLS { segment.end } else { segment.start + share * (segment.end - segment.start) }
-    };
+fn check_distances<M: Medium>(walks: &Walks<'_, M>, segment: &RaySegment, random: &mut Random) -> Check {
+    let upto = |end: f32| walks.density(&RaySegment { end, ..*segment });
+    let passes = |end: f32| upto(end).map(|density| density.pass_probability);
+    let whole = passes(segment.end)?;
+    // Ends of the cells: where equal parts of what stops have stopped.
+    let mut ends = [segment.end; CELLS];
+    for (cell, end) in ends[..CELLS - 1].iter_mut().enumerate() {
+        let left = 1.0 - (1.0 - whole) * (cell + 1) as f64 / CELLS as f64;
+        let (mut low, mut high) = (segment.start, segment.end);
+        for _ in 0..32 {
+            let middle = 0.5 * (low + high);
+            *(if passes(middle)? > left { &mut low } else { &mut high }) = middle;
+        }
+        *end = high;
+    }
     let mut observed = [0_u32; CELLS];
     for _ in 0..DRAWS {
-        let Some(t) = medium.sample_distance(segment, random.next(), random.next()) else { continue };
-        let inside = t >= segment.start && t < segment.end;
-        require(medium.scatters() && inside, "a walk stops inside of the segment", (segment, t))?;
-        let stop = density(medium, &RaySegment { end: t, ..*segment })?;
-        require(stop.stop_at_end > 0.0, "where a walk stops there is a density", (segment, t, stop))?;
-        observed[(1..CELLS).take_while(|&cell| t >= end(cell)).count()] += 1;
+        let Some(t) = walks.sample_distance(segment, [random.next(), random.next()]) else { continue };
+        let case = (segment, walks.lane, t);
+        let is_inside = t >= segment.start && t < segment.end;
+        require(walks.medium.scatters() && is_inside, "a walk stops inside of the segment", case)?;
+        require(upto(t)?.stop_at_end > 0.0, "where a walk stops there is a density", case)?;
+        observed[ends.iter().take_while(|end| t >= **end).count()] += 1;
     }
-    let mut total = 0.0;
-    for (cell, &count) in observed.iter().enumerate() {
-        // Simpson's rule on four pieces of the cell.
-        let (from, step) = (end(cell), 0.25 * (end(cell + 1) - end(cell)));
-        let mut expected = 0.0;
-        for (i, weight) in [1.0, 4.0, 2.0, 4.0, 1.0].into_iter().enumerate() {
-            let at = RaySegment { end: from + step * i as f32, ..*segment };
-            expected += weight * density(medium, &at)?.stop_at_end * f64::from(step) / 3.0;
-        }
-        total += expected;
-        require(agree(count, expected), "distances follow the density", (segment, cell, count, expected))?;
+    let mut before = 1.0;
+    for (count, end) in observed.into_iter().zip(ends) {
+        let after = passes(end)?;
+        let case = (segment, walks.lane, end, count, before - after);
+        require(agree(count, before - after), "walks stop where fewer pass", case)?;
+        before = after;
+        check_density(&upto, segment, walks.medium.sigma_t(segment.at(end)), end)?;
     }
-    let pass_probability = density(medium, segment)?.pass_probability;
+    Ok(())
+}
+
+/// Checks that the density to stop at the `end` of a part of the segment is the rate at which fewer pass.
+fn check_density(
+    upto: &impl Fn(f32) -> Result<SegmentDensity, super::ContractViolation>,
+    segment: &RaySegment,
+    sigma_t: Spectrum,
+    end: f32,
+) -> Check {
+    let here = upto(end)?;
+    // A hundredth of the shortest mean free path to both sides, unless positions are too coarse to tell.
+    let step = 0.01 / sigma_t.max_component();
+    let (low, high) = (end - step, end + step);
+    let is_fine = step > 1e3 * f32::EPSILON * high.abs();
+    if here.pass_probability == 0.0 || !(is_fine && low > segment.start && high < segment.end) {
+        return Ok(());
+    }
+    let rate = (upto(low)?.pass_probability - upto(high)?.pass_probability) / f64::from(high - low);
     require(
-        (total + pass_probability - 1.0).abs() < 0.01,
-        "a walk stops somewhere or passes",
-        (segment, total, pass_probability),
+        (rate - here.stop_at_end).abs() <= 0.02 * here.stop_at_end,
+        "walks stop at the rate at which fewer pass",
+        (segment, end, rate, here),
     )
 }
 
-/// Whether a number of draws fits a probability: within five standard errors and one per cent of quadrature.
+/// Whether a number of draws fits a probability: within five standard errors, and one part in a thousand.
 fn agree(count: u32, probability: f64) -> bool {
     let mean = DRAWS as f64 * probability;
-    (f64::from(count) - mean).abs() <= 5.0 * mean.sqrt() + 0.01 * mean + 3.0
+    (f64::from(count) - mean).abs() <= 5.0 * mean.sqrt() + 1e-3 * mean + 3.0
 }

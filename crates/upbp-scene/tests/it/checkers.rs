@@ -1,12 +1,12 @@
 //! The contract checkers find what they are there to find: each fault below would bias an image.
 
 use glam::{Vec2, Vec3};
-use upbp_estimators::check::{check_bsdf, check_camera, check_emitter};
+use upbp_estimators::check::{check_bsdf, check_camera, check_emitter, check_medium};
 use upbp_estimators::scene::{
     BoundingSphere, Bsdf, BsdfEvaluation, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter,
     EmitterKind, EmitterPoint, HitDensities, Incident, Interface, PixelRect, Walk,
 };
-use upbp_media::Spectrum;
+use upbp_media::{Homogeneous, Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 use upbp_scene::light::ConstantEnvironment;
 use upbp_scene::material::{Lambert, Phong};
 use upbp_scene::{PerspectiveCamera, PerspectiveView};
@@ -210,4 +210,84 @@ fn faults_of_a_camera_are_found() {
     check(1.0, Vec2::ZERO).unwrap();
     assert_eq!(check(1.02, Vec2::ZERO).unwrap_err().what, "a pixel's density is one over its solid angle");
     assert_eq!(check(1.0, Vec2::splat(0.5)).unwrap_err().what, "connect inverts ray");
+}
+
+/// A medium that errs in what `.1` says.
+struct WrongMedium(Homogeneous, &'static str);
+
+impl WrongMedium {
+    fn errs(&self, what: &str) -> f64 {
+        if self.1 == what { 0.8 } else { 1.0 }
+    }
+}
+
+impl Medium for WrongMedium {
+    fn scatters(&self) -> bool {
+        self.0.scatters()
+    }
+    fn segment(&self, segment: &RaySegment) -> SegmentDensity {
+        let density = self.0.segment(segment);
+        SegmentDensity { stop_at_end: self.errs("density") * density.stop_at_end, ..density }
+    }
+    fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32> {
+        let stop = self.0.sample_distance(segment, u_channel, u_distance)?;
+        Some(segment.start + self.errs("distances") as f32 * (stop - segment.start))
+    }
+    fn lane_extinctions(&self) -> Option<Spectrum> {
+        self.0.lane_extinctions()
+    }
+    fn segment_lanes(&self, segment: &RaySegment) -> SegmentDensity<[f64; 3]> {
+        let mut lanes = self.0.segment_lanes(segment);
+        lanes.stop_at_end[2] *= self.errs("density of a lane");
+        lanes
+    }
+    fn sample_lane(&self, segment: &RaySegment, lane: usize, u: [f32; 2]) -> Option<f32> {
+        let lane = if self.errs("lane") < 1.0 { 0 } else { lane };
+        self.0.sample_lane(segment, lane, u)
+    }
+    fn sigma_s(&self, position: Vec3) -> Spectrum {
+        self.0.sigma_s(position)
+    }
+    fn sigma_t(&self, position: Vec3) -> Spectrum {
+        self.0.sigma_t(position)
+    }
+    fn phase(&self) -> &PhaseFunction {
+        self.0.phase()
+    }
+    fn continuation(&self, position: Vec3) -> f32 {
+        self.0.continuation(position)
+    }
+    fn mean_free_path(&self) -> f32 {
+        self.0.mean_free_path()
+    }
+}
+
+#[test]
+fn faults_of_a_medium_are_found() {
+    let bounds = BoundingSphere { centre: Vec3::ONE, radius: 2.0 };
+    let medium = |sigma_a, sigma_s| {
+        let [sigma_a, sigma_s] = [sigma_a, sigma_s].map(|sigma: [f32; 3]| Spectrum::from_array(sigma));
+        Homogeneous::new(sigma_a, sigma_s, PhaseFunction::Isotropic).unwrap()
+    };
+    // Clear, absorbing, thin, dense, and of channels that differ.
+    for (sigma_a, sigma_s) in [
+        ([0.0; 3], [0.0; 3]),
+        ([1.0, 3.0, 0.0], [0.0; 3]),
+        ([0.0; 3], [1e-3; 3]),
+        ([0.1; 3], [300.0; 3]),
+        ([0.0; 3], [0.1, 1.0, 10.0]),
+        ([5.0, 0.0, 1.0], [0.0, 0.5, 200.0]),
+    ] {
+        check_medium(&medium(sigma_a, sigma_s), &bounds).unwrap();
+    }
+    let chromatic = medium([0.1, 0.2, 0.3], [0.5, 1.0, 4.0]);
+    check_medium(&WrongMedium(chromatic.clone(), "nothing"), &bounds).unwrap();
+    for (fault, expected) in [
+        ("density", "walks stop at the rate at which fewer pass"),
+        ("distances", "walks stop where fewer pass"),
+        ("density of a lane", "walks stop at the rate at which fewer pass"),
+        ("lane", "walks stop where fewer pass"),
+    ] {
+        assert_eq!(check_medium(&WrongMedium(chromatic.clone(), fault), &bounds).unwrap_err().what, expected);
+    }
 }

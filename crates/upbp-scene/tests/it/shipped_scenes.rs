@@ -20,7 +20,7 @@ fn shipped() -> Vec<PathBuf> {
 
 #[test]
 fn all_load_and_satisfy_the_contract() {
-    assert!(shipped().len() >= 26);
+    assert!(shipped().len() >= 33);
     for path in shipped() {
         let scene = ReadyScene::load(&path).unwrap_or_else(|error| panic!("{error}"));
         check_scene(&scene).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
