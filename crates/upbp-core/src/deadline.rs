@@ -76,6 +76,9 @@ pub(crate) struct Budget<'a> {
 
 /// Part of the render's time that its preparation may take.
 const PREPARATION: f64 = 0.05;
+/// Seconds that it may take of a short render, since a choice needs some samples, and the most that these may
+/// be of it.
+const LEAST_PREPARATION: (f64, f64) = (0.5, 1.0 / 6.0);
 
 impl Budget<'_> {
     /// Says what comes next.
@@ -91,9 +94,15 @@ impl Budget<'_> {
 
     /// A part of the time for the preparation. Unlimited if the render's time is.
     pub(crate) fn part(&self, part: f64) -> Allowance<'_> {
-        let seconds = self.stop.seconds.map(|seconds| part * PREPARATION * seconds);
+        let seconds = self.stop.seconds.map(|seconds| part * preparation_of(seconds));
         Allowance::new(&self.canceller, seconds)
     }
+}
+
+/// Seconds of a render that its preparation may take.
+fn preparation_of(seconds: f64) -> f64 {
+    let (least, largest_part) = LEAST_PREPARATION;
+    (PREPARATION * seconds).max(least.min(largest_part * seconds))
 }
 
 /// The time that one step of a preparation may take.

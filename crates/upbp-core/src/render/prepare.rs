@@ -31,9 +31,10 @@ pub struct Start<'a> {
     /// Stops the preparation, and the render after it.
     pub canceller: Canceller,
     /// The rules by which the render is going to end, as far as they are known: the choice of a plan takes
-    /// about 2 % of the work, and the preparation 5 % of the time, unless that is too little to learn
-    /// anything. If time is limited, there are so few light sub-paths that there are several iterations. If
-    /// choices are to be [deterministic](crate::Settings::deterministic), all limits are ignored.
+    /// about 2 % of the work, and the preparation 5 % of the time, or up to half a second of a short render
+    /// (at most a sixth of it), unless that is too little to learn anything. If time is limited, there are so
+    /// few light sub-paths that there are several iterations. If choices are to be
+    /// [deterministic](crate::Settings::deterministic), all limits are ignored.
     pub stop: Stop,
     /// Is told what comes next, before each step of the preparation.
     pub progress: Option<&'a mut (dyn FnMut(Preparing) + Send)>,
