@@ -32,8 +32,13 @@ use crate::settings::CheckedSettings;
 const CAMERA_PATHS: u32 = 2048;
 /// Light sub-paths, unless they are long or emitters are few.
 const LIGHT_PATHS: u32 = 4096;
+/// The same, if starts are guided: few of them bring light.
+const GUIDED_LIGHT_PATHS: u32 = 16384;
 /// Emitters from which on the number of sub-paths does not grow any more.
 const MANY: usize = 8;
+/// Contributions that are enough, and the part of the sub-paths that tells how many there are going to be.
+/// Where all photons meet all camera sub-paths they are as many as pairs.
+const CONTRIBUTIONS: (f64, f64) = (1e6, 1.0 / 16.0);
 /// Light vertices that are enough.
 const LIGHT_VERTICES: f64 = 2e5;
 /// Camera sub-paths per one of these, if many emitters are to be chosen by receiver: there is more to learn.
@@ -47,11 +52,6 @@ const GUIDED_ROUNDS: u32 = 3;
 const PART: f64 = 0.2;
 /// Part of this that a quick look at the length of light sub-paths may take.
 const QUICK_LOOK: f64 = 0.2;
-
-/// The part of all sub-paths that tells enough of a number of emitters.
-fn enough(emitters: usize) -> f64 {
-    emitters.clamp(2, MANY) as f64 / MANY as f64
-}
 
 /// Lets the scene choose its emitters, and the starts of light sub-paths on them, by what they contribute
 /// under a plan with `techniques`. The scene has to be as it was prepared.
@@ -78,10 +78,13 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let statistics =
         statistics::measure::<S, L>(scene, settings, techniques, lanes, statistics::FEW_LIGHT_PATHS, &quick)?;
     let vertices = statistics.vertices_per_path.max(1.0);
-    let light_paths = (LIGHT_VERTICES / vertices).clamp(64.0, f64::from(LIGHT_PATHS));
+    let most = if is_guided { GUIDED_LIGHT_PATHS } else { LIGHT_PATHS };
+    let light_paths = (LIGHT_VERTICES / vertices).clamp(64.0, f64::from(most));
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
     let camera_paths = CAMERA_PATHS * if is_much { MORE_CAMERA_PATHS } else { 1 };
-    let paths = [light_paths, f64::from(camera_paths)].map(|paths| (paths * enough(emitters)) as u32);
+    // What tells enough of so many emitters, or of starts.
+    let part = if is_guided { 1.0 } else { emitters.min(MANY) as f64 / MANY as f64 };
+    let paths = [light_paths, f64::from(camera_paths)].map(|paths| (paths * part) as u32);
     let plan = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / 8]);
     let plan = iteration_plan(scene, settings, &plan, 0);
     let rounds = if is_guided { GUIDED_ROUNDS } else { 1 };
@@ -90,7 +93,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     for round in 0..rounds {
         // Each round has random numbers of its own.
         let plan = IterationPlan { iteration: plan.iteration + u64::from(round), ..plan.clone() };
-        let run = |part, halt: &Halt<'_>| measure::<S, L>(scene, &plan, paths[1], part, halt);
+        let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths[1], part, halt);
         let seen = budget.part(part).largest(run).ok_or(RenderError::Cancelled)?;
         if emitters > 1 {
             scene.choose_emitters_by(&seen.emission, &shares(&seen.next_events, emitters));
@@ -123,6 +126,8 @@ struct Measured {
     /// Contributions of next events, in two halves of different camera sub-paths.
     next_events: [Vec<NextEvent>; 2],
     guides: Evidence,
+    /// Their number.
+    contributions: usize,
 }
 
 /// A contribution of a next event.
@@ -163,6 +168,27 @@ fn second_moment<S: Scene>(scene: &PreparedScene<'_, S>, seen: &[NextEvent]) -> 
         probability / event.chosen * weighted * weighted
     };
     seen.iter().map(moment).sum()
+}
+
+/// As [`measure`], but no larger a part than brings enough contributions.
+fn measure_enough<S: Scene, L: Lanes>(
+    scene: &PreparedScene<'_, S>,
+    plan: &IterationPlan,
+    camera_paths: u32,
+    part: f64,
+    halt: &Halt<'_>,
+) -> Option<Measured> {
+    let (enough, few) = CONTRIBUTIONS;
+    let mut next = part.min(few);
+    loop {
+        let seen = measure::<S, L>(scene, plan, camera_paths, next, halt)?;
+        let most = next * (enough / (seen.contributions as f64).max(1.0)).sqrt();
+        let affordable = part.min(most);
+        if affordable < 2.0 * next {
+            return Some(seen);
+        }
+        next = affordable;
+    }
 }
 
 /// Traces the light sub-paths of `plan` and some camera sub-paths, or a part of both. `None` if it was
@@ -228,7 +254,9 @@ fn measure<S: Scene, L: Lanes>(
     }
     guides.starts = starts.into_iter().flatten().collect();
     let probabilities = (0..emitters).map(|i| emission_probability(EmitterId(i as u32))).collect();
-    Some(Measured { emission: EmitterShares::of(probabilities, &emission), next_events, guides })
+    let contributions = emission.len() + next_events.iter().map(Vec::len).sum::<usize>();
+    let emission = EmitterShares::of(probabilities, &emission);
+    Some(Measured { emission, next_events, guides, contributions })
 }
 
 /// What light sub-paths of a plan leave; what they contribute by themselves goes to `seen`.

@@ -19,9 +19,13 @@ const SPECULAR: f64 = 0.6;
 const FIRST: f64 = 0.3;
 /// Points of specular surfaces that are enough.
 const MOST_POINTS: usize = 4096;
-/// The most that a guide may leave of the second moment of contributions. Half of the starts stay where they
-/// are, so that other light loses up to a factor of two, of which a small run may see nothing.
-const WORTH: f64 = 0.25;
+/// How many times as many starts a guide has to lead to the light as would come there without it, as a
+/// geometric mean over this light. Half of the starts stay where they are, so that other light loses up to a
+/// factor of two, of which a small run may see nothing.
+const WORTH: f64 = 2.0;
+/// The most that one start may count of the light of all: one that is bright because it is rare would draw most
+/// of the guided starts to its own cell.
+const BRIGHTEST: f64 = 0.03;
 
 /// Starts of light sub-paths that a run has found useful, and points that others may lead to.
 #[derive(Default)]
@@ -49,6 +53,12 @@ impl Starts {
 
     fn light(&self) -> f64 {
         self.samples.iter().map(|sample| sample.light).sum()
+    }
+
+    /// Lets no start count for more than a part of the light of all.
+    fn clip(&mut self, part: f64) {
+        let most = part * self.light();
+        self.samples.iter_mut().for_each(|sample| sample.light = sample.light.min(most));
     }
 
     /// Adds other starts, if there are any, as a part of all light.
@@ -127,30 +137,32 @@ pub(super) fn first<S: Scene>(
 }
 
 /// Guides to the starts that brought light to the picture, at emitters whose guide has been worth it: the one
-/// that was followed is judged, since it does not know what it brought.
+/// that was followed is judged, since it does not know what it brought. Logarithms are compared, for second
+/// moments of so few starts are those of the brightest.
 pub(super) fn next<S: Scene>(
     scene: &PreparedScene<'_, S>,
     seen: &Evidence,
     first: &[Starts],
 ) -> Vec<Option<EmissionGuide>> {
     let mut starts = vec![Starts::default(); scene.scene.emitters().len()];
-    // Second moments, by the guides that were followed and by the emitters' own distributions.
-    let mut moments = vec![[0.0; 2]; starts.len()];
+    // Light, and the same times the logarithm of how many times as many starts lead to it.
+    let mut sums = vec![[0.0; 2]; starts.len()];
     for (end, light) in &seen.starts {
         let on_ray = end.point.position;
         let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, on_ray);
         let Some((at, axes)) = at else { continue };
         let emitter = end.emitter.0 as usize;
-        let factor = scene.emission_factor(end.emitter, &end.point, end.direction, on_ray);
+        let factor = f64::from(scene.emission_factor(end.emitter, &end.point, end.direction, on_ray));
         starts[emitter].axes = axes;
         starts[emitter].samples.push(EmissionSample { at, light: *light });
-        moments[emitter][0] += light * light;
-        moments[emitter][1] += light * light * f64::from(factor);
+        sums[emitter][0] += light;
+        sums[emitter][1] += light * factor.ln();
     }
-    let is_worth = |[guided, plain]: [f64; 2]| guided < WORTH * plain;
     for (starts, first) in starts.iter_mut().zip(first) {
+        starts.clip(BRIGHTEST);
         starts.add(first, FIRST);
     }
-    let guides = starts.iter().zip(moments);
-    guides.map(|(starts, moments)| is_worth(moments).then(|| starts.fit()).flatten()).collect()
+    let is_worth = |[light, logarithms]: [f64; 2]| logarithms > WORTH.ln() * light;
+    let guides = starts.iter().zip(sums);
+    guides.map(|(starts, sums)| is_worth(sums).then(|| starts.fit()).flatten()).collect()
 }
