@@ -1,7 +1,7 @@
 //! Denoises a rendered image by Intel's Open Image Denoise, where its program `oidnDenoise` is installed.
 //!
-//! `cargo run --release --example denoise -- IN.exr OUT.exr` reads an image of `upbp render --features`, hands
-//! picture, albedo and normal over as PFM files, and writes what comes back, with a PNG beside it.
+//! `cargo run --release --example denoise -- IN.exr OUT.exr` reads an image of `upbp render --features`,
+//! hands picture, albedo and normal over as PFM files, and writes what comes back, with a PNG beside it.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};

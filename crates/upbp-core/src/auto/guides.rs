@@ -23,8 +23,8 @@ const MOST_POINTS: usize = 4096;
 /// geometric mean over this light. Half of the starts stay where they are, so that other light loses up to a
 /// factor of two, of which a small run may see nothing.
 const WORTH: f64 = 2.0;
-/// The most that one start may count of the light of all: one that is bright because it is rare would draw most
-/// of the guided starts to its own cell.
+/// The most that one start may count of the light of all: one that is bright because it is rare would draw
+/// most of the guided starts to its own cell.
 const BRIGHTEST: f64 = 0.03;
 
 /// Starts of light sub-paths that a run has found useful, and points that others may lead to.
