@@ -5,9 +5,9 @@
 #![cfg(target_os = "linux")]
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use upbp_core::{LightPaths, Settings};
+use upbp_core::{FrozenPlan, LightPaths, Settings, Start};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
 
@@ -33,9 +33,9 @@ fn settings(light_paths: u32, beams: f64, memory: u32) -> Settings {
     }
 }
 
-/// Renders two iterations; prints what was expected and what it took, bytes, and the number of light
-/// vertices.
-fn measure(memory: u32, vertices: f64, beams: f64) {
+/// Calls a function with the shipped scene, on one thread: how many have buffers of their own at the same
+/// time is up to the system's scheduler.
+fn with_scene<R: Send>(function: impl FnOnce(&ReadyScene) -> R + Send) -> R {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cornell_media.ron");
     let side = Count::new(64).expect("a positive count");
     let scene = ReadyScene::load_with(path, |description| {
@@ -43,19 +43,48 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
         description.film.height = side;
     })
     .expect("the shipped scene");
-    // One thread: how many have buffers of their own at the same time is up to the system's scheduler.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
-    pool.install(|| {
-        let renderer = |paths, memory| {
+    pool.install(|| function(&scene))
+}
+
+/// Where the plan is that a case is rendered by.
+fn plan_path() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("memory_plan.ron")
+}
+
+/// Writes the plan for about as many light vertices as wanted.
+fn make_plan(memory: u32, vertices: f64, beams: f64) {
+    with_scene(|scene| {
+        let prepare = |paths, memory| {
             let checked = settings(paths, beams, memory).validate().expect("valid settings");
-            scene.renderer(checked).expect("a renderer")
+            scene.renderer(checked).expect("a renderer").state().identity().clone()
         };
-        // A pilot first: what it leaves with the allocator and the threads does not grow with what is
-        // rendered.
-        let paths = vertices / renderer(1000, 100).state().identity().plan.vertices_per_light_path;
+        let paths = (vertices / prepare(1000, 100).plan.vertices_per_light_path) as u32;
+        let plan = prepare(paths, memory).frozen_plan();
+        fs::write(plan_path(), plan.to_ron()).expect("a folder for tests");
+    });
+}
+
+/// Renders two iterations; prints what was expected and what it took, bytes, and the numbers of light
+/// vertices and photon beams.
+fn measure(memory: u32, beams: f64) {
+    let text = fs::read_to_string(plan_path()).expect("the plan that was made");
+    let plan = FrozenPlan::from_ron(&text).expect("a plan");
+    with_scene(|scene| {
+        let render = |plan: FrozenPlan| {
+            let checked = settings(plan.plan.light_paths, beams, memory).validate().expect("valid settings");
+            let start = Start { plan: Some(plan), ..Start::default() };
+            let mut renderer = scene.start_renderer(checked, start).expect("a renderer");
+            assert!(renderer.iterate() && renderer.iterate());
+            renderer
+        };
+        // A small one first: the program's own pages come into memory where they are used.
+        let mut small = plan.clone();
+        small.plan.light_paths = 10;
+        small.plan.beam_paths = small.plan.beam_paths.min(5);
+        drop(render(small));
         let before = status("VmRSS");
-        let mut renderer = renderer(paths as u32, memory);
-        assert!(renderer.iterate() && renderer.iterate());
+        let renderer = render(plan);
         let report = renderer.report();
         println!(
             "case {} {} {} {}",
@@ -67,11 +96,15 @@ fn measure(memory: u32, vertices: f64, beams: f64) {
     });
 }
 
-/// Runs a case in a process of its own: expected and measured bytes, vertices.
+/// Runs a case in a process of its own: expected and measured bytes.
+///
+/// The plan is made before: a preparation leaves some MiB with the allocator, which the render then takes
+/// again or not.
 fn run(memory: u32, vertices: f64, beams: f64) -> [f64; 2] {
     // What is measured is what the render holds: by itself the GNU allocator keeps some MiB of what was
     // freed, now more, now less.
     let allocator = [("MALLOC_MMAP_THRESHOLD_", "131072"), ("MALLOC_TRIM_THRESHOLD_", "131072")];
+    make_plan(memory, vertices, beams);
     let case = format!("{memory} {vertices} {beams}");
     let text = own_process::run("runs::memory::memory_is_what_was_expected", &case, &allocator);
     let line = text.lines().find_map(|line| line.split_once("case ").map(|(_, rest)| rest));
@@ -94,7 +127,7 @@ fn memory_is_what_was_expected() {
     // beams.
     if let Some(case) = own_process::case() {
         let numbers: Vec<f64> = case.split(' ').map(|word| word.parse().expect("a number")).collect();
-        return measure(numbers[0] as u32, numbers[1], numbers[2]);
+        return measure(numbers[0] as u32, numbers[2]);
     }
     let close = |[expected, measured]: [f64; 2]| {
         assert!((measured / expected - 1.0).abs() < 0.1, "expected {expected} bytes, measured {measured}");
