@@ -18,7 +18,16 @@ mod vessel;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+use clap::Parser;
 use mesh::Mesh;
+
+/// Writes six scenes with their meshes and a sky.
+#[derive(Parser)]
+struct Options {
+    /// Where to
+    #[arg(value_name = "FOLDER", default_value = "out/beds")]
+    folder: PathBuf,
+}
 
 /// A scene and the meshes that it names.
 struct Bed {
@@ -48,7 +57,7 @@ fn write(beds: &[Bed], folder: &Path) -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1).map_or_else(|| PathBuf::from("out/beds"), PathBuf::from);
+    let Options { folder } = Options::parse();
     let beds = beds();
     write(&beds, &folder)?;
     for bed in &beds {

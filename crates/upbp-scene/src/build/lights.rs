@@ -113,7 +113,7 @@ impl Builder<'_> {
             for (index, light) in description.lights.iter().enumerate() {
                 if is_infinite(light) {
                     let message = format!(
-                        "comes from infinitely far away and does not reach into the medium `{outside}` around everything"
+                        "comes from infinitely far away and does not reach into the medium `{outside}` around everything; instead of `outside`, let it be the interior of a body with a `Null` material"
                     );
                     self.problem(item(index, light), message);
                 }

@@ -135,7 +135,7 @@ fn scenes_without_light_are_refused() {
     assert_eq!(problem(unused), nothing);
     assert_eq!(
         problem("media: { \"fog\": Homogeneous(sigma_s: 1) }, outside: \"fog\", lights: [Constant(1)]"),
-        "light 1 (Constant): comes from infinitely far away and does not reach into the medium `fog` around everything"
+        "light 1 (Constant): comes from infinitely far away and does not reach into the medium `fog` around everything; instead of `outside`, let it be the interior of a body with a `Null` material"
     );
 }
 
