@@ -17,8 +17,9 @@ use crate::settings::{CheckedSettings, LightPaths};
 /// Numbers of light sub-paths, relative to the full plan's: more than one per pixel where what matters is
 /// found by them alone, as what the sun throws through water is.
 const LIGHT_PATHS: [f64; 5] = [0.0625, 0.25, 1.0, 4.0, 16.0];
-/// Numbers of light sub-paths with beams, relative to the full plan's.
-const BEAM_PATHS: [f64; 2] = [0.25, 1.0];
+/// Numbers of light sub-paths with beams, relative to the full plan's: fewer are fast, and more of them show
+/// less as rays.
+const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
 /// Period of queries that only some iterations make.
 const PERIOD: NonZeroU32 = NonZeroU32::new(8).unwrap();
 /// Factor by which an iteration may take longer with the safeguard.
@@ -43,7 +44,8 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// The candidates beside a full plan, with at most `most` light sub-paths if these are more than its own.
+    /// The candidates beside a full plan, with at most `most` light sub-paths if these are more than its own,
+    /// and more beams than it has if there `is_room` for so many sub-paths and beams.
     pub(super) fn new<S: Scene>(
         scene: &PreparedScene<'_, S>,
         settings: &CheckedSettings,
@@ -51,12 +53,18 @@ impl Candidates {
         statistics: &Statistics,
         full: Plan,
         most: u32,
+        is_room: impl Fn([u32; 2]) -> bool,
     ) -> Self {
-        let counts = |full: u32, parts: &[f64], is_fixed: bool| {
+        let counts = |full: u32, parts: &[f64], is_fixed: bool, is_possible: &dyn Fn(u32) -> bool| {
             let count = |part: &f64| ((f64::from(full) * part) as u32).max(1);
-            let is_possible = |count: &u32| *count <= full.max(most);
-            if is_fixed { vec![full] } else { parts.iter().map(count).filter(is_possible).collect() }
+            let is_candidate = |count: &u32| *count <= full || is_possible(*count);
+            if is_fixed { vec![full] } else { parts.iter().map(count).filter(is_candidate).collect() }
         };
+        let is_fixed = settings.light_paths != LightPaths::Auto;
+        let light_paths = counts(full.light_paths, &LIGHT_PATHS, is_fixed, &|count| count <= most);
+        let longest = light_paths.iter().copied().fold(full.light_paths, u32::max);
+        let is_fixed = settings.beams.is_some();
+        let beam_paths = counts(full.beam_paths, &BEAM_PATHS, is_fixed, &|count| is_room([longest, count]));
         let usual = full.radii.surf;
         let widest = if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };
         let mut candidates = Self {
@@ -67,8 +75,8 @@ impl Candidates {
             } else {
                 TechniqueSet::EMPTY
             },
-            light_paths: counts(full.light_paths, &LIGHT_PATHS, settings.light_paths != LightPaths::Auto),
-            beam_paths: counts(full.beam_paths, &BEAM_PATHS, settings.beams.is_some()),
+            light_paths,
+            beam_paths,
             surf_radii: if widest > usual { vec![usual, widest] } else { vec![usual] },
             roulettes: settings.roulette.map_or_else(|| roulette::all().to_vec(), |own| vec![own]),
         };

@@ -75,6 +75,12 @@ impl Room {
         Ok(*plan)
     }
 
+    /// Whether there is room for a number of light sub-paths, and of those with beams.
+    pub(crate) fn holds<S: Scene>(&self, [paths, beam_paths]: [u32; 2], statistics: &Statistics) -> bool {
+        let need = LightCounts::expected(statistics, paths, beam_paths).peak_bytes::<S::Bsdf>();
+        need <= self.light_bytes as f64
+    }
+
     /// Bytes that a render by a plan is expected to take.
     pub(crate) fn expected_bytes<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> u64 {
         self.film + self.output.max(LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>() as u64)

@@ -124,7 +124,8 @@ fn choose_in<S: Scene, L: Lanes>(
         let full = full_plan::full_plan(scene, settings, techniques, &statistics, &room, budget);
         if is_auto && full.uses_light_paths() {
             let most = full_plan::most_light_paths(scene, settings, &statistics, &full, &room, budget);
-            let candidates = Candidates::new(scene, settings, &support, &statistics, full, most);
+            let is_room = |counts| room.holds::<S>(counts, &statistics);
+            let candidates = Candidates::new(scene, settings, &support, &statistics, full, most, is_room);
             let plan = best_plan::<S, L>(scene, settings, &candidates, budget);
             if !plan.uses_light_paths() {
                 // Next events have to find what light sub-paths would have found.

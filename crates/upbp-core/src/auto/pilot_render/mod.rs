@@ -31,8 +31,9 @@ use recorder::{ByRoulette, ByTechnique, MOST_SAMPLES, Recorder, Room, Sample, TE
 pub(super) const PASSES: u32 = 2;
 /// Light vertices of a pass, at most.
 const LIGHT_VERTICES: f64 = 5e5;
-/// Light sub-paths per pixel of a pass.
-const LIGHT_PATHS_PER_PIXEL: u32 = 2;
+/// Light sub-paths per pixel that is looked at. What is rare to photons, as a few that are bright in front of
+/// the camera, is all that tells some plans from others.
+const LIGHT_PATHS_PER_PIXEL: u32 = 8;
 
 /// The number of pixels that a pilot render looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
