@@ -93,7 +93,7 @@ pub(crate) struct Method {
     #[arg(long, value_name = "N")]
     light_paths: Option<u32>,
     /// Light sub-paths that leave photon beams, per iteration [default: enough to give a query beam about
-    /// one, fewer where that pays]
+    /// one, fewer or more where that pays]
     #[arg(long, value_name = "N")]
     beams: Option<u32>,
     /// Keep the first radii of kernels instead of shrinking them
