@@ -259,7 +259,7 @@ fn measure<S: Scene, L: Lanes>(
     Some(Measured { emission, next_events, guides, contributions })
 }
 
-/// What light sub-paths of a plan leave; what they contribute by themselves goes to `seen`.
+/// The map that light sub-paths of a plan leave; what they contribute by themselves goes to `seen`.
 fn light_sub_paths<S: Scene, L: Lanes>(
     context: &Context<'_, S>,
     seen: &mut Seen,

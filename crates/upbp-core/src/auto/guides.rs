@@ -19,8 +19,8 @@ const SPECULAR: f64 = 0.6;
 const FIRST: f64 = 0.3;
 /// Points of specular surfaces that are enough.
 const MOST_POINTS: usize = 4096;
-/// How many times as many starts a guide has to lead to the light as would come there without it, as a
-/// geometric mean over this light. Half of the starts stay where they are, so that other light loses up to a
+/// Factor by which a guide has to multiply the starts that lead to the light, a geometric mean over this
+/// light. Half of the starts stay where they are, so that other light loses up to a
 /// factor of two, of which a small run may see nothing.
 const WORTH: f64 = 2.0;
 /// The most that one start may count of the light of all: one that is bright because it is rare would draw

@@ -76,7 +76,7 @@ pub(super) struct Look {
     pub(super) single: f64,
     /// The part of `single` that is due to light sub-paths: to splats and merges.
     pub(super) light: f64,
-    /// What is charged beyond `single` for samples that the plan finds rarely.
+    /// The charge beyond `single` for samples that the plan finds rarely.
     pub(super) excess: Excess,
     /// Products of all pairs of different samples.
     pub(super) products: f64,
@@ -220,7 +220,7 @@ impl Share {
         square * self.inverse * ((self.splats + self.merges) * self.inverse)
     }
 
-    /// What such a sample is charged beyond its part.
+    /// The charge for such a sample beyond its part.
     #[inline]
     pub(super) fn excess(&self, square: f32) -> Excess {
         let charge = f64::from(square * self.inverse * ((self.inverse / self.trusted).max(1.0).sqrt() - 1.0));
