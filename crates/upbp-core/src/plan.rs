@@ -32,7 +32,7 @@ pub struct Plan {
     pub next_events: f32,
     /// Russian roulette.
     pub roulette: Roulette,
-    /// Periods of photon queries, in iterations.
+    /// Periods of photon queries.
     pub periods: MergePeriods,
     /// Connectible vertices per light sub-path, by the statistics before the first iteration.
     pub vertices_per_light_path: f64,
@@ -58,7 +58,7 @@ impl Plan {
         }
     }
 
-    /// The part of the iterations that make the queries of a technique.
+    /// The part of the camera sub-paths that make the queries of a technique.
     pub(crate) fn active_part(&self, technique: Technique) -> f64 {
         1.0 / f64::from(self.periods.period(technique))
     }
@@ -159,7 +159,7 @@ impl fmt::Display for Plan {
             write!(f, ", distances by channel")?;
         }
         for technique in self.techniques.iter().filter(|technique| self.periods.period(*technique) > 1) {
-            write!(f, ", {} in one of {} iterations", technique.name(), self.periods.period(technique))?;
+            write!(f, ", {} in one of {} pixels", technique.name(), self.periods.period(technique))?;
         }
         Ok(())
     }
@@ -220,7 +220,7 @@ mod tests {
         assert_eq!(FrozenPlan::from_ron(&text), Ok(frozen));
         assert_eq!(
             plan().to_string(),
-            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, distances by channel, surf in one of 4 iterations"
+            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, distances by channel, surf in one of 4 pixels"
         );
     }
 

@@ -3,7 +3,7 @@
 use upbp_media::{Medium, MediumId};
 
 use crate::kernel::Kernel;
-use crate::merge_periods::MergePeriods;
+use crate::merge_periods::{MergePeriods, rank};
 use crate::mis::{BeamExtent, Heuristic, MergeKind, MisPlan, VolumeMerges};
 use crate::path::Interaction;
 use crate::radius_field::RadiusField;
@@ -65,10 +65,10 @@ pub struct IterationPlan {
     pub kernels: Kernels,
     /// Scale of radii over the scene.
     pub radius_field: RadiusField,
-    /// Periods of photon queries, in iterations.
+    /// Periods of photon queries.
     pub periods: MergePeriods,
-    /// The techniques that run in this iteration: all but those whose photon queries other iterations make.
-    pub active: TechniqueSet,
+    /// Ranks of the pixels whose turn it is to make them, each below its period.
+    pub turns: PerMerge<u32>,
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
     /// Whether any of the techniques merges.
@@ -107,7 +107,7 @@ pub struct IterationChoices {
     pub kernels: Kernels,
     /// Scale of radii over the scene.
     pub radius_field: RadiusField,
-    /// Periods of photon queries, in iterations.
+    /// Periods of photon queries.
     pub periods: MergePeriods,
     /// Heuristic of the weights.
     pub heuristic: Heuristic,
@@ -199,7 +199,7 @@ impl IterationPlan {
             // Weights without merges know no radius.
             radius_field: if merges { choices.radius_field } else { RadiusField::Uniform },
             periods,
-            active: techniques.intersection(periods.active(choices.seed, choices.iteration)),
+            turns: periods.turns(choices.seed, choices.iteration),
             mis,
             merges,
             features: false,
@@ -232,21 +232,33 @@ impl IterationPlan {
         self.merges_by(Technique::Bp2d) || self.merges_by(Technique::Bb1d)
     }
 
-    /// Whether this iteration merges by `technique`, anywhere.
+    /// Whether any camera sub-paths merge by `technique`, anywhere.
     #[must_use]
     pub fn merges_by(&self, technique: Technique) -> bool {
-        let has = match technique {
+        match technique {
             Technique::Surf => self.mis.surf > 0.0,
             _ => self.mis.volume.iter().any(|merges| merges.of(technique) > 0.0),
-        };
-        has && self.active.has(technique)
+        }
     }
 
-    /// Whether this iteration merges by `technique` in a medium.
+    /// Whether any camera sub-paths merge by `technique` in a medium.
     #[inline]
     #[must_use]
     pub(crate) fn merges_in(&self, medium: MediumId, technique: Technique) -> bool {
-        self.mis.merges_in(medium).of(technique) > 0.0 && self.active.has(technique)
+        self.mis.merges_in(medium).of(technique) > 0.0
+    }
+
+    /// The techniques of a pixel's camera sub-path: all but those whose photon queries other pixels make.
+    #[inline]
+    pub(crate) fn techniques_at(&self, pixel: [u32; 2]) -> TechniqueSet {
+        if self.periods == MergePeriods::ONE {
+            return self.techniques;
+        }
+        let has_turn = |technique: &Technique| match self.turns.get(*technique) {
+            Some(turn) => *turn == rank(pixel, self.periods.period(*technique)),
+            None => true,
+        };
+        self.techniques.iter().filter(has_turn).collect()
     }
 
     /// The merges that a path with this sine between its lines takes part in at a vertex, where kernel radii
@@ -267,12 +279,6 @@ impl IterationPlan {
     pub(crate) fn per_photon(&self, technique: Technique) -> f32 {
         let paths = if technique.uses_beams() { self.beam_paths } else { self.light_paths };
         self.periods.period(technique) as f32 / paths as f32
-    }
-
-    /// Whether camera sub-paths are query beams.
-    #[must_use]
-    pub fn has_query_beams(&self) -> bool {
-        self.merges_by(Technique::Pb2d) || self.merges_by(Technique::Bb1d)
     }
 
     /// Whether light sub-paths are of any use.

@@ -37,7 +37,7 @@ pub enum StreamKind {
     /// independent after a few draws: what they differ in is what stratification leaves of the variance of a
     /// pixel, since it takes away what their common decisions make.
     PilotCamera,
-    /// The choice of iterations that make photon queries.
+    /// The turns in which pixels make photon queries.
     MergePeriods,
 }
 

@@ -1,6 +1,7 @@
 //! The choice of techniques: it leaves out what a scene does not need, changes no expectation, and can be
 //! repeated and frozen.
 
+use std::num::NonZeroU32;
 use std::path::Path;
 
 use upbp_core::{
@@ -131,6 +132,31 @@ fn no_bias_in_fog() {
 #[test]
 fn no_bias_in_a_forward_scattering_box() {
     unbiased("forward_hg_box", "reference");
+}
+
+/// Where one pixel in eight makes the queries of surface merging, a render of few iterations is as bright as
+/// one where all do. If whole iterations took turns, three of them would have all light that merges find
+/// times 8/3, or none.
+#[test]
+fn few_iterations_with_queries_in_some_pixels_are_as_bright() {
+    let scene = shipped("suite/surface_caustic");
+    let techniques = "hit+nee+surf".parse::<TechniqueSet>().expect("names").into();
+    let always = frozen(&scene, Settings { techniques, ..settings() });
+    let mut in_some_pixels = always.clone();
+    in_some_pixels.plan.periods.surf = NonZeroU32::new(8).expect("a period");
+    let differences: Vec<f64> = (0..12)
+        .map(|seed| {
+            let render = |plan: &FrozenPlan| {
+                let settings = Settings { seed, ..settings() }.validate().expect("valid settings");
+                let mut renderer = scene.start_renderer(settings, by(plan.clone())).expect("a plan for it");
+                (0..3).for_each(|_| assert!(renderer.iterate()));
+                renderer.film().image().mean()[1]
+            };
+            render(&in_some_pixels) / render(&always) - 1.0
+        })
+        .collect();
+    let square = differences.iter().map(|x| x * x).sum::<f64>() / differences.len() as f64;
+    assert!(square.sqrt() < 0.1, "{differences:?}");
 }
 
 /// A render by the plan that its own seed has chosen against one by the plan of the next seed, with kernels

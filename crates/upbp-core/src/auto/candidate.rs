@@ -20,7 +20,7 @@ const LIGHT_PATHS: [f64; 5] = [0.0625, 0.25, 1.0, 4.0, 16.0];
 /// Numbers of light sub-paths with beams, relative to the full plan's: fewer are fast, and more of them show
 /// less as rays.
 const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
-/// Period of queries that only some iterations make.
+/// Period of queries that only some pixels make.
 const PERIOD: NonZeroU32 = NonZeroU32::new(8).unwrap();
 /// Factor by which an iteration may take longer with the safeguard.
 const SAFEGUARD_OVERHEAD: f64 = 1.05;
@@ -33,8 +33,8 @@ pub(super) struct Candidates {
     pub(super) full: Plan,
     /// Techniques that stay on: some paths may have no other.
     always: TechniqueSet,
-    /// Techniques that a plan with light sub-paths has at least now and then: there may be light that a pilot
-    /// render misses.
+    /// Techniques that a plan with light sub-paths has at least in some pixels: there may be light that a
+    /// pilot render misses.
     safeguard: TechniqueSet,
     light_paths: Vec<u32>,
     beam_paths: Vec<u32>,
@@ -146,25 +146,25 @@ impl Candidates {
     }
 
     /// A plan with the techniques that may find light that the pilot render missed, if it has light
-    /// sub-paths: in all iterations and with the widest radius where this costs little, since such light is
+    /// sub-paths: in all pixels and with the widest radius where this costs little, since such light is
     /// bright in few photons, else in all with the radius at hand, else in some.
     pub(super) fn with_safeguard(&self, plan: Plan, cost: Cost<'_>) -> Plan {
         if !plan.uses_light_paths() {
             return plan;
         }
-        let (mut always, mut now_and_then) = (plan, plan);
+        let (mut always, mut in_some_pixels) = (plan, plan);
         for technique in self.safeguard.iter() {
             let techniques = plan.techniques.with(technique);
             let is_active = plan.techniques.has(technique) && plan.active_part(technique) == 1.0;
             always = Plan { techniques, ..with_period(always, technique, NonZeroU32::MIN) };
             if !is_active {
-                now_and_then = Plan { techniques, ..with_period(now_and_then, technique, PERIOD) };
+                in_some_pixels = Plan { techniques, ..with_period(in_some_pixels, technique, PERIOD) };
             }
         }
         let widest = with_surf_radius(always, self.full.radii.surf);
         let most = SAFEGUARD_OVERHEAD * cost.iteration(&plan);
         let affordable = [widest, always].into_iter().find(|safe| cost.iteration(safe) <= most);
-        if self.safeguard.is_empty() { plan } else { affordable.unwrap_or(now_and_then) }
+        if self.safeguard.is_empty() { plan } else { affordable.unwrap_or(in_some_pixels) }
     }
 }
 

@@ -55,7 +55,7 @@ impl<'a> Cost<'a> {
     /// Processor nanoseconds of an iteration.
     pub(super) fn iteration(self, plan: &Plan) -> f64 {
         let work = &self.0.work;
-        // The part of the iterations that run any of some techniques.
+        // The part of the camera sub-paths that run any of some techniques.
         let any = |techniques: TechniqueSet| {
             let run = plan.techniques.intersection(techniques);
             1.0 - run.iter().map(|technique| 1.0 - plan.active_part(technique)).product::<f64>()
@@ -75,11 +75,15 @@ impl<'a> Cost<'a> {
             let i = Technique::LightTracing as usize;
             light += work.calls[i][roulette] * NS_PER_CALL[i];
         }
-        light *= any(TechniqueSet::ALL.without(TechniqueSet::PT));
-        let stored = any(PHOTON_POINTS.with(Technique::Connect)) * NS_PER_VERTEX;
-        light += work.vertices * (stored + any(PHOTON_POINTS) * NS_PER_TREE_POINT);
-        let beams = any(BEAMS) * f64::from(plan.beam_paths) * work.beams * NS_PER_TREE_BEAM;
-        self.0.pixels * camera + f64::from(plan.light_paths) * light + beams
+        if plan.techniques.intersects(PHOTON_POINTS.with(Technique::Connect)) {
+            light += work.vertices * NS_PER_VERTEX;
+        }
+        if plan.techniques.intersects(PHOTON_POINTS) {
+            light += work.vertices * NS_PER_TREE_POINT;
+        }
+        let light_paths = if plan.uses_light_paths() { f64::from(plan.light_paths) } else { 0.0 };
+        let beam_paths = if plan.techniques.intersects(BEAMS) { f64::from(plan.beam_paths) } else { 0.0 };
+        self.0.pixels * camera + light_paths * light + beam_paths * work.beams * NS_PER_TREE_BEAM
     }
 
     /// Time of a call among the photons or beams of a plan over that among those of the pilot render's plan:

@@ -27,9 +27,6 @@ pub(crate) fn surf<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
-    if !plan.merges_by(Technique::Surf) {
-        return;
-    }
     let kernel = plan.kernels.surf.scaled(vertex.scale);
     out.observer.enter_technique(Some(Technique::Surf));
     map.surface.in_ball(vertex.position, kernel.radius(), |index, distance2| {

@@ -47,7 +47,9 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     observer.camera_end(ray.origin, ray.direction, ray.pdf);
     let mut out = Output { layers: &mut walk.layers, counters, observer };
     let emission = plan.mis.hit > 0.0 && prepared.has_emitting_media();
-    let query_beams = plan.has_query_beams();
+    let own = plan.techniques_at(pixel);
+    let [pb2d, bb1d] = [Technique::Pb2d, Technique::Bb1d].map(|one| own.has(one) && plan.merges_by(one));
+    let query_beams = pb2d || bb1d;
     let is_long = query_beams && plan.mis.query_beams == BeamExtent::Long;
     let to_surface = is_long || emission || prepared.has_dense_media();
     let extent = if to_surface { Extent::ToSurface } else { Extent::ToStop };
@@ -73,8 +75,10 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         if emission {
             techniques::emission_along(context, edge_trace, &edge, &mut stream, &mut out);
         }
-        if query_beams {
+        if pb2d {
             techniques::pb2d(context, map, edge_trace, &edge, &mut out);
+        }
+        if bb1d {
             techniques::bb1d(context, map, edge_trace, &edge, &mut out);
         }
 
@@ -144,10 +148,17 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             techniques::next_events(context, &vertex, &sides, &mut stream, crossings, &mut out);
             techniques::connections(context, map, &vertex, &sides, &mut stream, crossings, &mut out);
             match &vertex.interaction {
-                Interaction::Surface(surface) => techniques::surf(context, map, &vertex, surface, &mut out),
+                Interaction::Surface(surface) if own.has(Technique::Surf) => {
+                    techniques::surf(context, map, &vertex, surface, &mut out);
+                }
+                Interaction::Surface(_) => {}
                 Interaction::Medium(medium) => {
-                    techniques::pp3d(context, map, &vertex, *medium, &mut out);
-                    techniques::bp2d(context, map, &vertex, *medium, &mut out);
+                    if own.has(Technique::Pp3d) {
+                        techniques::pp3d(context, map, &vertex, *medium, &mut out);
+                    }
+                    if own.has(Technique::Bp2d) {
+                        techniques::bp2d(context, map, &vertex, *medium, &mut out);
+                    }
                 }
             }
         }

@@ -41,7 +41,7 @@ struct Counts {
     relative: ByTechnique<f64>,
     /// Light sub-paths that they come from, and those with beams.
     paths: [f64; 2],
-    /// Part of the iterations that make the queries of a technique, which `relative` contains.
+    /// Part of the camera sub-paths that make the queries of a technique, which `relative` contains.
     active: ByTechnique<f64>,
     /// The number of the roulette.
     roulette: usize,

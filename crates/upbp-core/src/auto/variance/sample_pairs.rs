@@ -91,13 +91,13 @@ pub(super) struct View<'a> {
     /// Samples of each technique relative to the pilot render's plan.
     relative: [f32; TECHNIQUES],
     trusted: f32,
-    /// Pairs of samples of one query that count beside those of independent samples: it is made for both or
-    /// for none.
+    /// Pairs of samples of one camera sub-path that count beside those of independent samples: it makes the
+    /// queries for both or for none.
     common: [f32; TECHNIQUES],
     /// Pairs of photons of one light sub-path that the plan has, less those of the pilot render: by points
     /// and by beams.
     more: [f32; 2],
-    /// Whether any technique makes queries in some iterations only.
+    /// Whether any technique makes queries in some pixels only.
     periodic: bool,
     /// Sums of what was found of a light sub-path: by class and, where queries are periodic, by technique.
     by_class: Vec<[Vec3; 2]>,
@@ -181,9 +181,7 @@ impl<'a> View<'a> {
 
     /// Pairs of merges with one light sub-path, by two camera sub-paths, over those of the pilot render.
     pub(super) fn pairs_relative(&self, first: Technique, second: Technique) -> f32 {
-        let paths = 1.0 + self.more[class(first).min(class(second))];
-        // One iteration makes the queries of all pixels or of none.
-        if first == second { paths * (1.0 + self.common[first as usize]) } else { paths }
+        1.0 + self.more[class(first).min(class(second))]
     }
 
     /// The densities of the plan at a sample's path.

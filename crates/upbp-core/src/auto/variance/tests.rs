@@ -417,9 +417,7 @@ proptest! {
         let mut expected = 0.0;
         for a in &own {
             for b in &other {
-                let queries =
-                    if a.technique == b.technique { 1.0 / counts.active[a.technique as usize] } else { 1.0 };
-                let factor = queries * of_one_light_path(a, b, thinning, &counts);
+                let factor = of_one_light_path(a, b, thinning, &counts);
                 expected += weight * factor * weighted(a, &counts).dot(weighted(b, &counts));
             }
         }
