@@ -71,6 +71,24 @@ pub(crate) fn add(sum: &mut Sum3, values: [f64; 3]) {
 
 #[inline]
 fn add_to(sum: &mut Sum3, c: usize, value: f64) {
+    // Nearly always the place stays, and so do its powers of two normal numbers: then floating-point numbers
+    // cut the value, without rounding.
+    let place_before = place(sum, c);
+    if (-27..=27).contains(&place_before) {
+        let in_upper = value * power_of_two(-DIGITS * i32::from(place_before));
+        if in_upper < power_of_two(DIGITS) {
+            let upper = in_upper as u64;
+            sum[2 * c] += upper;
+            sum[2 * c + 1] += ((in_upper - upper as f64) * power_of_two(DIGITS)) as u64;
+            return;
+        }
+    }
+    add_anywhere(sum, c, value);
+}
+
+/// Adds a positive number, whatever its place.
+#[cold]
+fn add_anywhere(sum: &mut Sum3, c: usize, value: f64) {
     let (digits, exponent) = decompose(value);
     let first = exponent + digits.ilog2().cast_signed();
     let upper = first.div_euclid(DIGITS) as i8;

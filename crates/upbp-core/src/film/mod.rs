@@ -224,34 +224,9 @@ impl Film {
         assert!(iteration < MAX_ITERATIONS, "iteration {iteration}");
         assert_eq!(self.missing(iteration).start, sets.start, "iteration {iteration} is added once");
         let width = self.rect.width as usize;
-        let add = |sums: &mut [Sum3], value: &(dyn Fn(&Pixel) -> ([f64; 3], u64) + Sync)| -> u64 {
-            let rows = sums.par_chunks_mut(width).zip(pixels.par_chunks(width)).enumerate();
-            rows.map(|(y, (sums, pixels))| {
-                let mut dropped = 0;
-                for (x, (own, pixel)) in sums.iter_mut().zip(pixels).enumerate() {
-                    if sets.contains(&set_of(x, y)) {
-                        let (value, left_out) = value(pixel);
-                        exact_sum::add(own, value);
-                        dropped += left_out;
-                    }
-                }
-                dropped
-            })
-            .sum()
-        };
-        let mut dropped = 0;
-        for (layer, sums) in &mut self.layers {
-            dropped += add(sums, &|pixel| usable(pixel.layers[*layer as usize]));
-        }
-        let layers: Vec<_> = self.layers.iter().map(|(layer, _)| *layer as usize).collect();
-        let total = |pixel: &Pixel| {
-            layers.iter().fold([0.0; 3], |total, layer| plus(total, usable(pixel.layers[*layer]).0))
-        };
-        if half(iteration).0 == 0 {
-            add(&mut self.even, &|pixel| (total(pixel), 0));
-        }
-        add(&mut self.seen[half(iteration).0], &|pixel| (usable(pixel.seen).0, 0));
-        add(&mut self.squares, &|pixel| (total(pixel).map(|value| value * value), 0));
+        let half = half(iteration).0;
+        let dropped =
+            self.rows(half, pixels).into_par_iter().enumerate().map(|(y, row)| row.add(y, &sets)).sum();
         if let Some(sums) = &mut self.features {
             sums.add(width, &sets, features);
         }
@@ -262,6 +237,24 @@ impl Film {
             self.parts.insert(iteration, sets.end);
         }
         dropped
+    }
+
+    /// The rows of an iteration's pixels with those of the sums that they belong to.
+    fn rows<'a>(&'a mut self, half: usize, pixels: &'a [Pixel]) -> Vec<Row<'a>> {
+        let width = self.rect.width as usize;
+        let Self { layers, even, seen, squares, .. } = self;
+        let mut layers: Vec<_> =
+            layers.iter_mut().map(|(layer, sums)| (*layer, sums.chunks_mut(width))).collect();
+        let mut even = if half == 0 { even.as_mut_slice() } else { &mut [] }.chunks_mut(width);
+        let others = seen[half].chunks_mut(width).zip(squares.chunks_mut(width));
+        let row = |(pixels, (seen, squares))| Row {
+            pixels,
+            layers: layers.iter_mut().filter_map(|(layer, rows)| Some((*layer, rows.next()?))).collect(),
+            even: even.next(),
+            seen,
+            squares,
+        };
+        pixels.chunks(width).zip(others).map(row).collect()
     }
 
     /// Adds another film of the same size that holds other iterations.
@@ -485,6 +478,40 @@ impl Film {
         };
         let pixels = (0..self.even.len()).into_par_iter().with_min_len(1024).map(pixel).collect();
         Image { width: self.rect.width, height: self.rect.height, pixels }
+    }
+}
+
+/// A row of an iteration's pixels, with those of the sums that they belong to.
+struct Row<'a> {
+    pixels: &'a [Pixel],
+    layers: Vec<(Layer, &'a mut [Sum3])>,
+    /// None in odd iterations.
+    even: Option<&'a mut [Sum3]>,
+    seen: &'a mut [Sum3],
+    squares: &'a mut [Sum3],
+}
+
+impl Row<'_> {
+    /// Adds the pixels of some sets to the sums, in the `y`-th row. Returns how many values were left out.
+    fn add(self, y: usize, sets: &Range<u32>) -> u64 {
+        let Row { pixels, mut layers, mut even, seen, squares } = self;
+        let mut dropped = 0;
+        // All sums of a pixel at once: it is read from memory once.
+        for (x, pixel) in pixels.iter().enumerate().filter(|(x, _)| sets.contains(&set_of(*x, y))) {
+            let mut total = [0.0; 3];
+            for (layer, sums) in &mut layers {
+                let (value, left_out) = usable(pixel.layers[*layer as usize]);
+                exact_sum::add(&mut sums[x], value);
+                total = plus(total, value);
+                dropped += left_out;
+            }
+            if let Some(sums) = &mut even {
+                exact_sum::add(&mut sums[x], total);
+            }
+            exact_sum::add(&mut seen[x], usable(pixel.seen).0);
+            exact_sum::add(&mut squares[x], total.map(|value| value * value));
+        }
+        dropped
     }
 }
 
