@@ -3,6 +3,7 @@
 mod error_estimate;
 pub(crate) mod exact_sum;
 mod features;
+mod image;
 mod iterations;
 pub(crate) mod pixel_sets;
 
@@ -17,6 +18,8 @@ pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap, HalfImage};
 use exact_sum::Sum3;
 pub use features::FeatureImages;
 use features::FeatureSums;
+pub(crate) use image::BLOCK_SIDES;
+pub use image::Image;
 pub use iterations::{IterationSet, MAX_ITERATIONS};
 use pixel_sets::{SETS, set_of, stand_ins};
 
@@ -59,17 +62,6 @@ pub struct Film {
     iterations: IterationSet,
     /// Iterations that are there in part, with the number of [sets of pixels](pixel_sets) that are.
     parts: BTreeMap<u64, u32>,
-}
-
-/// A picture: three values per pixel, row by row from the top.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Image {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// Red, green and blue of each pixel.
-    pub pixels: Vec<[f32; 3]>,
 }
 
 /// Sums of nothing, one per pixel.
@@ -528,75 +520,6 @@ fn usable(radiance: Spectrum) -> ([f64; 3], u64) {
         if usable { f64::from(value) } else { 0.0 }
     });
     (values, dropped)
-}
-
-/// Sides in pixels of the square blocks whose errors count alike, where neighbours may share errors.
-pub(crate) const BLOCK_SIDES: [u32; 4] = [1, 4, 8, 16];
-
-impl Image {
-    /// relMSE against a reference of the same size: mean over pixels and channels of `(x − r)² / (r² +
-    /// 0.01)`.
-    #[must_use]
-    pub fn relative_mse(&self, reference: &Self) -> f64 {
-        self.mean_of(reference, |x, r| (x - r).powi(2) / (r * r + 0.01))
-    }
-
-    /// relMSE of the means of square blocks of pixels times their pixels, mean over blocks of 1, 4, 8 and 16
-    /// pixels a side: the relMSE where errors of pixels are independent, more where neighbours share them,
-    /// as blotches and streaks do. Blocks that the picture cuts count by their pixels.
-    #[must_use]
-    pub fn relative_mse_over_scales(&self, reference: &Self) -> f64 {
-        self.difference_over(&BLOCK_SIDES, reference, reference)
-    }
-
-    /// Squared differences of the means of blocks times their pixels, relative to another image, mean over
-    /// sides of blocks.
-    fn difference_over(&self, sides: &[u32], other: &Self, reference: &Self) -> f64 {
-        let of_side = |side: &u32| {
-            let [x, y, r] = [self, other, reference].map(|image| image.block_sums(*side as usize));
-            let term = |((x, y), r): ((&[f64; 4], &[f64; 4]), &[f64; 4])| {
-                let n = x[3];
-                let squares = (0..3).map(|c| ((x[c] - y[c]) / n).powi(2) / ((r[c] / n).powi(2) + 0.01));
-                n * n * squares.sum::<f64>()
-            };
-            let sum: f64 = x.iter().zip(&y).zip(&r).map(term).sum();
-            sum / (3 * self.pixels.len().max(1)) as f64
-        };
-        sides.iter().map(of_side).sum::<f64>() / sides.len() as f64
-    }
-
-    /// Sums over square blocks of pixels, with the number of pixels behind.
-    fn block_sums(&self, side: usize) -> Vec<[f64; 4]> {
-        let width = self.width as usize;
-        let columns = width.div_ceil(side);
-        let mut sums = vec![[0.0; 4]; columns * (self.height as usize).div_ceil(side)];
-        for (i, pixel) in self.pixels.iter().enumerate() {
-            let sum = &mut sums[i / width / side * columns + i % width / side];
-            for (sum, value) in sum.iter_mut().zip(pixel.iter().chain(&[1.0])) {
-                *sum += f64::from(*value);
-            }
-        }
-        sums
-    }
-
-    /// Root of the mean squared difference to a reference of the same size.
-    #[must_use]
-    pub fn rmse(&self, reference: &Self) -> f64 {
-        self.mean_of(reference, |x, r| (x - r).powi(2)).sqrt()
-    }
-
-    /// Mean over all pixels, per channel.
-    #[must_use]
-    pub fn mean(&self) -> [f64; 3] {
-        let n = self.pixels.len().max(1) as f64;
-        std::array::from_fn(|c| self.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / n)
-    }
-
-    fn mean_of(&self, reference: &Self, term: impl Fn(f64, f64) -> f64) -> f64 {
-        let pairs = self.pixels.iter().flatten().zip(reference.pixels.iter().flatten());
-        let sum: f64 = pairs.map(|(x, r)| term(f64::from(*x), f64::from(*r))).sum();
-        sum / (3 * self.pixels.len().max(1)) as f64
-    }
 }
 
 #[cfg(test)]
