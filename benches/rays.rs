@@ -8,7 +8,7 @@ use std::f32::consts::{PI, TAU};
 use std::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use glam::Vec3;
+use glam::{Affine3A, Quat, Vec3};
 use upbp_accel::{Quad, Ray, SceneGeometry, Shape, Sphere, TriangleMesh};
 use upbp_estimators::{Stream, StreamKind};
 
@@ -82,6 +82,19 @@ fn soup(triangles: usize) -> TriangleMesh {
     TriangleMesh::new(positions, indices, None).expect("a mesh")
 }
 
+/// Twenty-seven copies of a mesh, or as many meshes of their own.
+fn balls(are_copies: bool) -> Vec<Shape> {
+    let ball = bumpy_sphere(100_000);
+    let copy = |number: u32| {
+        let place = Vec3::new((number % 3) as f32, (number / 3 % 3) as f32, (number / 9) as f32) - 1.0;
+        let turned = Quat::from_rotation_y(number as f32);
+        let to_scene = Affine3A::from_scale_rotation_translation(Vec3::splat(0.25), turned, place * 0.6);
+        let copy = ball.placed(&to_scene).expect("a copy");
+        if are_copies { copy } else { copy.unshared() }
+    };
+    (0..27).map(|number| copy(number).into()).collect()
+}
+
 fn rays(coherent: bool) -> Vec<Ray> {
     let mut random = Stream::new(7, 0, StreamKind::Camera, 0);
     let ray = |pixel: usize| {
@@ -98,13 +111,15 @@ fn rays(coherent: bool) -> Vec<Ray> {
 
 fn scenes(criterion: &mut Criterion) {
     let mesh = |mesh: TriangleMesh| vec![Shape::from(mesh)];
-    let scenes: [(&str, &dyn Fn() -> Vec<Shape>); 6] = [
+    let scenes: [(&str, &dyn Fn() -> Vec<Shape>); 8] = [
         ("quads-7", &room),
         ("mixed-20", &mixed),
         ("sphere-100k", &|| mesh(bumpy_sphere(100_000))),
         ("sphere-1m", &|| mesh(bumpy_sphere(1_000_000))),
         ("soup-100k", &|| mesh(soup(100_000))),
         ("soup-1m", &|| mesh(soup(1_000_000))),
+        ("copies-27-of-100k", &|| balls(true)),
+        ("meshes-27-of-100k", &|| balls(false)),
     ];
     for (name, shapes) in scenes {
         let shapes = shapes();

@@ -62,6 +62,11 @@ pub(crate) trait Wide: Copy {
     }
 
     #[inline(always)]
+    fn add3(self, a: [Self::F; 3], b: [Self::F; 3]) -> [Self::F; 3] {
+        [self.add(a[0], b[0]), self.add(a[1], b[1]), self.add(a[2], b[2])]
+    }
+
+    #[inline(always)]
     fn sub3(self, a: [Self::F; 3], b: [Self::F; 3]) -> [Self::F; 3] {
         [self.sub(a[0], b[0]), self.sub(a[1], b[1]), self.sub(a[2], b[2])]
     }
@@ -108,6 +113,33 @@ pub(crate) fn run(task: impl Task) {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         Arch::V3(simd) => simd.vectorize(avx2::Vectorised { task, simd }),
         _ => task.run(Plain),
+    }
+}
+
+/// A choice of instructions.
+#[cfg(feature = "geometry")]
+pub(crate) trait Instructions: Copy {
+    fn run(self, task: impl Task);
+}
+
+/// The best that this processor has.
+#[cfg(feature = "geometry")]
+#[derive(Clone, Copy)]
+pub(crate) struct Best;
+
+#[cfg(feature = "geometry")]
+impl Instructions for Best {
+    #[inline]
+    fn run(self, task: impl Task) {
+        run(task);
+    }
+}
+
+#[cfg(feature = "geometry")]
+impl Instructions for Plain {
+    #[inline]
+    fn run(self, task: impl Task) {
+        task.run(self);
     }
 }
 

@@ -17,8 +17,20 @@ use rayon::prelude::*;
 use super::hierarchy::{Child, Hierarchy, Kind, Node};
 use crate::simd::WIDTH;
 
-/// Primitives up to which a scene has no tree: every ray is tested against all.
-const SMALL: usize = 48;
+/// What is below the leaves.
+#[derive(Clone, Copy)]
+pub(super) struct Leaves {
+    /// Primitives up to which there is no tree: every ray is tested against all.
+    small: usize,
+    /// The most primitives in a block.
+    block: usize,
+}
+
+impl Leaves {
+    pub(super) const PRIMITIVES: Self = Self { small: 48, block: WIDTH };
+    /// Hierarchies of their own.
+    pub(super) const MESHES: Self = Self { small: 0, block: 1 };
+}
 
 /// Cost of a ray's test against a block of primitives, as a multiple of that against a node.
 const BLOCK_COST: f32 = 1.0;
@@ -43,12 +55,16 @@ pub(super) struct Boxed {
     pub(super) kind: Kind,
 }
 
-/// Builds over primitives; `pack` makes a block of up to eight of a kind.
-pub(super) fn build(boxes: &[Boxed], mut pack: impl FnMut(Kind, &[u32]) -> Child) -> Hierarchy {
-    if boxes.len() <= SMALL {
+/// Builds over primitives; `pack` makes a block of some of a kind.
+pub(super) fn build(
+    boxes: &[Boxed],
+    leaves: Leaves,
+    mut pack: impl FnMut(Kind, &[u32]) -> Child,
+) -> Hierarchy {
+    if boxes.len() <= leaves.small {
         let all: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut roots = Vec::new();
-        by_kind(boxes, &all, |kind, members| roots.push(pack(kind, members)));
+        by_kind(boxes, leaves, &all, |kind, members| roots.push(pack(kind, members)));
         return Hierarchy { nodes: Vec::new(), roots };
     }
     let (members, groups) = group_by_centre(boxes);
@@ -59,19 +75,19 @@ pub(super) fn build(boxes: &[Boxed], mut pack: impl FnMut(Kind, &[u32]) -> Child
     };
     let binary = build_bvh2(&groups, params, &mut Duration::default());
     let mut collapse =
-        Collapse { boxes, members, groups, subtrees: Vec::new(), binary, nodes: Vec::new(), pack };
+        Collapse { boxes, leaves, members, groups, subtrees: Vec::new(), binary, nodes: Vec::new(), pack };
     collapse.weigh();
     let roots = vec![collapse.emit()];
     Hierarchy { nodes: collapse.nodes, roots }
 }
 
-/// Calls `run` with runs of up to eight primitives of a kind.
-fn by_kind(boxes: &[Boxed], members: &[u32], mut run: impl FnMut(Kind, &[u32])) {
+/// Calls `run` with the primitives of each block.
+fn by_kind(boxes: &[Boxed], leaves: Leaves, members: &[u32], mut run: impl FnMut(Kind, &[u32])) {
     let kind = |index: &u32| boxes[*index as usize].kind;
     let mut members = members.to_vec();
     members.sort_by_key(kind);
     for same in members.chunk_by(|a, b| kind(a) == kind(b)) {
-        same.chunks(WIDTH).for_each(|members| run(kind(&members[0]), members));
+        same.chunks(leaves.block).for_each(|members| run(kind(&members[0]), members));
     }
 }
 
@@ -115,6 +131,7 @@ struct Subtree {
 
 struct Collapse<'a, P> {
     boxes: &'a [Boxed],
+    leaves: Leaves,
     members: Vec<u32>,
     groups: Vec<Group>,
     binary: Bvh2,
@@ -152,11 +169,12 @@ impl<P: FnMut(Kind, &[u32]) -> Child> Collapse<'_, P> {
                 let members = self.members_of(index);
                 let kind = self.boxes[members[0] as usize].kind;
                 let same = members.iter().all(|&index| self.boxes[index as usize].kind == kind);
-                let uniform = (same && members.len() <= WIDTH).then_some((kind, members.len() as u32));
+                let uniform =
+                    (same && members.len() <= self.leaves.block).then_some((kind, members.len() as u32));
                 Subtree { cost: [area * BLOCK_COST; 7], uniform, ..none }
             } else {
                 let children = [0, 1].map(|i| &self.subtrees[(node.first_index + i) as usize]);
-                Subtree::over(children, area)
+                Subtree::over(children, self.leaves, area)
             };
         }
     }
@@ -230,7 +248,7 @@ impl<P: FnMut(Kind, &[u32]) -> Child> Collapse<'_, P> {
     /// Blocks of any number of primitives, below nodes of their own if there are several.
     fn blocks(&mut self, members: &[u32]) -> Child {
         let mut level = Vec::new();
-        by_kind(self.boxes, members, |kind, members| {
+        by_kind(self.boxes, self.leaves, members, |kind, members| {
             let around = members.iter().map(|&index| &self.boxes[index as usize]);
             let bounds =
                 around.map(|boxed| (boxed.min, boxed.max)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
@@ -250,9 +268,11 @@ impl<P: FnMut(Kind, &[u32]) -> Child> Collapse<'_, P> {
 
 impl Subtree {
     /// The subtree over two others; `area` of its box.
-    fn over([a, b]: [&Self; 2], area: f32) -> Self {
+    fn over([a, b]: [&Self; 2], leaves: Leaves, area: f32) -> Self {
         let uniform = match (a.uniform, b.uniform) {
-            (Some((kind, count)), Some((other, more))) if kind == other && count + more <= WIDTH as u32 => {
+            (Some((kind, count)), Some((other, more)))
+                if kind == other && (count + more) as usize <= leaves.block =>
+            {
                 Some((kind, count + more))
             }
             _ => None,

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::lane_ray::{LaneRay, Planes, SLAB_ROUNDING, SlabRay};
+use super::lane_ray::{LaneRay, Planes, SLAB_ROUNDING, SlabRay, Slabs, Widened};
 use crate::simd::{WIDTH, Wide, set_lanes};
 
 /// Kind of the primitives in a block.
@@ -121,27 +121,46 @@ pub(super) trait Visitor {
 }
 
 impl Hierarchy {
-    /// Shows `visitor` the blocks that `ray` may meet before `t_max`. With `IN_ORDER` the nearer child of
-    /// each node comes first.
+    /// Shows `visitor` the blocks that `ray` may meet before `t_max`, until it breaks off. With `IN_ORDER`
+    /// the nearer child of each node comes first.
     #[inline(always)]
     pub(super) fn traverse<const IN_ORDER: bool, W: Wide>(
         &self,
         wide: W,
         ray: &LaneRay<W>,
-        mut t_max: f32,
-        mut visitor: impl Visitor,
-    ) {
+        t_max: &mut f32,
+        visitor: &mut impl Visitor,
+    ) -> ControlFlow<()> {
         for &root in &self.roots {
-            let end = if root.is_block() {
-                visitor.visit(wide, ray, root.as_block(), &mut t_max)
+            if root.is_block() {
+                visitor.visit(wide, ray, root.as_block(), t_max)?;
             } else {
                 let slabs = SlabRay::new(wide, ray);
-                self.descend::<IN_ORDER, W>(root, wide, (ray, &slabs), &mut t_max, &mut visitor)
-            };
-            if end.is_break() {
-                return;
+                self.descend::<IN_ORDER, W>(root, wide, (ray, &slabs), t_max, visitor)?;
             }
         }
+        ControlFlow::Continue(())
+    }
+
+    /// [`traverse`](Self::traverse) with all boxes wider by `margins` on both sides.
+    #[inline(always)]
+    pub(super) fn traverse_widened<const IN_ORDER: bool, W: Wide>(
+        &self,
+        wide: W,
+        ray: &LaneRay<W>,
+        margins: Vec3,
+        t_max: &mut f32,
+        visitor: &mut impl Visitor,
+    ) -> ControlFlow<()> {
+        for &root in &self.roots {
+            if root.is_block() {
+                visitor.visit(wide, ray, root.as_block(), t_max)?;
+            } else {
+                let slabs = Widened::new(wide, ray, margins);
+                self.descend::<IN_ORDER, W>(root, wide, (ray, &slabs), t_max, visitor)?;
+            }
+        }
+        ControlFlow::Continue(())
     }
 
     /// The part of [`traverse`](Self::traverse) below the node `root`.
@@ -150,7 +169,7 @@ impl Hierarchy {
         &self,
         root: Child,
         wide: W,
-        (ray, slabs): (&LaneRay<W>, &SlabRay<W>),
+        (ray, slabs): (&LaneRay<W>, &impl Slabs<W>),
         t_max: &mut f32,
         visitor: &mut impl Visitor,
     ) -> ControlFlow<()> {

@@ -1,5 +1,7 @@
 //! A ray, prepared for tests against eight boxes or primitives at once.
 
+use glam::Vec3;
+
 use crate::ray::Ray;
 use crate::simd::Wide;
 
@@ -46,23 +48,68 @@ impl<W: Wide> SlabRay<W> {
         let inverse = ray.direction.map(|x| wide.div(one, x));
         Self { origin: ray.origin, inverse, negative: inverse.map(|x| usize::from(wide.less(x, zero) != 0)) }
     }
+}
 
+/// A test of a ray against eight boxes.
+pub(super) trait Slabs<W: Wide> {
     /// The distances at which the ray enters and leaves each box, or its ends where they are nearer, each
     /// with an error of [`SLAB_ROUNDING`].
     ///
     /// A zero component of the direction gives infinite distances to both planes of its axis, or NaN for a
     /// plane that holds the origin. The comparisons are written so that a NaN does not constrain: a ray that
     /// lies in a face, or in a box without thickness, meets it.
+    fn slabs(&self, wide: W, planes: &Planes, t_min: W::F, t_max: W::F) -> [W::F; 2];
+}
+
+impl<W: Wide> SlabRay<W> {
+    /// `origins` as they are for the planes with the least and with the greatest coordinates.
     #[inline(always)]
-    pub(super) fn slabs(&self, wide: W, planes: &Planes, t_min: W::F, t_max: W::F) -> [W::F; 2] {
+    fn between(
+        &self,
+        origins: [&[W::F; 3]; 2],
+        wide: W,
+        planes: &Planes,
+        [t_min, t_max]: [W::F; 2],
+    ) -> [W::F; 2] {
         let (mut near, mut far) = (t_min, t_max);
         for (axis, planes) in planes.iter().enumerate() {
             let negative = self.negative[axis] & 1;
-            let enter = wide.sub(wide.load(&planes[negative]), self.origin[axis]);
-            let exit = wide.sub(wide.load(&planes[1 - negative]), self.origin[axis]);
+            let enter = wide.sub(wide.load(&planes[negative]), origins[negative][axis]);
+            let exit = wide.sub(wide.load(&planes[1 - negative]), origins[1 - negative][axis]);
             near = wide.greater_of(wide.mul(enter, self.inverse[axis]), near);
             far = wide.less_of(wide.mul(exit, self.inverse[axis]), far);
         }
         [near, far]
+    }
+}
+
+impl<W: Wide> Slabs<W> for SlabRay<W> {
+    #[inline(always)]
+    fn slabs(&self, wide: W, planes: &Planes, t_min: W::F, t_max: W::F) -> [W::F; 2] {
+        self.between([&self.origin; 2], wide, planes, [t_min, t_max])
+    }
+}
+
+/// A ray in every lane, prepared for the slabs of boxes that are wider than they are said to be.
+pub(super) struct Widened<W: Wide> {
+    ray: SlabRay<W>,
+    /// For the planes with the least and with the greatest coordinates.
+    origins: [[W::F; 3]; 2],
+}
+
+impl<W: Wide> Widened<W> {
+    #[inline(always)]
+    pub(super) fn new(wide: W, ray: &LaneRay<W>, margins: Vec3) -> Self {
+        let margins = wide.splat3(margins.to_array());
+        let origins = [wide.add3(ray.origin, margins), wide.sub3(ray.origin, margins)];
+        Self { ray: SlabRay::new(wide, ray), origins }
+    }
+}
+
+impl<W: Wide> Slabs<W> for Widened<W> {
+    #[inline(always)]
+    fn slabs(&self, wide: W, planes: &Planes, t_min: W::F, t_max: W::F) -> [W::F; 2] {
+        let [above, below] = &self.origins;
+        self.ray.between([above, below], wide, planes, [t_min, t_max])
     }
 }

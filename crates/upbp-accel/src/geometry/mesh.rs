@@ -1,22 +1,34 @@
 //! The triangle mesh.
 
-use glam::{DVec3, Vec3};
+use std::sync::{Arc, OnceLock};
+
+use glam::{Affine3A, DVec3, Vec3};
 
 use super::error::GeometryError;
+use super::placement::Placement;
 use super::triangle::RayShear;
 
 /// Triangles over shared vertices.
 ///
 /// The winding gives the normal: it points to where the vertices are seen counter-clockwise. A closed mesh
 /// must be wound so that normals point outwards; [`TriangleMesh::signed_volume`] is negative otherwise.
+///
+/// Clones share the triangles, and so do copies that are [placed](Self::placed) elsewhere.
 #[derive(Clone, Debug)]
 pub struct TriangleMesh {
+    surface: Arc<Surface>,
+    placement: Option<Placement>,
+    bounds: (Vec3, Vec3),
+    /// Area of the triangles up to and including each, once it is asked for.
+    cumulative_area: OnceLock<Vec<f64>>,
+}
+
+/// Triangles in coordinates of their own.
+#[derive(Debug)]
+struct Surface {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     normals: Option<Vec<Vec3>>,
-    /// Area of the triangles up to and including each.
-    cumulative_area: Vec<f64>,
-    bounds: (Vec3, Vec3),
     closed: bool,
     dropped: usize,
 }
@@ -55,60 +67,142 @@ impl TriangleMesh {
         let closed = is_closed(&positions, &indices);
         let count = indices.len();
         let mut triangles = indices;
-        triangles.retain(|&triangle| doubled_area(&positions, triangle) > 0.0);
+        let has_area =
+            |triangle: &[u32; 3]| cross(triangle.map(|vertex| positions[vertex as usize])).length() > 0.0;
+        triangles.retain(has_area);
         if triangles.is_empty() {
             return Err(GeometryError::Degenerate { what: "a mesh" });
         }
-        let mut total = 0.0;
-        let cumulative_area = triangles
-            .iter()
-            .map(|&triangle| {
-                total += 0.5 * doubled_area(&positions, triangle);
-                total
-            })
-            .collect();
-        let mut bounds = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for &vertex in triangles.iter().flatten() {
-            let position = positions[vertex as usize];
-            bounds = (bounds.0.min(position), bounds.1.max(position));
-        }
         let dropped = count - triangles.len();
-        Ok(Self { positions, triangles, normals, cumulative_area, bounds, closed, dropped })
+        let surface = Arc::new(Surface { positions, triangles, normals, closed, dropped });
+        Ok(Self::with_surface(surface, None))
     }
 
-    pub(super) fn translated(mut self, by: Vec3) -> Self {
-        self.positions.iter_mut().for_each(|position| *position += by);
-        let (min, max) = self.bounds;
-        Self { bounds: (min + by, max + by), ..self }
+    fn with_surface(surface: Arc<Surface>, placement: Option<Placement>) -> Self {
+        let mut mesh = Self {
+            surface,
+            placement,
+            bounds: (Vec3::INFINITY, Vec3::NEG_INFINITY),
+            cumulative_area: OnceLock::new(),
+        };
+        for triangle in 0..mesh.triangle_count() {
+            for corner in mesh.corners(triangle) {
+                mesh.bounds = (mesh.bounds.0.min(corner), mesh.bounds.1.max(corner));
+            }
+        }
+        mesh
     }
 
-    /// The vertex positions.
+    /// A copy in another place, which shares the triangles. `to_scene` maps all corners from where they are
+    /// in this mesh; it may mirror, stretch and shear, and the normals still point outwards.
+    ///
+    /// A scene with many copies of a mesh needs memory for one of them; rays take somewhat longer to find
+    /// their way than to triangles of a mesh of its own, and meet the same.
+    pub fn placed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
+        let mut placement = Placement::new(to_scene)?;
+        if let Some(first) = &self.placement {
+            placement = placement.after(first)?;
+        }
+        let mesh = Self::with_surface(self.surface.clone(), Some(placement));
+        let (min, max) = mesh.bounds;
+        if !(min.is_finite() && max.is_finite()) {
+            return Err(GeometryError::NonFinite { what: "a corner of a placed mesh" });
+        }
+        if (0..mesh.triangle_count()).all(|triangle| cross(mesh.corners(triangle)) == DVec3::ZERO) {
+            return Err(GeometryError::Degenerate { what: "a placed mesh" });
+        }
+        Ok(mesh)
+    }
+
+    /// The same mesh with triangles of its own, in the same place: no copy any more.
     #[must_use]
-    pub fn positions(&self) -> &[Vec3] {
-        &self.positions
+    pub fn unshared(self) -> Self {
+        let Some(placement) = self.placement else { return self };
+        let Surface { positions, triangles, normals, closed, dropped } = &*self.surface;
+        let surface = Surface {
+            positions: positions.iter().map(|position| placement.point(*position)).collect(),
+            triangles: (0..triangles.len() as u32).map(|triangle| self.vertices(triangle)).collect(),
+            normals: normals
+                .as_ref()
+                .map(|normals| normals.iter().map(|normal| placement.normal(*normal)).collect()),
+            closed: *closed,
+            dropped: *dropped,
+        };
+        Self { surface: Arc::new(surface), placement: None, ..self }
     }
 
-    /// The triangles that are in use, as indices of positions.
+    pub(super) fn translated(self, by: Vec3) -> Self {
+        if let Some(placement) = self.placement {
+            return Self::with_surface(self.surface, Some(placement.translated(by)));
+        }
+        let Surface { positions, triangles, normals, closed, dropped } = &*self.surface;
+        let positions = positions.iter().map(|position| *position + by).collect();
+        let (triangles, normals) = (triangles.clone(), normals.clone());
+        let surface = Surface { positions, triangles, normals, closed: *closed, dropped: *dropped };
+        Self::with_surface(Arc::new(surface), None)
+    }
+
+    /// The number of triangles that are in use.
     #[must_use]
-    pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+    pub fn triangle_count(&self) -> u32 {
+        self.surface.triangles.len() as u32
+    }
+
+    /// Where the mesh is placed, if it is a copy.
+    pub(super) fn placement(&self) -> Option<&Placement> {
+        self.placement.as_ref()
+    }
+
+    /// The mesh in coordinates of its own.
+    pub(super) fn model(&self) -> Self {
+        Self::with_surface(self.surface.clone(), None)
+    }
+
+    /// A number that all copies share, and no other mesh that exists.
+    pub(super) fn number(&self) -> usize {
+        Arc::as_ptr(&self.surface) as usize
+    }
+
+    /// Corners of a triangle as numbers of positions.
+    fn vertices(&self, triangle: u32) -> [u32; 3] {
+        let [a, b, c] = self.surface.triangles[triangle as usize];
+        if self.placement.is_some_and(|placement| placement.mirrors) { [a, c, b] } else { [a, b, c] }
     }
 
     /// The number of triangles without area that were left out.
     #[must_use]
     pub fn dropped_triangles(&self) -> usize {
-        self.dropped
+        self.surface.dropped
     }
 
-    /// The corners of a triangle.
-    pub(super) fn corners(&self, triangle: u32) -> [Vec3; 3] {
-        self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
+    /// The corners of a triangle, counter-clockwise as seen from the front.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    #[must_use]
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        let corners = self.vertices(triangle).map(|vertex| self.surface.positions[vertex as usize]);
+        match &self.placement {
+            None => corners,
+            Some(placement) => corners.map(|corner| placement.point(corner)),
+        }
     }
 
     /// Surface area, square scene units.
     #[must_use]
     pub fn area(&self) -> f32 {
-        self.cumulative_area.last().copied().unwrap_or(0.0) as f32
+        self.cumulative_area().last().copied().unwrap_or(0.0) as f32
+    }
+
+    fn cumulative_area(&self) -> &[f64] {
+        self.cumulative_area.get_or_init(|| {
+            let mut total = 0.0;
+            let up_to = |triangle| {
+                total += 0.5 * cross(self.corners(triangle)).length();
+                total
+            };
+            (0..self.triangle_count()).map(up_to).collect()
+        })
     }
 
     /// The enclosed volume, cubic scene units: negative if the normals point inwards, and without meaning
@@ -117,7 +211,7 @@ impl TriangleMesh {
     pub fn signed_volume(&self) -> f32 {
         // From a point near the mesh: from a far one the terms cancel.
         let from = self.bounds.0.as_dvec3();
-        let sum: f64 = (0..self.triangles.len() as u32)
+        let sum: f64 = (0..self.triangle_count())
             .map(|triangle| {
                 let [a, b, c] = self.corners(triangle).map(|corner| corner.as_dvec3() - from);
                 a.dot(b.cross(c))
@@ -129,13 +223,13 @@ impl TriangleMesh {
     /// A point distributed uniformly over the surface, and the geometric normal; `u` in `[0, 1)²`.
     #[must_use]
     pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        let total = self.cumulative_area.last().copied().unwrap_or(0.0);
+        let areas = self.cumulative_area();
+        let total = areas.last().copied().unwrap_or(0.0);
         let target = f64::from(u[0]) * total;
-        let triangle =
-            self.cumulative_area.partition_point(|&sum| sum <= target).min(self.triangles.len() - 1);
-        let before = if triangle == 0 { 0.0 } else { self.cumulative_area[triangle - 1] };
+        let triangle = areas.partition_point(|&sum| sum <= target).min(areas.len() - 1);
+        let before = if triangle == 0 { 0.0 } else { areas[triangle - 1] };
         // The rest of the random number inside the triangle is uniform again.
-        let left = ((target - before) / (self.cumulative_area[triangle] - before)).clamp(0.0, 1.0);
+        let left = ((target - before) / (areas[triangle] - before)).clamp(0.0, 1.0);
         let root = left.sqrt();
         let (b, c) = (root * (1.0 - f64::from(u[1])), root * f64::from(u[1]));
         (self.point(triangle as u32, b, c), self.geometric_normal(triangle as u32))
@@ -146,7 +240,7 @@ impl TriangleMesh {
     /// Vertices at the same position count as one, so that seams of normals or textures do not matter.
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        self.closed
+        self.surface.closed
     }
 
     /// Whether `point` lies inside; `None` for a mesh that is not closed.
@@ -155,14 +249,14 @@ impl TriangleMesh {
     /// that any direction gives the right parity.
     #[must_use]
     pub fn contains(&self, point: Vec3) -> Option<bool> {
-        if !self.closed {
+        if !self.surface.closed {
             return None;
         }
         if !(self.bounds.0.cmple(point).all() && point.cmple(self.bounds.1).all()) {
             return Some(false);
         }
         let shear = RayShear::new(point, Vec3::new(0.267_261_24, 0.534_522_5, 0.801_783_7));
-        let crossings = (0..self.triangles.len() as u32)
+        let crossings = (0..self.triangle_count())
             .filter_map(|triangle| shear.intersect(self.corners(triangle)))
             .filter(|hit| hit.t > 0.0)
             .count();
@@ -184,13 +278,17 @@ impl TriangleMesh {
 
     /// The unit normal of the plane of a triangle.
     pub(super) fn geometric_normal(&self, triangle: u32) -> Vec3 {
-        cross(&self.positions, self.triangles[triangle as usize]).normalize().as_vec3()
+        cross(self.corners(triangle)).normalize().as_vec3()
     }
 
     /// The interpolated normal, in the hemisphere of `geometric`.
     pub(super) fn shading_normal(&self, triangle: u32, b: f32, c: f32, geometric: Vec3) -> Vec3 {
-        let Some(normals) = &self.normals else { return geometric };
-        let [p, q, r] = self.triangles[triangle as usize].map(|vertex| normals[vertex as usize]);
+        let Some(normals) = &self.surface.normals else { return geometric };
+        let mut corners = self.vertices(triangle).map(|vertex| normals[vertex as usize]);
+        if let Some(placement) = &self.placement {
+            corners = corners.map(|normal| placement.normal(normal));
+        }
+        let [p, q, r] = corners;
         match (p * (1.0 - b - c) + q * b + r * c).try_normalize() {
             Some(normal) if normal.dot(geometric) < 0.0 => -normal,
             Some(normal) => normal,
@@ -201,13 +299,9 @@ impl TriangleMesh {
 
 /// The normal of a triangle, of twice its area in length; in double precision, so that that of a small
 /// triangle does not vanish.
-fn cross(positions: &[Vec3], triangle: [u32; 3]) -> DVec3 {
-    let [a, b, c] = triangle.map(|vertex| positions[vertex as usize].as_dvec3());
+fn cross(corners: [Vec3; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
     (b - a).cross(c - a)
-}
-
-fn doubled_area(positions: &[Vec3], triangle: [u32; 3]) -> f64 {
-    cross(positions, triangle).length()
 }
 
 /// Whether every edge joins exactly two triangles that are wound alike; equal positions count as one.

@@ -22,13 +22,16 @@ pub(super) struct Name {
 }
 
 impl Name {
-    /// All primitives of a list of shapes, in its order.
+    /// All primitives of a list of shapes, in its order, without those of meshes that are copies.
     pub(super) fn all(shapes: &[Shape]) -> Vec<Self> {
-        let triangles =
-            |shape: &Shape| if let Shape::Mesh(mesh) = shape { mesh.triangles().len() } else { 1 };
-        let mut names = Vec::with_capacity(shapes.iter().map(triangles).sum());
+        let triangles = |shape: &Shape| match shape {
+            Shape::Mesh(mesh) if mesh.placement().is_some() => 0,
+            Shape::Mesh(mesh) => mesh.triangle_count(),
+            Shape::Sphere(_) | Shape::Quad(_) | Shape::Box(_) => 1,
+        };
+        let mut names = Vec::with_capacity(shapes.iter().map(|shape| triangles(shape) as usize).sum());
         for (shape, index) in shapes.iter().zip(0..) {
-            names.extend((0..triangles(shape) as u32).map(|triangle| Self { shape: index, triangle }));
+            names.extend((0..triangles(shape)).map(|triangle| Self { shape: index, triangle }));
         }
         names
     }

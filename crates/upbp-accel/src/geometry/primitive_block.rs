@@ -7,7 +7,8 @@
 use glam::{DVec3, Vec3};
 
 use super::axis_box::AxisBox;
-use super::lane_ray::{LaneRay, Planes, ROUNDING, SLAB_ROUNDING, SlabRay};
+use super::lane_ray::{LaneRay, Planes, ROUNDING, SLAB_ROUNDING, SlabRay, Slabs as _};
+use super::placement::Placement;
 use super::quad::{Plane, Quad};
 use super::sphere::Sphere;
 use super::triangle::RayShear;
@@ -39,6 +40,20 @@ impl Triangles {
     pub(super) fn corners(&self, lane: usize) -> [Vec3; 3] {
         let [a, b, c] = &self.0;
         [a, b, c].map(|corner| Vec3::new(corner[0][lane], corner[1][lane], corner[2][lane]))
+    }
+
+    /// The triangles of a mesh where a copy of it has them.
+    #[inline(always)]
+    pub(super) fn placed<W: Wide>(&self, wide: W, placement: &Placement) -> Self {
+        let mut placed = Self::EMPTY;
+        let order = if placement.mirrors { [0, 2, 1] } else { [0, 1, 2] };
+        for (corner, to) in order.into_iter().enumerate() {
+            let points = placement.points(wide, wide.load3(&self.0[corner]));
+            for (axis, lanes) in points.into_iter().enumerate() {
+                placed.0[to][axis] = wide.store(lanes);
+            }
+        }
+        placed
     }
 }
 

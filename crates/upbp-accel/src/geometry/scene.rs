@@ -6,16 +6,17 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::axis_box::AxisBox;
-use super::build::build;
+use super::build::{Leaves, build};
 use super::error::GeometryError;
 use super::hierarchy::{BlockRef, Hierarchy, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, SurfacePoint, Visit};
+use super::instances::{InstanceSearch, Instances};
 use super::lane_ray::LaneRay;
 use super::primitive::{Name, Primitives, Probe};
 use super::shape::Shape;
 use super::sphere::Sphere;
 use crate::ray::Ray;
-use crate::simd::{Task, Wide, run};
+use crate::simd::{Best, Instructions, Task, Wide};
 
 /// The shapes of a scene, ready for rays.
 #[derive(Clone, Debug)]
@@ -24,10 +25,12 @@ pub struct SceneGeometry {
     bounds: (Vec3, Vec3),
     hierarchy: Hierarchy,
     primitives: Primitives,
+    instances: Instances,
 }
 
 impl SceneGeometry {
-    /// Builds the hierarchy over all primitives. No shapes at all are allowed.
+    /// Builds the hierarchy over all primitives, and those over meshes that are
+    /// [placed](super::TriangleMesh::placed). No shapes at all are allowed.
     pub fn build(shapes: Vec<Shape>) -> Result<Self, GeometryError> {
         let names = Name::all(&shapes);
         if names.len() > MAX_INDEX {
@@ -35,12 +38,13 @@ impl SceneGeometry {
         }
         let boxes: Vec<_> = names.par_iter().with_min_len(1024).map(|name| name.boxed(&shapes)).collect();
         let mut primitives = Primitives::EMPTY;
-        let hierarchy = build(&boxes, |kind, members| {
+        let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| {
             primitives.pack(&shapes, kind, members.iter().map(|&index| names[index as usize]))
         });
         let each = shapes.iter().map(Shape::aabb);
         let bounds = each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((Vec3::ZERO, Vec3::ZERO));
-        Ok(Self { shapes, bounds, hierarchy, primitives })
+        let instances = Instances::of(&shapes)?;
+        Ok(Self { shapes, bounds, hierarchy, primitives, instances })
     }
 
     /// The least and the greatest coordinates; both zero for an empty scene.
@@ -70,7 +74,7 @@ impl SceneGeometry {
     /// Spheres and boxes report where the line enters and where it leaves. The visitor may shorten the ray
     /// or stop.
     pub fn for_each_hit(&self, ray: Ray, visit: impl FnMut(&Candidate) -> Visit) {
-        run(Search::<_, true> { scene: self, ray, visit });
+        self.search::<true>(Best, ray, visit);
     }
 
     /// The nearest intersection in `(t_min, t_max)`; of several at the same distance, that of the earliest
@@ -104,8 +108,44 @@ impl SceneGeometry {
             found = accept(candidate);
             if found { Visit::Stop } else { Visit::Continue }
         };
-        run(Search::<_, false> { scene: self, ray, visit });
+        self.search::<false>(Best, ray, visit);
         found
+    }
+
+    /// Visits what is no copy first.
+    #[inline]
+    fn search<const IN_ORDER: bool>(
+        &self,
+        instructions: impl Instructions,
+        ray: Ray,
+        mut visit: impl FnMut(&Candidate) -> Visit,
+    ) {
+        if self.instances.is_empty() {
+            instructions.run(Search::<_, IN_ORDER> { scene: self, ray, visit });
+            return;
+        }
+        let (mut rest, mut is_done) = (ray, false);
+        let visit_first = |candidate: &Candidate| {
+            let answer = visit(candidate);
+            match answer {
+                Visit::Continue => {}
+                Visit::ShrinkTo(t) => rest.t_max = rest.t_max.min(t),
+                Visit::Stop => is_done = true,
+            }
+            answer
+        };
+        instructions.run(Search::<_, IN_ORDER> { scene: self, ray, visit: visit_first });
+        if !is_done {
+            let extent = self.extent_from(rest.origin);
+            let instances = &self.instances;
+            instructions.run(InstanceSearch::<_, IN_ORDER> { instances, ray: rest, extent, visit });
+        }
+    }
+
+    /// The greatest sum of coordinate differences between a point and any of a shape.
+    #[inline(always)]
+    fn extent_from(&self, point: Vec3) -> f32 {
+        (self.bounds.0 - point).abs().max((self.bounds.1 - point).abs()).element_sum()
     }
 
     /// Surface data of an intersection of `ray` with this scene.
@@ -184,11 +224,12 @@ impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Task for Search<'_, V,
     #[inline(always)]
     fn run(self, wide: impl Wide) {
         let Self { scene, ray, visit } = self;
-        let extent =
-            (scene.bounds.0 - ray.origin).abs().max((scene.bounds.1 - ray.origin).abs()).element_sum();
-        let probe = Probe::new(&scene.shapes, &scene.primitives, &ray, extent);
+        let probe = Probe::new(&scene.shapes, &scene.primitives, &ray, scene.extent_from(ray.origin));
         let lanes = LaneRay::new(wide, &ray);
-        scene.hierarchy.traverse::<IN_ORDER, _>(wide, &lanes, ray.t_max, Blocks { probe, visit });
+        let mut t_max = ray.t_max;
+        // Nothing is left to do if it breaks off.
+        let _ =
+            scene.hierarchy.traverse::<IN_ORDER, _>(wide, &lanes, &mut t_max, &mut Blocks { probe, visit });
     }
 }
 

@@ -121,7 +121,7 @@ impl Cells {
         let size = extent / counts;
         let mut cells = Self { min, size, counts: counts.as_uvec3(), indices: Vec::new() };
         let mut state = vec![State::Unknown; cells.counts.element_product() as usize];
-        for triangle in 0..mesh.triangles().len() as u32 {
+        for triangle in 0..mesh.triangle_count() {
             cells.mark(mesh.corners(triangle).map(|corner| corner.as_dvec3() - min), &mut state);
         }
         // Cells that no triangle touches hang together, all inside or all outside.

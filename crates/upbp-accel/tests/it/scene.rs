@@ -84,9 +84,9 @@ fn one_by_one(shapes: &[Shape], ray: Ray) -> Vec<Candidate> {
             });
         };
         if let Shape::Mesh(mesh) = shape {
-            for (triangle, number) in mesh.triangles().iter().zip(0..) {
-                let corners = triangle.map(|vertex| mesh.positions()[vertex as usize]).to_vec();
-                add(TriangleMesh::new(corners, vec![[0, 1, 2]], None).unwrap().into(), Some(number));
+            for triangle in 0..mesh.triangle_count() {
+                let corners = mesh.corners(triangle).to_vec();
+                add(TriangleMesh::new(corners, vec![[0, 1, 2]], None).unwrap().into(), Some(triangle));
             }
         } else {
             add(shape.clone(), None);
@@ -362,7 +362,7 @@ fn small_far_and_large_near_spheres_are_met_accurately() {
 fn closed_meshes_are_crossed_an_even_number_of_times() {
     let mesh = dented_ball(24, Vec3::ZERO, 1.0);
     assert!(mesh.is_closed());
-    let positions = mesh.positions().to_vec();
+    let positions: Vec<_> = (0..mesh.triangle_count()).flat_map(|triangle| mesh.corners(triangle)).collect();
     let scene = SceneGeometry::build(vec![mesh.into()]).unwrap();
     let mut random = Random::new(14);
     for _ in 0..20_000 {

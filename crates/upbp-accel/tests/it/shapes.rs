@@ -1,19 +1,25 @@
 //! Shapes by themselves: validation, area sampling, inside and outside, leaving a surface.
 
 use crate::support::Random;
-use glam::Vec3;
+use glam::{Affine3A, Quat, Vec3};
 use upbp_accel::{
     AxisBox, GeometryError, Quad, Ray, SceneGeometry, Shape, Sphere, TriangleMesh, Visit, offset_origin,
 };
 
-fn cube_mesh(min: Vec3, max: Vec3) -> TriangleMesh {
+/// Corners and triangles of a cube.
+fn cube(min: Vec3, max: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let corner = |i: u32| {
         let pick = |bit: u32, low: f32, high: f32| if i >> bit & 1 == 0 { low } else { high };
         Vec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
     };
     let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    TriangleMesh::new((0..8).map(corner).collect(), triangles, None).unwrap()
+    ((0..8).map(corner).collect(), triangles)
+}
+
+fn cube_mesh(min: Vec3, max: Vec3) -> TriangleMesh {
+    let (positions, triangles) = cube(min, max);
+    TriangleMesh::new(positions, triangles, None).unwrap()
 }
 
 fn every_kind(scale: f32, offset: Vec3) -> Vec<Shape> {
@@ -73,7 +79,8 @@ fn bad_input_is_refused_with_its_place() {
     assert!(matches!(mesh(&corners, &[[0, 1, 3]], None), Err(GeometryError::Degenerate { .. })));
     assert!(matches!(mesh(&corners, &[], None), Err(GeometryError::Degenerate { .. })));
     let partly = mesh(&corners, &[[0, 1, 3], [0, 1, 2], [2, 2, 1]], None).unwrap();
-    assert_eq!((partly.triangles(), partly.dropped_triangles()), (&[[0, 1, 2]][..], 2));
+    assert_eq!((partly.triangle_count(), partly.dropped_triangles()), (1, 2));
+    assert_eq!(partly.corners(0)[..], corners[..3]);
 }
 
 #[test]
@@ -185,12 +192,11 @@ fn inside_and_outside_are_told_apart() {
 
 #[test]
 fn only_meshes_without_a_border_are_closed() {
-    let cube = cube_mesh(Vec3::ZERO, Vec3::ONE);
-    let (positions, triangles) = (cube.positions().to_vec(), cube.triangles().to_vec());
-    assert!(cube.is_closed());
+    let (positions, triangles) = cube(Vec3::ZERO, Vec3::ONE);
     let closed = |triangles: &[[u32; 3]]| {
         TriangleMesh::new(positions.clone(), triangles.to_vec(), None).unwrap().is_closed()
     };
+    assert!(closed(&triangles));
     assert!(!closed(&triangles[1..]), "a hole");
     assert!(!closed(&[&triangles[..], &triangles[..1]].concat()), "a doubled triangle");
     assert!(!closed(&[&triangles[..], &triangles[..]].concat()), "a doubled cube");
@@ -202,6 +208,67 @@ fn only_meshes_without_a_border_are_closed() {
     let separate = triangles.iter().flatten().map(|&vertex| positions[vertex as usize]).collect();
     let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     assert!(TriangleMesh::new(separate, indices, None).unwrap().is_closed());
+}
+
+#[test]
+fn copies_are_meshes_where_they_are_placed() {
+    let turned = Affine3A::from_scale_rotation_translation(
+        Vec3::new(2.0, 2.0, -0.5),
+        Quat::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7),
+        Vec3::new(5.0, -3.0, 1.0),
+    );
+    let tilted = Affine3A::from_cols_array(&[1.0, 0.0, 0.0, 0.3, 1.0, 0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 9.0]);
+    let normals = |positions: &[Vec3]| positions.iter().map(|p| (*p - 0.5).normalize()).collect::<Vec<_>>();
+    let (positions, triangles) = cube(Vec3::ZERO, Vec3::ONE);
+    let model = TriangleMesh::new(positions.clone(), triangles.clone(), Some(normals(&positions))).unwrap();
+    for to_scene in [turned, tilted] {
+        let copy = model.placed(&to_scene).unwrap();
+        let in_scene: Vec<_> = positions.iter().map(|p| to_scene.transform_point3(*p)).collect();
+        let mut triangles = triangles.clone();
+        if to_scene.matrix3.determinant() < 0.0 {
+            for triangle in &mut triangles {
+                triangle.swap(1, 2);
+            }
+        }
+        let to_normals = to_scene.matrix3.inverse().transpose();
+        let normals = normals(&positions).into_iter().map(|normal| to_normals * normal).collect();
+        let own = TriangleMesh::new(in_scene, triangles, Some(normals)).unwrap();
+        assert!(copy.is_closed() && copy.signed_volume() > 0.0);
+        assert!((copy.signed_volume() / own.signed_volume() - 1.0).abs() < 1e-5);
+        assert!((copy.area() / own.area() - 1.0).abs() < 1e-5);
+        for i in 0..8 {
+            let u = [i as f32 / 8.0, 0.3];
+            let ((a, normal_a), (b, normal_b)) = (copy.sample_area(u), own.sample_area(u));
+            assert!(a.distance(b) < 1e-5 && normal_a.distance(normal_b) < 1e-5, "{a} {b}");
+        }
+        let centre = to_scene.transform_point3(Vec3::splat(0.5));
+        let [copy, own] = [copy, own].map(|mesh| SceneGeometry::build(vec![mesh.into()]).unwrap());
+        let mut random = Random::new(16);
+        for _ in 0..200 {
+            let target = to_scene.transform_point3(random.cube() * 0.5 + 0.5);
+            let origin = centre + random.cube() * 9.0;
+            let ray = Ray::new(origin, (target - origin).normalize());
+            let [a, b] = [&copy, &own].map(|scene| scene.surface(&ray, &scene.closest(ray).unwrap()));
+            assert!(a.position.distance(b.position) < 1e-4, "{a:?} {b:?}");
+            assert!(a.geometric_normal.distance(b.geometric_normal) < 1e-4, "{a:?} {b:?}");
+            assert!(a.shading_normal.distance(b.shading_normal) < 1e-3, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn copies_that_are_flat_or_nowhere_are_refused() {
+    let model = cube_mesh(Vec3::ZERO, Vec3::ONE);
+    let flat = Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0));
+    assert!(matches!(model.placed(&flat), Err(GeometryError::Degenerate { .. })));
+    let far = Affine3A::from_translation(Vec3::splat(1e12));
+    assert!(matches!(model.placed(&far), Err(GeometryError::Degenerate { .. })));
+    let nowhere = Affine3A::from_translation(Vec3::NAN);
+    assert!(matches!(model.placed(&nowhere), Err(GeometryError::NonFinite { .. })));
+    let large = Affine3A::from_scale(Vec3::splat(1e30));
+    assert!(model.placed(&large).is_ok());
+    let too_large = model.placed(&large).unwrap().placed(&large);
+    assert!(matches!(too_large, Err(GeometryError::NonFinite { .. })));
 }
 
 #[test]

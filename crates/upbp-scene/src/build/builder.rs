@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use upbp_core::open_file;
 use upbp_media::MediumId;
 
+use super::surfaces::MeshFiles;
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::Problem;
 
@@ -20,6 +21,7 @@ pub(super) struct Builder<'a> {
     pub(super) hash: Fnv1a,
     /// The files that were read.
     pub(super) files: Vec<PathBuf>,
+    pub(super) meshes: MeshFiles,
 }
 
 impl Builder<'_> {

@@ -19,7 +19,7 @@ use upbp_estimators::scene::EmitterId;
 use upbp_media::{Homogeneous, MediumId};
 
 use self::builder::Builder;
-use self::surfaces::ShapeDraft;
+use self::surfaces::{MeshFiles, ShapeDraft};
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::SceneError;
 use crate::light::{AreaLight, Light, VolumeLight};
@@ -78,6 +78,7 @@ impl ReadyScene {
             problems: Vec::new(),
             hash: Fnv1a(description.hash()),
             files: Vec::new(),
+            meshes: MeshFiles::of(description),
         };
         let scene = builder.build();
         match scene {

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
-use upbp_accel::{AxisBox, Quad, Shape, Sphere, TriangleMesh};
+use glam::{Affine3A, DMat3, DVec3, Mat3, Vec3};
+use upbp_accel::{AxisBox, GeometryError, Quad, Shape, Sphere, TriangleMesh};
 use upbp_media::{MediumId, Spectrum};
 
 use super::builder::{Builder, unknown};
@@ -15,6 +15,10 @@ use crate::obj::ObjMesh;
 
 /// The largest mesh file that is read, in bytes.
 const MAX_FILE: u64 = 1 << 30;
+
+/// Triangles from which shapes with the same mesh file share them. For fewer, memory is of no matter, and
+/// rays find triangles of their own somewhat faster.
+const COPIED_FROM: u32 = 4096;
 
 /// A shape that is checked by itself, but not yet against others.
 #[derive(Clone, Debug)]
@@ -132,7 +136,7 @@ impl Builder<'_> {
             Geometry::Quad { origin, edge_u, edge_v } => {
                 Quad::new(origin.get(), edge_u.get(), edge_v.get()).map(Shape::from)
             }
-            Geometry::Box { min, max } => {
+            Geometry::Box { min, max, rotate } => {
                 if !min.get().cmplt(max.get()).all() {
                     return Err(format!(
                         "`min` {} is not below `max` {} on every axis",
@@ -140,9 +144,12 @@ impl Builder<'_> {
                         max.get()
                     ));
                 }
-                AxisBox::new(min.get(), max.get()).map(Shape::from)
+                match rotation(rotate)? {
+                    Some(rotation) => rotated_box([min.get(), max.get()], rotation).map(Shape::from),
+                    None => AxisBox::new(min.get(), max.get()).map(Shape::from),
+                }
             }
-            Geometry::Mesh { file, positions, indices, normals, scale, translate } => {
+            Geometry::Mesh { file, positions, indices, normals, scale, rotate, translate } => {
                 let given_here = !(positions.is_empty() && indices.is_empty() && normals.is_empty());
                 let mesh = match file {
                     Some(_) if given_here => {
@@ -157,28 +164,103 @@ impl Builder<'_> {
                             |list: &[Vector]| list.iter().map(|vector| vector.get()).collect::<Vec<_>>();
                         check_triangles(&vectors(positions), indices)?;
                         let normals = (!normals.is_empty()).then(|| vectors(normals));
-                        ObjMesh { positions: vectors(positions), indices: indices.clone(), normals }
+                        let mesh = TriangleMesh::new(vectors(positions), indices.clone(), normals);
+                        mesh.map_err(|error| error.to_string())?
                     }
                 };
+                let rotation = rotation(rotate)?;
+                let in_place = scale.is_none() && rotation.is_none() && translate.is_none();
                 let scale = scale.map_or(1.0, description::Positive::get);
                 let translate = translate.map_or(Vec3::ZERO, Vector::get);
-                let mut positions = mesh.positions;
-                for (number, position) in positions.iter_mut().enumerate() {
-                    *position = *position * scale + translate;
-                    Vector::new(*position).map_err(|error| format!("position {number}: {error}"))?;
+                let linear = rotation.unwrap_or(Mat3::IDENTITY) * scale;
+                let to_scene = Affine3A::from_mat3_translation(linear, translate);
+                let copies = file.as_deref().map_or(1, |file| self.meshes.copies(file));
+                let is_copy = copies > 1 && mesh.triangle_count() >= COPIED_FROM;
+                let mesh = if in_place && !is_copy { Ok(mesh) } else { mesh.placed(&to_scene) };
+                let mesh = mesh.map_err(|error| error.to_string())?;
+                for triangle in 0..mesh.triangle_count() {
+                    for corner in mesh.corners(triangle) {
+                        Vector::new(corner).map_err(|error| format!("triangle {triangle}: {error}"))?;
+                    }
                 }
-                TriangleMesh::new(positions, mesh.indices, mesh.normals).map(Shape::from)
+                Ok(if is_copy { mesh } else { mesh.unshared() }.into())
             }
         };
         shape.map_err(|error| error.to_string())
     }
 
-    fn obj_mesh(&mut self, file: &str) -> Result<ObjMesh, String> {
+    /// The mesh in a file, which is read once.
+    fn obj_mesh(&mut self, file: &str) -> Result<TriangleMesh, String> {
+        if let Some(known) = self.meshes.known.get(file) {
+            return known.clone();
+        }
         let path = self.path(file);
         let describe = |error: &dyn std::fmt::Display| format!("mesh `{}`: {error}", path.display());
-        let bytes = self.open(&path, MAX_FILE).map_err(|error| describe(&error))?;
-        ObjMesh::read(bytes).map_err(|error| describe(&error))
+        let read = |builder: &mut Self| {
+            let bytes = builder.open(&path, MAX_FILE).map_err(|error| describe(&error))?;
+            let ObjMesh { positions, indices, normals } =
+                ObjMesh::read(bytes).map_err(|error| describe(&error))?;
+            TriangleMesh::new(positions, indices, normals).map_err(|error| describe(&error))
+        };
+        let mesh = read(self);
+        self.meshes.known.insert(file.to_owned(), mesh.clone());
+        mesh
     }
+}
+
+/// The mesh files of a scene.
+#[derive(Default)]
+pub(super) struct MeshFiles {
+    /// What was read.
+    known: BTreeMap<String, Result<TriangleMesh, String>>,
+    /// Shapes that refer to each.
+    uses: BTreeMap<String, usize>,
+}
+
+impl MeshFiles {
+    pub(super) fn of(description: &description::SceneDescription) -> Self {
+        let mut files = Self::default();
+        for shape in &description.shapes {
+            if let Geometry::Mesh { file: Some(file), .. } = &shape.geometry {
+                *files.uses.entry(file.clone()).or_default() += 1;
+            }
+        }
+        files
+    }
+
+    fn copies(&self, file: &str) -> usize {
+        self.uses.get(file).copied().unwrap_or(1)
+    }
+}
+
+/// All rotations of a list together; `None` if there are none.
+fn rotation(list: &[description::Rotation]) -> Result<Option<Mat3>, String> {
+    let mut all = DMat3::IDENTITY;
+    for (number, description::Rotation { axis, degrees }) in list.iter().enumerate() {
+        let Some(axis) = axis.get().as_dvec3().try_normalize() else {
+            return Err(format!("rotation {}: its axis has no direction", number + 1));
+        };
+        all = DMat3::from_axis_angle(axis, f64::from(degrees.get()).to_radians()) * all;
+    }
+    // What is left of zeros by rounding: quarter turns are exact.
+    let digits = |v: DVec3| (v * 2_f64.powi(40)).round() * 2_f64.powi(-40);
+    let DMat3 { x_axis, y_axis, z_axis } = all;
+    let exact = DMat3::from_cols(digits(x_axis), digits(y_axis), digits(z_axis));
+    Ok((exact != DMat3::IDENTITY).then(|| exact.as_mat3()))
+}
+
+/// A box that is rotated about its centre.
+fn rotated_box([min, max]: [Vec3; 2], rotation: Mat3) -> Result<TriangleMesh, GeometryError> {
+    /// Corners of each face, counter-clockwise from outside; bits of a number tell of an axis each.
+    const FACES: [[u32; 4]; 6] =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let (centre, half) = (0.5 * min + 0.5 * max, 0.5 * max - 0.5 * min);
+    let corner = |number: u32| {
+        let side = |axis: u32| if number >> axis & 1 == 0 { -1.0 } else { 1.0 };
+        centre + rotation * (half * Vec3::new(side(0), side(1), side(2)))
+    };
+    let triangles = FACES.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriangleMesh::new((0..8).map(corner).collect(), triangles, None)
 }
 
 /// Reports the first triangle without area. Those in mesh files are left out; one that is written by hand is

@@ -26,7 +26,7 @@ pub(crate) use self::medium::tabulated;
 pub use self::medium::{Medium, Phase};
 pub use self::named_map::Named;
 pub use self::scene::SceneDescription;
-pub use self::shape::{Geometry, Shape};
+pub use self::shape::{Geometry, Rotation, Shape};
 pub(crate) use self::text::Fnv1a;
 pub use self::value::{
     Asymmetries, Asymmetry, BeamAngle, Colour, Count, CutoffAngle, Degrees, Diameter, FieldOfView, Ior,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::value::{Colour, Positive, Vector, is_default};
+use super::value::{Colour, Degrees, Positive, Vector, is_default};
 
 /// A surface, or a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,12 +48,15 @@ pub enum Geometry {
         /// The second edge from that corner.
         edge_v: Vector,
     },
-    /// An axis-aligned box.
+    /// A box along the axes, unless it is rotated.
     Box {
         /// The corner with the least coordinates.
         min: Vector,
         /// The corner with the greatest coordinates.
         max: Vector,
+        /// Rotations about the centre of the box, one after the other.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        rotate: Vec<Rotation>,
     },
     /// Triangles from a file, or given here: either `file`, or `positions` and `indices`.
     Mesh {
@@ -72,8 +75,21 @@ pub enum Geometry {
         /// Factor for all coordinates, applied first.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         scale: Option<Positive>,
-        /// Translation of all corners, applied second.
+        /// Rotations about the origin, applied second, one after the other.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        rotate: Vec<Rotation>,
+        /// Translation of all corners, applied last.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         translate: Option<Vector>,
     },
+}
+
+/// A rotation, counter-clockwise as seen from the tip of its axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rotation {
+    /// The axis, a vector of any length.
+    pub axis: Vector,
+    /// The angle.
+    pub degrees: Degrees,
 }

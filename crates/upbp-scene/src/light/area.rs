@@ -78,13 +78,14 @@ impl AreaLight {
 
 /// Bounds with the normals of a mesh.
 fn with_normals(mesh: &TriangleMesh, bounds: EmitterBounds) -> EmitterBounds {
-    let normal = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|corner| mesh.positions()[corner as usize]);
+    let normal = |triangle: u32| {
+        let [a, b, c] = mesh.corners(triangle);
         (b - a).cross(c - a).normalize_or_zero()
     };
-    let sum: Vec3 = mesh.triangles().iter().map(normal).sum();
+    let normals = || (0..mesh.triangle_count()).map(normal);
+    let sum: Vec3 = normals().sum();
     let Some(axis) = sum.try_normalize() else { return bounds };
-    let cos = mesh.triangles().iter().map(|triangle| normal(triangle).dot(axis)).fold(1.0, f32::min);
+    let cos = normals().map(|normal| normal.dot(axis)).fold(1.0, f32::min);
     EmitterBounds { axis, cos_normals: cos.max(-1.0), ..bounds }
 }
 

@@ -26,9 +26,8 @@ impl ReadyScene {
     pub(super) fn width(&self, ray: &Ray, candidate: &Candidate, hit: &Hit<Material>) -> f32 {
         let largest_corner = match self.geometry.shape(candidate.shape) {
             Shape::Mesh(mesh) => {
-                let corners = mesh.triangles()[candidate.primitive as usize];
-                let largest = |corner: u32| mesh.positions()[corner as usize].abs().max_element();
-                corners.map(largest).into_iter().fold(0.0, f32::max)
+                let corners = mesh.corners(candidate.primitive);
+                corners.map(|corner| corner.abs().max_element()).into_iter().fold(0.0, f32::max)
             }
             Shape::Sphere(_) | Shape::Box(_) | Shape::Quad(_) => 0.0,
         };

@@ -240,9 +240,19 @@ fn problems_of_meshes_name_the_triangle() {
             "a mesh of 5 positions has 1 normals",
         ),
         (
-            "CORNERS, indices: [(0, 1, 2)], scale: 1e12, translate: (1, 1, 1)",
+            "CORNERS, indices: [(0, 1, 2), (0, 4, 2)], scale: 1e12, translate: (1, 1, 1)",
             "white",
-            "position 4: expected finite coordinates between -1e12 and 1e12, found (2e12, 1, 1)",
+            "triangle 1: expected finite coordinates between -1e12 and 1e12, found (2e12, 1, 1)",
+        ),
+        (
+            "CORNERS, indices: [(0, 1, 2)], scale: 1e-20, translate: (1, 1, 1)",
+            "white",
+            "a placed mesh has no extent",
+        ),
+        (
+            "CORNERS, indices: [(0, 1, 2)], rotate: [(axis: (1, 0, 0), degrees: 9), (axis: (0, 0, 0), degrees: 9)]",
+            "white",
+            "rotation 2: its axis has no direction",
         ),
         (
             "CORNERS, indices: [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]",

@@ -2,5 +2,6 @@
 
 mod checkers;
 mod errors;
+mod placement;
 mod shipped_scenes;
 mod vessels;

@@ -1,6 +1,8 @@
 //! Answers equal those of the exact tests of all primitives, without a tree or a test in single precision.
 
-use glam::DVec3;
+use std::f32::consts::TAU;
+
+use glam::{Affine3A, DVec3, Mat3};
 use proptest::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng as _;
@@ -60,6 +62,20 @@ impl Random {
         Some(shape)
     }
 
+    /// A map that may turn, mirror, stretch and shear.
+    fn placement(&mut self, scale: f32, offset: Vec3) -> Affine3A {
+        let mut map = Mat3::from_rotation_z(TAU * self.unit()) * Mat3::from_rotation_x(TAU * self.unit());
+        match self.below(4) {
+            0 => map = Mat3::IDENTITY,
+            1 => map *= Mat3::from_diagonal(self.cube() * 3.0),
+            2 => map *= 10_f32.powf(3.0 * self.unit() - 2.0),
+            _ => map.x_axis += self.cube() * 0.5,
+        }
+        // About a place in the scene.
+        let [from, to] = [self.place(), self.place()].map(|place| offset + place * scale);
+        Affine3A::from_mat3_translation(map, to - map * from)
+    }
+
     fn ray(&mut self, shapes: &[Shape], scale: f32, offset: Vec3) -> Ray {
         let mut origin = offset + self.place() * scale * [1.0, 1.0, 4.0, 1e3][self.below(4)];
         if !shapes.is_empty() && self.unit() < 0.3 {
@@ -100,7 +116,7 @@ fn brute_force(shapes: &[Shape], ray: &Ray) -> Vec<Candidate> {
             }
             Shape::Mesh(mesh) => {
                 let shear = RayShear::new(ray.origin, ray.direction);
-                for triangle in 0..mesh.triangles().len() as u32 {
+                for triangle in 0..mesh.triangle_count() {
                     if let Some(hit) = shear.intersect(mesh.corners(triangle)) {
                         add(hit.t, triangle, hit.weights);
                     }
@@ -114,7 +130,18 @@ fn brute_force(shapes: &[Shape], ray: &Ray) -> Vec<Candidate> {
 
 /// Checks all queries of some rays; returns the number of intersections.
 fn check(shapes: usize, rays: usize, scale: f32, offset: Vec3, random: &mut Random) -> usize {
-    let shapes: Vec<_> = (0..shapes).filter_map(|_| random.shape(scale, offset)).collect();
+    let mut shapes: Vec<_> = (0..shapes).filter_map(|_| random.shape(scale, offset)).collect();
+    let meshes: Vec<_> = shapes
+        .iter()
+        .filter_map(|shape| if let Shape::Mesh(mesh) = shape { Some(mesh) } else { None })
+        .collect();
+    let mut copies = Vec::new();
+    for mesh in meshes {
+        for _ in 0..random.below(3) {
+            copies.extend(mesh.placed(&random.placement(scale, offset)).ok().map(Shape::from));
+        }
+    }
+    shapes.extend(copies);
     let scene = SceneGeometry::build(shapes.clone()).unwrap();
     let mut found = 0;
     for _ in 0..rays {
@@ -130,7 +157,7 @@ fn check(shapes: usize, rays: usize, scale: f32, offset: Vec3, random: &mut Rand
             plain.push(*candidate);
             Visit::Continue
         };
-        Search::<_, true> { scene: &scene, ray, visit: collect }.run(Plain);
+        scene.search::<true>(Plain, ray, collect);
         assert_eq!(best, plain, "instruction sets differ: {ray:?}");
         best.sort_by(|a, b| a.t.total_cmp(&b.t).then((a.shape, a.primitive).cmp(&(b.shape, b.primitive))));
         assert_eq!(best, expected, "{ray:?} {shapes:?}");

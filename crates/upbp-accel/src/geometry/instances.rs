@@ -1,0 +1,249 @@
+//! Copies of meshes: a hierarchy over them, above one of each mesh in coordinates of its own.
+//!
+//! A ray is carried over to the coordinates of a mesh only to find blocks of triangles that it may meet.
+//! These are carried back, and tested where they are in the scene, so that it meets what it would meet if the
+//! mesh were there itself, to the last bit. Boxes are taken to be wider than they are by what both ways round
+//! off.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::build::{Boxed, Leaves, build};
+use super::error::GeometryError;
+use super::hierarchy::{BlockRef, Child, Hierarchy, Kind, MAX_INDEX, Visitor};
+use super::hit::{Candidate, ShapeId, Visit};
+use super::lane_ray::{LaneRay, ROUNDING, SLAB_ROUNDING};
+use super::placement::Placement;
+use super::primitive::Name;
+use super::primitive_block::{Block, TriangleRay, Triangles};
+use super::shape::Shape;
+use crate::ray::Ray;
+use crate::simd::{Task, WIDTH, Wide, set_lanes};
+
+/// The meshes of a scene that are copies.
+#[derive(Clone, Debug)]
+pub(super) struct Instances {
+    hierarchy: Hierarchy,
+    copies: Vec<Instance>,
+    models: Vec<Model>,
+}
+
+/// A copy of a mesh.
+#[derive(Clone, Debug)]
+struct Instance {
+    shape: u32,
+    model: usize,
+    placement: Placement,
+    bounds: (Vec3, Vec3),
+    /// The largest number that adds to a coordinate of a corner.
+    reach: f32,
+}
+
+/// A mesh in coordinates of its own.
+#[derive(Clone, Debug)]
+struct Model {
+    hierarchy: Hierarchy,
+    blocks: Vec<Triangles>,
+    /// Numbers of the triangles in each block.
+    triangles: Vec<[u32; WIDTH]>,
+}
+
+impl Instances {
+    /// The placed meshes of a list of shapes.
+    pub(super) fn of(shapes: &[Shape]) -> Result<Self, GeometryError> {
+        let mut numbers = BTreeMap::new();
+        let (mut copies, mut models) = (Vec::new(), Vec::new());
+        for (shape, index) in shapes.iter().zip(0..) {
+            let Shape::Mesh(mesh) = shape else { continue };
+            let Some(placement) = mesh.placement() else { continue };
+            let next = models.len();
+            let model = *numbers.entry(mesh.number()).or_insert(next);
+            if model == next {
+                models.push(mesh.model());
+            }
+            let (min, max) = models[model].aabb();
+            let reach = placement.reach(min.abs().max(max.abs()));
+            let (placement, bounds) = (*placement, mesh.aabb());
+            copies.push(Instance { shape: index, model, placement, bounds, reach });
+        }
+        if copies.len() > MAX_INDEX {
+            return Err(GeometryError::TooManyPrimitives { count: copies.len() });
+        }
+        let models = models.into_iter().map(|mesh| Model::build(mesh.into())).collect::<Result<_, _>>()?;
+        let boxed = |instance: &Instance| {
+            let (min, max) = instance.bounds;
+            Boxed { min, max, kind: Kind::Box }
+        };
+        let boxes: Vec<_> = copies.iter().map(boxed).collect();
+        let hierarchy =
+            build(&boxes, Leaves::MESHES, |kind, members| Child::block(kind, members[0] as usize, 1));
+        Ok(Self { hierarchy, copies, models })
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.copies.is_empty()
+    }
+}
+
+impl Model {
+    fn build(mesh: Shape) -> Result<Self, GeometryError> {
+        let shapes = [mesh];
+        let names = Name::all(&shapes);
+        if names.len() > MAX_INDEX {
+            return Err(GeometryError::TooManyPrimitives { count: names.len() });
+        }
+        let boxes: Vec<_> = names.par_iter().with_min_len(1024).map(|name| name.boxed(&shapes)).collect();
+        let [Shape::Mesh(mesh)] = &shapes else { return Err(GeometryError::Degenerate { what: "a mesh" }) };
+        let (mut blocks, mut triangles) = (Vec::new(), Vec::new());
+        let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| {
+            let (mut block, mut numbers) = (Triangles::EMPTY, [0; WIDTH]);
+            for (lane, &triangle) in members.iter().enumerate() {
+                block.set(lane, mesh.corners(triangle));
+                numbers[lane] = triangle;
+            }
+            blocks.push(block);
+            triangles.push(numbers);
+            Child::block(kind, blocks.len() - 1, members.len())
+        });
+        Ok(Self { hierarchy, blocks, triangles })
+    }
+}
+
+/// A walk of a ray through the copies of meshes, with the nearer boxes first or in any order.
+pub(super) struct InstanceSearch<'a, V, const IN_ORDER: bool> {
+    pub(super) instances: &'a Instances,
+    pub(super) ray: Ray,
+    /// The greatest sum of coordinate differences between the ray's origin and any triangle.
+    pub(super) extent: f32,
+    pub(super) visit: V,
+}
+
+impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Task for InstanceSearch<'_, V, IN_ORDER> {
+    #[inline(always)]
+    fn run(self, wide: impl Wide) {
+        let Self { instances, ray, extent, visit } = self;
+        let lanes = LaneRay::new(wide, &ray);
+        let triangle_ray = TriangleRay::new(ray.origin, ray.direction, extent);
+        let mut t_max = ray.t_max;
+        let mut each = EachInstance::<_, IN_ORDER> { instances, ray, extent, triangle_ray, visit };
+        // Nothing is left to do if it breaks off.
+        let _ = instances.hierarchy.traverse::<IN_ORDER, _>(wide, &lanes, &mut t_max, &mut each);
+    }
+}
+
+struct EachInstance<'a, V, const IN_ORDER: bool> {
+    instances: &'a Instances,
+    ray: Ray,
+    extent: f32,
+    triangle_ray: TriangleRay,
+    visit: V,
+}
+
+impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Visitor for EachInstance<'_, V, IN_ORDER> {
+    #[inline(always)]
+    fn visit<W: Wide>(
+        &mut self,
+        wide: W,
+        _: &LaneRay<W>,
+        block: BlockRef,
+        t_max: &mut f32,
+    ) -> ControlFlow<()> {
+        let Self { instances, ray, extent, triangle_ray, visit } = self;
+        let instance = &instances.copies[block.index];
+        // What the exact test, the corners and the ray in the coordinates of the mesh may be wrong by.
+        let margin = ROUNDING * (*extent + instance.reach);
+        let Some(start) = entry(ray, instance.bounds, margin, *t_max) else {
+            return ControlFlow::Continue(());
+        };
+        let at = ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(start);
+        let placement = &instance.placement;
+        let own = Ray {
+            origin: placement.point_in_mesh(at).as_vec3(),
+            direction: placement.direction_in_mesh(ray.direction).as_vec3(),
+            t_min: 0.0,
+            t_max: f32::INFINITY,
+        };
+        let margins = placement.size_in_mesh(f64::from(margin)).as_vec3();
+        let model = &instances.models[instance.model];
+        let mut triangles =
+            InstanceTriangles { ray, triangle_ray, instance, model, start, t_max: *t_max, visit };
+        let mut own_t_max = triangles.own_t_max();
+        let own = LaneRay::new(wide, &own);
+        let hierarchy = &model.hierarchy;
+        hierarchy.traverse_widened::<IN_ORDER, W>(wide, &own, margins, &mut own_t_max, &mut triangles)?;
+        *t_max = triangles.t_max;
+        ControlFlow::Continue(())
+    }
+}
+
+/// Where a ray enters a box that is wider by a margin, or its start; `None` if it does not before `t_max`.
+#[inline(always)]
+fn entry(ray: &Ray, (min, max): (Vec3, Vec3), margin: f32, t_max: f32) -> Option<f32> {
+    let margin = DVec3::splat(f64::from(margin));
+    let (min, max) = (min.as_dvec3() - margin, max.as_dvec3() + margin);
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let (mut near, mut far) = (f64::from(ray.t_min), f64::from(t_max));
+    for axis in 0..3 {
+        let inverse = 1.0 / direction[axis];
+        let (a, b) = ((min[axis] - origin[axis]) * inverse, (max[axis] - origin[axis]) * inverse);
+        // The second operand remains if the other is no number: for rays in a plane of the box.
+        near = a.min(b).max(near);
+        far = a.max(b).min(far);
+    }
+    // A distance that is rounded to single precision must not be beyond the box's.
+    (near <= far).then_some((near as f32).next_down().max(ray.t_min))
+}
+
+/// Triangles of a copy, tested where they are in the scene.
+struct InstanceTriangles<'a, V> {
+    ray: &'a Ray,
+    triangle_ray: &'a TriangleRay,
+    instance: &'a Instance,
+    model: &'a Model,
+    /// Where the ray starts in the mesh.
+    start: f32,
+    t_max: f32,
+    visit: &'a mut V,
+}
+
+impl<V> InstanceTriangles<'_, V> {
+    /// The end of the ray as it is counted in the mesh, or somewhat more.
+    #[inline(always)]
+    fn own_t_max(&self) -> f32 {
+        (self.t_max - self.start) * (1.0 + SLAB_ROUNDING) + ROUNDING * self.t_max
+    }
+}
+
+impl<V: FnMut(&Candidate) -> Visit> Visitor for InstanceTriangles<'_, V> {
+    #[inline(always)]
+    fn visit<W: Wide>(
+        &mut self,
+        wide: W,
+        _: &LaneRay<W>,
+        block: BlockRef,
+        own_t_max: &mut f32,
+    ) -> ControlFlow<()> {
+        let triangles = self.model.blocks[block.index].placed(wide, &self.instance.placement);
+        let lanes = LaneRay::new(wide, self.ray);
+        for lane in set_lanes(triangles.may_meet(wide, &lanes, self.triangle_ray, self.t_max) & block.used) {
+            let Some(hit) = self.triangle_ray.shear.intersect(triangles.corners(lane)) else { continue };
+            let t = hit.t as f32;
+            if t > self.ray.t_min && t < self.t_max {
+                let primitive = self.model.triangles[block.index][lane];
+                let shape = ShapeId(self.instance.shape);
+                match (self.visit)(&Candidate { t, shape, primitive, uv: hit.weights }) {
+                    Visit::Continue => {}
+                    Visit::ShrinkTo(t) => {
+                        self.t_max = self.t_max.min(t);
+                        *own_t_max = self.own_t_max();
+                    }
+                    Visit::Stop => return ControlFlow::Break(()),
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
