@@ -61,6 +61,7 @@ pub(crate) trait Wide: Copy {
         [self.load(&v[0]), self.load(&v[1]), self.load(&v[2])]
     }
 
+    #[cfg(feature = "geometry")]
     #[inline(always)]
     fn add3(self, a: [Self::F; 3], b: [Self::F; 3]) -> [Self::F; 3] {
         [self.add(a[0], b[0]), self.add(a[1], b[1]), self.add(a[2], b[2])]
