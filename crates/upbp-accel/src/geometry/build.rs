@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::hierarchy::{Child, Hierarchy, Kind, Node};
 use crate::simd::WIDTH;
 
-/// What is below the leaves.
+/// Limits of leaves, by what is below them.
 #[derive(Clone, Copy)]
 pub(super) struct Leaves {
     /// Primitives up to which there is no tree: every ray is tested against all.
@@ -53,6 +53,12 @@ pub(super) struct Boxed {
     pub(super) min: Vec3,
     pub(super) max: Vec3,
     pub(super) kind: Kind,
+}
+
+impl Boxed {
+    pub(super) fn triangle([a, b, c]: [Vec3; 3]) -> Self {
+        Self { min: a.min(b).min(c), max: a.max(b).max(c), kind: Kind::Triangle }
+    }
 }
 
 /// Builds over primitives; `pack` makes a block of some of a kind.

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::lane_ray::{LaneRay, Planes, SLAB_ROUNDING, SlabRay, Slabs, Widened};
+use super::lane_ray::{LaneRay, Planes, SLAB_ROUNDING, Slabs};
 use crate::simd::{WIDTH, Wide, set_lanes};
 
 /// Kind of the primitives in a block.
@@ -122,12 +122,13 @@ pub(super) trait Visitor {
 
 impl Hierarchy {
     /// Shows `visitor` the blocks that `ray` may meet before `t_max`, until it breaks off. With `IN_ORDER`
-    /// the nearer child of each node comes first.
+    /// the nearer child of each node comes first. Boxes are tested by `S`, with its `margins`.
     #[inline(always)]
-    pub(super) fn traverse<const IN_ORDER: bool, W: Wide>(
+    pub(super) fn traverse<const IN_ORDER: bool, S: Slabs<W>, W: Wide>(
         &self,
         wide: W,
         ray: &LaneRay<W>,
+        margins: S::Margins,
         t_max: &mut f32,
         visitor: &mut impl Visitor,
     ) -> ControlFlow<()> {
@@ -135,28 +136,7 @@ impl Hierarchy {
             if root.is_block() {
                 visitor.visit(wide, ray, root.as_block(), t_max)?;
             } else {
-                let slabs = SlabRay::new(wide, ray);
-                self.descend::<IN_ORDER, W>(root, wide, (ray, &slabs), t_max, visitor)?;
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// [`traverse`](Self::traverse) with all boxes wider by `margins` on both sides.
-    #[inline(always)]
-    pub(super) fn traverse_widened<const IN_ORDER: bool, W: Wide>(
-        &self,
-        wide: W,
-        ray: &LaneRay<W>,
-        margins: Vec3,
-        t_max: &mut f32,
-        visitor: &mut impl Visitor,
-    ) -> ControlFlow<()> {
-        for &root in &self.roots {
-            if root.is_block() {
-                visitor.visit(wide, ray, root.as_block(), t_max)?;
-            } else {
-                let slabs = Widened::new(wide, ray, margins);
+                let slabs = S::new(wide, ray, margins);
                 self.descend::<IN_ORDER, W>(root, wide, (ray, &slabs), t_max, visitor)?;
             }
         }

@@ -1,5 +1,7 @@
 //! Intersections of rays with surfaces.
 
+use std::ops::ControlFlow;
+
 use glam::Vec3;
 
 /// Index of a shape in the list that a [`SceneGeometry`](super::SceneGeometry) was built from.
@@ -31,6 +33,19 @@ pub enum Visit {
     ShrinkTo(f32),
     /// End the traversal.
     Stop,
+}
+
+impl Visit {
+    /// Shortens a ray, or breaks off.
+    #[inline(always)]
+    pub(super) fn apply(self, t_max: &mut f32) -> ControlFlow<()> {
+        match self {
+            Self::Continue => {}
+            Self::ShrinkTo(t) => *t_max = t_max.min(t),
+            Self::Stop => return ControlFlow::Break(()),
+        }
+        ControlFlow::Continue(())
+    }
 }
 
 /// Position and normals of the surface at an intersection.

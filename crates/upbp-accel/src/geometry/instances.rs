@@ -15,13 +15,14 @@ use super::build::{Boxed, Leaves, build};
 use super::error::GeometryError;
 use super::hierarchy::{BlockRef, Child, Hierarchy, Kind, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, Visit};
-use super::lane_ray::{LaneRay, ROUNDING, SLAB_ROUNDING};
+use super::lane_ray::{LaneRay, ROUNDING, SLAB_ROUNDING, SlabRay, Widened};
+use super::mesh::TriangleMesh;
 use super::placement::Placement;
-use super::primitive::Name;
-use super::primitive_block::{Block, TriangleRay, Triangles};
+use super::primitive::{Blocks, Name};
+use super::primitive_block::{Block as _, TriangleRay, Triangles};
 use super::shape::Shape;
 use crate::ray::Ray;
-use crate::simd::{Task, WIDTH, Wide, set_lanes};
+use crate::simd::{Task, Wide, set_lanes};
 
 /// The meshes of a scene that are copies.
 #[derive(Clone, Debug)]
@@ -46,9 +47,7 @@ struct Instance {
 #[derive(Clone, Debug)]
 struct Model {
     hierarchy: Hierarchy,
-    blocks: Vec<Triangles>,
-    /// Numbers of the triangles in each block.
-    triangles: Vec<[u32; WIDTH]>,
+    triangles: Blocks<Triangles>,
 }
 
 impl Instances {
@@ -72,9 +71,10 @@ impl Instances {
         if copies.len() > MAX_INDEX {
             return Err(GeometryError::TooManyPrimitives { count: copies.len() });
         }
-        let models = models.into_iter().map(|mesh| Model::build(mesh.into())).collect::<Result<_, _>>()?;
+        let models = models.iter().map(Model::build).collect::<Result<_, _>>()?;
         let boxed = |instance: &Instance| {
             let (min, max) = instance.bounds;
+            // All that the hierarchy knows of a copy.
             Boxed { min, max, kind: Kind::Box }
         };
         let boxes: Vec<_> = copies.iter().map(boxed).collect();
@@ -89,26 +89,20 @@ impl Instances {
 }
 
 impl Model {
-    fn build(mesh: Shape) -> Result<Self, GeometryError> {
-        let shapes = [mesh];
-        let names = Name::all(&shapes);
-        if names.len() > MAX_INDEX {
-            return Err(GeometryError::TooManyPrimitives { count: names.len() });
+    fn build(mesh: &TriangleMesh) -> Result<Self, GeometryError> {
+        let count = mesh.triangle_count();
+        if count as usize > MAX_INDEX {
+            return Err(GeometryError::TooManyPrimitives { count: count as usize });
         }
-        let boxes: Vec<_> = names.par_iter().with_min_len(1024).map(|name| name.boxed(&shapes)).collect();
-        let [Shape::Mesh(mesh)] = &shapes else { return Err(GeometryError::Degenerate { what: "a mesh" }) };
-        let (mut blocks, mut triangles) = (Vec::new(), Vec::new());
+        let boxed = |triangle| Boxed::triangle(mesh.corners(triangle));
+        let boxes: Vec<_> = (0..count).into_par_iter().with_min_len(1024).map(boxed).collect();
+        let mut triangles = Blocks::EMPTY;
         let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| {
-            let (mut block, mut numbers) = (Triangles::EMPTY, [0; WIDTH]);
-            for (lane, &triangle) in members.iter().enumerate() {
-                block.set(lane, mesh.corners(triangle));
-                numbers[lane] = triangle;
-            }
-            blocks.push(block);
-            triangles.push(numbers);
-            Child::block(kind, blocks.len() - 1, members.len())
+            // Each copy is a shape of its own.
+            let named = |&triangle: &u32| (Name { shape: u32::MAX, triangle }, mesh.corners(triangle));
+            Child::block(kind, triangles.push(members.iter().map(named)), members.len())
         });
-        Ok(Self { hierarchy, blocks, triangles })
+        Ok(Self { hierarchy, triangles })
     }
 }
 
@@ -130,7 +124,8 @@ impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Task for InstanceSearc
         let mut t_max = ray.t_max;
         let mut each = EachInstance::<_, IN_ORDER> { instances, ray, extent, triangle_ray, visit };
         // Nothing is left to do if it breaks off.
-        let _ = instances.hierarchy.traverse::<IN_ORDER, _>(wide, &lanes, &mut t_max, &mut each);
+        let _ =
+            instances.hierarchy.traverse::<IN_ORDER, SlabRay<_>, _>(wide, &lanes, (), &mut t_max, &mut each);
     }
 }
 
@@ -173,7 +168,7 @@ impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Visitor for EachInstan
         let mut own_t_max = triangles.own_t_max();
         let own = LaneRay::new(wide, &own);
         let hierarchy = &model.hierarchy;
-        hierarchy.traverse_widened::<IN_ORDER, W>(wide, &own, margins, &mut own_t_max, &mut triangles)?;
+        hierarchy.traverse::<IN_ORDER, Widened<W>, W>(wide, &own, margins, &mut own_t_max, &mut triangles)?;
         *t_max = triangles.t_max;
         ControlFlow::Continue(())
     }
@@ -226,22 +221,17 @@ impl<V: FnMut(&Candidate) -> Visit> Visitor for InstanceTriangles<'_, V> {
         block: BlockRef,
         own_t_max: &mut f32,
     ) -> ControlFlow<()> {
-        let triangles = self.model.blocks[block.index].placed(wide, &self.instance.placement);
+        let triangles = self.model.triangles.blocks[block.index].placed(wide, &self.instance.placement);
         let lanes = LaneRay::new(wide, self.ray);
         for lane in set_lanes(triangles.may_meet(wide, &lanes, self.triangle_ray, self.t_max) & block.used) {
             let Some(hit) = self.triangle_ray.shear.intersect(triangles.corners(lane)) else { continue };
             let t = hit.t as f32;
             if t > self.ray.t_min && t < self.t_max {
-                let primitive = self.model.triangles[block.index][lane];
+                let primitive = self.model.triangles.names[block.index][lane].triangle;
                 let shape = ShapeId(self.instance.shape);
-                match (self.visit)(&Candidate { t, shape, primitive, uv: hit.weights }) {
-                    Visit::Continue => {}
-                    Visit::ShrinkTo(t) => {
-                        self.t_max = self.t_max.min(t);
-                        *own_t_max = self.own_t_max();
-                    }
-                    Visit::Stop => return ControlFlow::Break(()),
-                }
+                let candidate = Candidate { t, shape, primitive, uv: hit.weights };
+                (self.visit)(&candidate).apply(&mut self.t_max)?;
+                *own_t_max = self.own_t_max();
             }
         }
         ControlFlow::Continue(())

@@ -41,17 +41,13 @@ impl<W: Wide> LaneRay<W> {
     }
 }
 
-impl<W: Wide> SlabRay<W> {
-    #[inline(always)]
-    pub(super) fn new(wide: W, ray: &LaneRay<W>) -> Self {
-        let (zero, one) = (wide.splat(0.0), wide.splat(1.0));
-        let inverse = ray.direction.map(|x| wide.div(one, x));
-        Self { origin: ray.origin, inverse, negative: inverse.map(|x| usize::from(wide.less(x, zero) != 0)) }
-    }
-}
-
 /// A test of a ray against eight boxes.
 pub(super) trait Slabs<W: Wide> {
+    /// Widths by which boxes are wider on both sides than they are said to be.
+    type Margins: Copy;
+
+    fn new(wide: W, ray: &LaneRay<W>, margins: Self::Margins) -> Self;
+
     /// The distances at which the ray enters and leaves each box, or its ends where they are nearer, each
     /// with an error of [`SLAB_ROUNDING`].
     ///
@@ -84,6 +80,15 @@ impl<W: Wide> SlabRay<W> {
 }
 
 impl<W: Wide> Slabs<W> for SlabRay<W> {
+    type Margins = ();
+
+    #[inline(always)]
+    fn new(wide: W, ray: &LaneRay<W>, (): ()) -> Self {
+        let (zero, one) = (wide.splat(0.0), wide.splat(1.0));
+        let inverse = ray.direction.map(|x| wide.div(one, x));
+        Self { origin: ray.origin, inverse, negative: inverse.map(|x| usize::from(wide.less(x, zero) != 0)) }
+    }
+
     #[inline(always)]
     fn slabs(&self, wide: W, planes: &Planes, t_min: W::F, t_max: W::F) -> [W::F; 2] {
         self.between([&self.origin; 2], wide, planes, [t_min, t_max])
@@ -97,16 +102,16 @@ pub(super) struct Widened<W: Wide> {
     origins: [[W::F; 3]; 2],
 }
 
-impl<W: Wide> Widened<W> {
+impl<W: Wide> Slabs<W> for Widened<W> {
+    type Margins = Vec3;
+
     #[inline(always)]
-    pub(super) fn new(wide: W, ray: &LaneRay<W>, margins: Vec3) -> Self {
+    fn new(wide: W, ray: &LaneRay<W>, margins: Vec3) -> Self {
         let margins = wide.splat3(margins.to_array());
         let origins = [wide.add3(ray.origin, margins), wide.sub3(ray.origin, margins)];
-        Self { ray: SlabRay::new(wide, ray), origins }
+        Self { ray: SlabRay::new(wide, ray, ()), origins }
     }
-}
 
-impl<W: Wide> Slabs<W> for Widened<W> {
     #[inline(always)]
     fn slabs(&self, wide: W, planes: &Planes, t_min: W::F, t_max: W::F) -> [W::F; 2] {
         let [above, below] = &self.origins;

@@ -24,7 +24,7 @@ pub struct TriangleMesh {
 }
 
 /// Triangles in coordinates of their own.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Surface {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
@@ -131,15 +131,15 @@ impl TriangleMesh {
         Self { surface: Arc::new(surface), placement: None, ..self }
     }
 
-    pub(super) fn translated(self, by: Vec3) -> Self {
-        if let Some(placement) = self.placement {
-            return Self::with_surface(self.surface, Some(placement.translated(by)));
+    pub(super) fn translated(mut self, by: Vec3) -> Self {
+        match &mut self.placement {
+            Some(placement) => *placement = placement.translated(by),
+            None => {
+                Arc::make_mut(&mut self.surface).positions.iter_mut().for_each(|position| *position += by);
+            }
         }
-        let Surface { positions, triangles, normals, closed, dropped } = &*self.surface;
-        let positions = positions.iter().map(|position| *position + by).collect();
-        let (triangles, normals) = (triangles.clone(), normals.clone());
-        let surface = Surface { positions, triangles, normals, closed: *closed, dropped: *dropped };
-        Self::with_surface(Arc::new(surface), None)
+        let (min, max) = self.bounds;
+        Self { bounds: (min + by, max + by), ..self }
     }
 
     /// The number of triangles that are in use.
@@ -148,7 +148,7 @@ impl TriangleMesh {
         self.surface.triangles.len() as u32
     }
 
-    /// Where the mesh is placed, if it is a copy.
+    /// The map to the scene, of a copy.
     pub(super) fn placement(&self) -> Option<&Placement> {
         self.placement.as_ref()
     }

@@ -10,7 +10,11 @@ use crate::simd::Wide;
 pub(super) struct Placement {
     to_scene: Mat3,
     translation: Vec3,
+    /// Added last, so that copies are moved as exactly as other shapes.
+    moved: Vec3,
     to_mesh: DMat3,
+    /// Map of normals, without the scale.
+    normals: Mat3,
     /// Whether left and right are exchanged.
     pub(super) mirrors: bool,
 }
@@ -27,21 +31,28 @@ impl Placement {
         if !(is_map && to_mesh.as_mat3().is_finite()) {
             return Err(GeometryError::Degenerate { what: "a mesh that is placed flat" });
         }
-        let mirrors = to_mesh.determinant() < 0.0;
-        Ok(Self { to_scene: linear, translation: to_scene.translation.into(), to_mesh, mirrors })
+        let columns = to_mesh.to_cols_array();
+        let largest = columns.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+        Ok(Self {
+            to_scene: linear,
+            translation: to_scene.translation.into(),
+            moved: Vec3::ZERO,
+            to_mesh,
+            normals: (to_mesh.transpose() * largest.recip()).as_mat3(),
+            mirrors: to_mesh.determinant() < 0.0,
+        })
     }
 
-    /// What is placed by another one first.
+    /// The placement that applies another one first.
     pub(super) fn after(&self, first: &Self) -> Result<Self, GeometryError> {
-        Self::new(&(self.as_affine() * first.as_affine()))
-    }
-
-    fn as_affine(&self) -> Affine3A {
-        Affine3A::from_mat3_translation(self.to_scene, self.translation)
+        let affine = |placement: &Self| {
+            Affine3A::from_mat3_translation(placement.to_scene, placement.translation + placement.moved)
+        };
+        Self::new(&(affine(self) * affine(first)))
     }
 
     pub(super) fn translated(self, by: Vec3) -> Self {
-        Self { translation: self.translation + by, ..self }
+        Self { moved: self.moved + by, ..self }
     }
 
     /// A point in the scene. [`points`](Self::points) gives the same bits.
@@ -49,7 +60,8 @@ impl Placement {
     pub(super) fn point(&self, p: Vec3) -> Vec3 {
         let [a, b, c] = self.to_scene.to_cols_array_2d();
         let [x, y, z] = p.to_array();
-        Vec3::from_array(std::array::from_fn(|i| a[i] * x + b[i] * y + c[i] * z + self.translation[i]))
+        let placed = |i: usize| a[i] * x + b[i] * y + c[i] * z + self.translation[i];
+        Vec3::from_array(std::array::from_fn(placed)) + self.moved
     }
 
     /// Eight points in the scene.
@@ -60,17 +72,18 @@ impl Placement {
         for axis in 1..3 {
             sums = wide.add3(sums, wide.scale3(wide.splat3(columns[axis]), p[axis]));
         }
-        wide.add3(sums, wide.splat3(self.translation.to_array()))
+        let placed = wide.add3(sums, wide.splat3(self.translation.to_array()));
+        wide.add3(placed, wide.splat3(self.moved.to_array()))
     }
 
-    /// A normal in the scene, of any length.
+    /// A normal in the scene, not of unit length.
     pub(super) fn normal(&self, normal: Vec3) -> Vec3 {
-        (self.to_mesh.transpose() * normal.as_dvec3()).as_vec3()
+        self.normals * normal
     }
 
     /// A point of the scene in the coordinates of the mesh.
     pub(super) fn point_in_mesh(&self, point: DVec3) -> DVec3 {
-        self.to_mesh * (point - self.translation.as_dvec3())
+        self.to_mesh * (point - self.moved.as_dvec3() - self.translation.as_dvec3())
     }
 
     /// A direction of the scene in the coordinates of the mesh, with the length that it has there.
@@ -88,6 +101,6 @@ impl Placement {
     pub(super) fn reach(&self, largest: Vec3) -> f32 {
         let Mat3 { x_axis, y_axis, z_axis } = self.to_scene;
         let sum = x_axis.abs() * largest.x + y_axis.abs() * largest.y + z_axis.abs() * largest.z;
-        (sum + self.translation.abs()).max_element()
+        (sum + self.translation.abs() + self.moved.abs()).max_element()
     }
 }

@@ -43,10 +43,7 @@ impl Name {
             Shape::Sphere(sphere) => (Kind::Sphere, sphere.aabb()),
             Shape::Quad(quad) => (Kind::Quad, quad.aabb()),
             Shape::Box(axis_box) => (Kind::Box, axis_box.aabb()),
-            Shape::Mesh(mesh) => {
-                let [a, b, c] = mesh.corners(self.triangle);
-                (Kind::Triangle, (a.min(b).min(c), a.max(b).max(c)))
-            }
+            Shape::Mesh(mesh) => return Boxed::triangle(mesh.corners(self.triangle)),
         };
         Boxed { min, max, kind }
     }
@@ -54,16 +51,16 @@ impl Name {
 
 /// Blocks of a kind with the names of their primitives.
 #[derive(Clone, Debug)]
-struct Blocks<B> {
-    blocks: Vec<B>,
-    names: Vec<[Name; WIDTH]>,
+pub(super) struct Blocks<B> {
+    pub(super) blocks: Vec<B>,
+    pub(super) names: Vec<[Name; WIDTH]>,
 }
 
 impl<B: Block> Blocks<B> {
-    const EMPTY: Self = Self { blocks: Vec::new(), names: Vec::new() };
+    pub(super) const EMPTY: Self = Self { blocks: Vec::new(), names: Vec::new() };
 
     /// Adds a block of up to eight primitives, returns its place.
-    fn push(&mut self, primitives: impl Iterator<Item = (Name, B::Primitive)>) -> usize {
+    pub(super) fn push(&mut self, primitives: impl Iterator<Item = (Name, B::Primitive)>) -> usize {
         let (mut block, mut names) = (B::EMPTY, [Name::default(); WIDTH]);
         for (lane, (name, primitive)) in primitives.enumerate() {
             block.set(lane, primitive);

@@ -303,7 +303,7 @@ impl Block for AxisBoxes {
     #[inline(always)]
     fn may_meet<W: Wide>(&self, wide: W, ray: &LaneRay<W>, (): &(), t_max: f32) -> u32 {
         let (start, end) = (wide.splat(f32::NEG_INFINITY), wide.splat(f32::INFINITY));
-        let [entry, exit] = SlabRay::new(wide, ray).slabs(wide, &self.0, start, end);
+        let [entry, exit] = SlabRay::new(wide, ray, ()).slabs(wide, &self.0, start, end);
         let (less, more) = (wide.splat(1.0 - SLAB_ROUNDING), wide.splat(1.0 + SLAB_ROUNDING));
         let (tiny, t_max) = (wide.splat(f32::MIN_POSITIVE), wide.splat(t_max));
         // Least and greatest distances, for such as are not negative.

@@ -11,7 +11,7 @@ use super::error::GeometryError;
 use super::hierarchy::{BlockRef, Hierarchy, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, SurfacePoint, Visit};
 use super::instances::{InstanceSearch, Instances};
-use super::lane_ray::LaneRay;
+use super::lane_ray::{LaneRay, SlabRay};
 use super::primitive::{Name, Primitives, Probe};
 use super::shape::Shape;
 use super::sphere::Sphere;
@@ -127,11 +127,7 @@ impl SceneGeometry {
         let (mut rest, mut is_done) = (ray, false);
         let visit_first = |candidate: &Candidate| {
             let answer = visit(candidate);
-            match answer {
-                Visit::Continue => {}
-                Visit::ShrinkTo(t) => rest.t_max = rest.t_max.min(t),
-                Visit::Stop => is_done = true,
-            }
+            is_done = answer.apply(&mut rest.t_max).is_break();
             answer
         };
         instructions.run(Search::<_, IN_ORDER> { scene: self, ray, visit: visit_first });
@@ -227,9 +223,10 @@ impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Task for Search<'_, V,
         let probe = Probe::new(&scene.shapes, &scene.primitives, &ray, scene.extent_from(ray.origin));
         let lanes = LaneRay::new(wide, &ray);
         let mut t_max = ray.t_max;
+        let mut blocks = Blocks { probe, visit };
         // Nothing is left to do if it breaks off.
         let _ =
-            scene.hierarchy.traverse::<IN_ORDER, _>(wide, &lanes, &mut t_max, &mut Blocks { probe, visit });
+            scene.hierarchy.traverse::<IN_ORDER, SlabRay<_>, _>(wide, &lanes, (), &mut t_max, &mut blocks);
     }
 }
 
@@ -248,14 +245,7 @@ impl<V: FnMut(&Candidate) -> Visit> Visitor for Blocks<'_, V> {
         t_max: &mut f32,
     ) -> ControlFlow<()> {
         let Self { probe, visit } = self;
-        probe.intersect(wide, ray, block, t_max, |candidate, t_max| {
-            match visit(candidate) {
-                Visit::Continue => {}
-                Visit::ShrinkTo(t) => *t_max = t_max.min(t),
-                Visit::Stop => return ControlFlow::Break(()),
-            }
-            ControlFlow::Continue(())
-        })
+        probe.intersect(wide, ray, block, t_max, |candidate, t_max| visit(candidate).apply(t_max))
     }
 }
 

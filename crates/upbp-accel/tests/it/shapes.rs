@@ -221,6 +221,13 @@ fn copies_are_meshes_where_they_are_placed() {
     let normals = |positions: &[Vec3]| positions.iter().map(|p| (*p - 0.5).normalize()).collect::<Vec<_>>();
     let (positions, triangles) = cube(Vec3::ZERO, Vec3::ONE);
     let model = TriangleMesh::new(positions.clone(), triangles.clone(), Some(normals(&positions))).unwrap();
+    // Normals keep their digits, whatever the scale.
+    let tiny = model.placed(&Affine3A::from_scale(Vec3::splat(1e-25))).unwrap();
+    let scene = SceneGeometry::build(vec![tiny.into()]).unwrap();
+    let ray = Ray::new(Vec3::new(2e-26, 3e-26, 1e-24), -Vec3::Z);
+    let point = scene.surface(&ray, &scene.closest(ray).unwrap());
+    assert!(point.shading_normal.distance(point.geometric_normal) > 0.1, "{point:?}");
+
     for to_scene in [turned, tilted] {
         let copy = model.placed(&to_scene).unwrap();
         let in_scene: Vec<_> = positions.iter().map(|p| to_scene.transform_point3(*p)).collect();

@@ -74,24 +74,30 @@ fn shapes_that_share_a_mesh_file_are_what_they_are_with_files_of_their_own() {
     fs::create_dir_all(&folder).unwrap();
     let ball = dented_ball(48);
     let places = [
-        "",
-        ", rotate: [(axis: (0, 1, 0), degrees: 40)], translate: (2.1, 0, 0)",
-        ", scale: 0.5, rotate: [(axis: (0, 1, 0), degrees: 40), (axis: (1, 0, 2), degrees: -70)]",
-        ", scale: 1.5, translate: (-1.3, 2.2, 0.4)",
+        ("", Vec3::ZERO),
+        (", rotate: [(axis: (0, 1, 0), degrees: 40)]", Vec3::new(2.1, 0.0, 0.0)),
+        (", scale: 0.5, rotate: [(axis: (0, 1, 0), degrees: 40), (axis: (1, 0, 2), degrees: -70)]", Vec3::Y),
+        (", scale: 1.5", Vec3::new(-1.3, 2.2, 0.4)),
     ];
-    let shapes = |shared: bool, material: &str| {
-        let shape = |(number, place): (usize, &&str)| {
+    let shapes = |shared: bool, material: &str, offset: Vec3| {
+        let shape = |(number, (place, at)): (usize, &(&str, Vec3))| {
             let file = format!("{}.obj", if shared { 0 } else { number });
             fs::write(folder.join(&file), &ball).unwrap();
+            let Vec3 { x, y, z } = *at + offset;
+            let place = format!("{place}, translate: ({x}, {y}, {z})");
             format!("(geometry: Mesh(file: \"{file}\"{place}), material: \"{material}\"),")
         };
         places.iter().enumerate().map(shape).collect::<String>()
     };
-    for material in ["white", "glass"] {
-        let [shared, own] = [true, false].map(|shared| scene(&folder, &shapes(shared, material)));
+    // The second scene is moved near the origin.
+    let far = Vec3::new(3e5, -2e5, 1e5);
+    for (material, offset) in [("white", Vec3::ZERO), ("glass", far), ("glass", Vec3::ZERO)] {
+        let [shared, own] = [true, false].map(|shared| scene(&folder, &shapes(shared, material, offset)));
+        assert_eq!(shared.origin() == Vec3::ZERO, offset == Vec3::ZERO);
         assert_eq!((shared.files().len(), own.files().len()), (1, places.len()));
         let mut hits = 0;
-        for ray in rays() {
+        for mut ray in rays() {
+            ray.origin += offset - shared.origin();
             assert_eq!(answers(&shared, &ray), answers(&own, &ray), "{ray:?}");
             hits += usize::from(shared.intersect(&ray).is_some());
         }
