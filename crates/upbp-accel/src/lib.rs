@@ -11,7 +11,7 @@ pub use glam;
 
 #[cfg(feature = "geometry")]
 pub use geometry::{
-    AxisBox, Candidate, GeometryError, Quad, SceneGeometry, Shape, ShapeId, ShapeVolume, Sphere,
+    AxisBox, BoxTree, Candidate, GeometryError, Quad, SceneGeometry, Shape, ShapeId, ShapeVolume, Sphere,
     SurfacePoint, TriangleMesh, Visit,
 };
 pub use lookup::{

@@ -153,11 +153,23 @@ impl fmt::Display for Report {
                 c.cut_walks
             )?;
         }
-        if [c.dropped, c.lost_walks, c.boundary_conflicts].iter().any(|count| *count > 0) {
+        if c.dropped > 0 {
+            writeln!(f, "{} contributions were not finite and are left out", c.dropped)?;
+        }
+        if c.lost_walks > 0 {
+            let count = c.lost_walks;
             writeln!(
                 f,
-                "dropped: {} contributions that were not finite; geometry that is not closed: {} walks lost, {} boundaries ignored",
-                c.dropped, c.lost_walks, c.boundary_conflicts
+                "{count} walks were lost: they left the scene inside of a body (is a mesh not closed?)"
+            )?;
+        }
+        if c.boundary_conflicts > 0 {
+            let edges = c.camera_edges as f64 + c.light_edges as f64;
+            writeln!(
+                f,
+                "{} boundaries on {edges:.1e} edges contradict the bodies around them and were ignored: a few, where \
+                 surfaces cut each other, are rounding; many are a mesh that is not closed",
+                c.boundary_conflicts
             )?;
         }
         if let Some(last) = self.series.points().last() {

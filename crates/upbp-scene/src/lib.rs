@@ -8,6 +8,7 @@ pub mod light;
 pub mod material;
 pub mod obj;
 pub mod phase_table;
+#[cfg(not(test))] // The unit tests render nothing, and are built in a minute less.
 mod render;
 mod sampling;
 mod scene;

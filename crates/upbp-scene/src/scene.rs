@@ -7,7 +7,7 @@
 use std::path::PathBuf;
 
 use glam::Vec3;
-use upbp_accel::{Candidate, Ray, SceneGeometry, ShapeId, Visit};
+use upbp_accel::{BoxTree, Candidate, Ray, SceneGeometry, ShapeId, Visit};
 use upbp_estimators::scene::{BoundingSphere, Bsdf, Crossing, EmitterId, Hit, Scene};
 use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
 
@@ -26,11 +26,10 @@ pub(crate) struct Surface {
     pub(crate) emitter: Option<EmitterId>,
 }
 
-/// A body, with its box for the search for bodies around a point.
+/// A body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
     pub(crate) shape: ShapeId,
-    pub(crate) aabb: (Vec3, Vec3),
     pub(crate) interior: Interior,
 }
 
@@ -42,6 +41,8 @@ pub struct ReadyScene {
     /// By [`ShapeId`].
     pub(crate) surfaces: Vec<Surface>,
     pub(crate) bodies: Vec<Body>,
+    /// By the number of the body.
+    pub(crate) body_boxes: BoxTree,
     pub(crate) lights: Vec<Light>,
     pub(crate) media: Vec<Homogeneous>,
     pub(crate) camera: PerspectiveCamera,
@@ -227,14 +228,13 @@ impl Scene for ReadyScene {
 
     fn stack_at(&self, point: Vec3) -> MediumStack {
         let mut stack = MediumStack::new(self.outside);
-        for body in &self.bodies {
-            let (min, max) = body.aabb;
-            let near = min.cmple(point).all() && point.cmple(max).all();
-            if near && self.geometry.shape(body.shape).contains(point) == Some(true) {
+        self.body_boxes.for_each_around(point, |index| {
+            let body = &self.bodies[index];
+            if self.geometry.contains(body.shape, point) == Some(true) {
                 // More bodies than a stack holds: the walks count the contradictions that follow.
                 let _ = stack.enter(body.interior);
             }
-        }
+        });
         stack
     }
 }

@@ -86,7 +86,7 @@ fn no_light_of_beams_is_lost_in_fog_without_an_end() {
             ("nee+pb2d+bp2d", BeamExtent::Long),
             ("all", BeamExtent::Long),
         ] {
-            let found = render_channels(&fog, &beams(techniques, extent, 2), 120);
+            let found = render_channels(&fog, &beams(techniques, extent, 2), 60);
             for c in 0..3 {
                 let Estimate { mean, error } = found[c];
                 // A kernel blurs by a tenth of a per cent.

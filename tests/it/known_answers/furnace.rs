@@ -110,7 +110,7 @@ fn chromatic_white_furnace() {
             let scene = scene(&chromatic(ratio, body));
             for techniques in ["pt", "bpt"] {
                 let settings = settings(techniques, None);
-                for (channel, found) in render_channels(&scene, &settings, 320).iter().enumerate() {
+                for (channel, found) in render_channels(&scene, &settings, 160).iter().enumerate() {
                     let sigmas = (found.mean - 1.0) / found.error;
                     let case = format!("{body}, ratio {ratio}, {techniques}, channel {channel}");
                     println!("{case}: {:.5} ± {:.5}, {sigmas:+.2}", found.mean, found.error);

@@ -150,7 +150,7 @@ fn counts_and_times_of_any_size_are_merged_reported_and_resumed() {
     let mut state = read("[(0,2),(7,8)]");
     state.merge(read("[(3,6)]")).expect("no iterations in common");
     let text = state.report().to_string();
-    assert!(text.contains(&format!("{} walks lost", u64::MAX)), "{text}");
+    assert!(text.contains(&format!("{} walks were lost", u64::MAX)), "{text}");
     let room = upbp_testing::room(5);
     let mut renderer = renderer(&room);
     renderer.resume(state).expect("the same render");

@@ -28,8 +28,8 @@ pub(super) struct Leaves {
 
 impl Leaves {
     pub(super) const PRIMITIVES: Self = Self { small: 48, block: WIDTH };
-    /// Hierarchies of their own.
-    pub(super) const MESHES: Self = Self { small: 0, block: 1 };
+    /// What is no primitive: all that a hierarchy knows of it is its box.
+    pub(super) const BOXES: Self = Self { small: 0, block: 1 };
 }
 
 /// Cost of a ray's test against a block of primitives, as a multiple of that against a node.

@@ -74,12 +74,11 @@ impl Instances {
         let models = models.iter().map(Model::build).collect::<Result<_, _>>()?;
         let boxed = |instance: &Instance| {
             let (min, max) = instance.bounds;
-            // All that the hierarchy knows of a copy.
             Boxed { min, max, kind: Kind::Box }
         };
         let boxes: Vec<_> = copies.iter().map(boxed).collect();
         let hierarchy =
-            build(&boxes, Leaves::MESHES, |kind, members| Child::block(kind, members[0] as usize, 1));
+            build(&boxes, Leaves::BOXES, |kind, members| Child::block(kind, members[0] as usize, 1));
         Ok(Self { hierarchy, copies, models })
     }
 

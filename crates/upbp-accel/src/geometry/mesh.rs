@@ -7,6 +7,7 @@ use glam::{Affine3A, DVec3, Vec3};
 use super::error::GeometryError;
 use super::placement::Placement;
 use super::triangle::RayShear;
+use crate::ray::Ray;
 
 /// Triangles over shared vertices.
 ///
@@ -245,22 +246,34 @@ impl TriangleMesh {
 
     /// Whether `point` lies inside; `None` for a mesh that is not closed.
     ///
-    /// Counts the crossings of a ray. The intersection test decides edges and corners consistently, so
-    /// that any direction gives the right parity.
+    /// Tests all triangles; [`SceneGeometry::contains`](super::SceneGeometry::contains) has a hierarchy.
     #[must_use]
     pub fn contains(&self, point: Vec3) -> Option<bool> {
+        self.contains_by(point, |ray| {
+            let shear = RayShear::new(ray.origin, ray.direction);
+            let met =
+                (0..self.triangle_count()).filter_map(|triangle| shear.intersect(self.corners(triangle)));
+            met.filter(|hit| hit.t > 0.0).count()
+        })
+    }
+
+    /// [`contains`](Self::contains) by the number of times that a ray crosses the mesh, which is asked for
+    /// only where it matters.
+    ///
+    /// The intersection test decides edges and corners consistently, so that any direction gives the right
+    /// parity.
+    pub(super) fn contains_by(&self, point: Vec3, crossings: impl FnOnce(Ray) -> usize) -> Option<bool> {
         if !self.surface.closed {
             return None;
         }
-        if !(self.bounds.0.cmple(point).all() && point.cmple(self.bounds.1).all()) {
+        let (min, max) = self.bounds;
+        if !(min.cmple(point).all() && point.cmple(max).all()) {
             return Some(false);
         }
-        let shear = RayShear::new(point, Vec3::new(0.267_261_24, 0.534_522_5, 0.801_783_7));
-        let crossings = (0..self.triangle_count())
-            .filter_map(|triangle| shear.intersect(self.corners(triangle)))
-            .filter(|hit| hit.t > 0.0)
-            .count();
-        Some(crossings % 2 == 1)
+        let ray = Ray::new(point, Vec3::new(0.267_261_24, 0.534_522_5, 0.801_783_7));
+        // No triangle is farther away than half of this.
+        let ray = ray.with_range(0.0, 2.0 * (max - min).element_sum());
+        Some(crossings(ray) % 2 == 1)
     }
 
     /// The least and the greatest coordinates.

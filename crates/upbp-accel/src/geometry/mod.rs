@@ -3,6 +3,7 @@
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instruction set at hand")]
 
 mod axis_box;
+mod box_tree;
 mod build;
 mod error;
 mod hierarchy;
@@ -21,6 +22,7 @@ mod triangle;
 mod volume_sampling;
 
 pub use axis_box::AxisBox;
+pub use box_tree::BoxTree;
 pub use error::GeometryError;
 pub use hit::{Candidate, ShapeId, SurfacePoint, Visit};
 pub use mesh::TriangleMesh;

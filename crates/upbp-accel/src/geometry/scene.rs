@@ -68,6 +68,25 @@ impl SceneGeometry {
         &self.shapes
     }
 
+    /// Whether `point` lies strictly inside of a shape; `None` if the shape is not closed.
+    ///
+    /// Costs a ray for a mesh, where [`Shape::contains`] tests all of its triangles.
+    ///
+    /// # Panics
+    /// If `id` does not belong to this scene.
+    #[must_use]
+    pub fn contains(&self, id: ShapeId, point: Vec3) -> Option<bool> {
+        let Shape::Mesh(mesh) = self.shape(id) else { return self.shape(id).contains(point) };
+        mesh.contains_by(point, |ray| {
+            let mut crossings = 0;
+            self.search::<false>(Best, ray, |candidate| {
+                crossings += usize::from(candidate.shape == id);
+                Visit::Continue
+            });
+            crossings
+        })
+    }
+
     /// Calls `visit` for every intersection with `t` in the open interval `(t_min, t_max)`, in no particular
     /// but always the same order. `t_min` must not be negative.
     ///

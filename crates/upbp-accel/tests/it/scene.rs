@@ -1,6 +1,6 @@
 //! Rays against scenes equal rays against every primitive.
 
-use crate::support::{Random, any_direction};
+use crate::support::{Random, any_direction, visit_hits};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use upbp_accel::{AxisBox, Candidate, Quad, Ray, SceneGeometry, Shape, ShapeId, Sphere, TriangleMesh, Visit};
@@ -63,7 +63,7 @@ fn random_shapes(count: usize, scale: f32, offset: Vec3, random: &mut Random) ->
 
 fn all_hits(scene: &SceneGeometry, ray: Ray) -> Vec<Candidate> {
     let mut hits = Vec::new();
-    scene.for_each_hit(ray, |candidate| {
+    visit_hits(scene, ray, &mut |candidate| {
         hits.push(*candidate);
         Visit::Continue
     });
@@ -77,7 +77,7 @@ fn one_by_one(shapes: &[Shape], ray: Ray) -> Vec<Candidate> {
     for (shape, index) in shapes.iter().zip(0..) {
         let mut add = |shape: Shape, triangle: Option<u32>| {
             let alone = SceneGeometry::build(vec![shape]).unwrap();
-            alone.for_each_hit(ray, |candidate| {
+            visit_hits(&alone, ray, &mut |candidate| {
                 let primitive = triangle.unwrap_or(candidate.primitive);
                 hits.push(Candidate { shape: ShapeId(index), primitive, ..*candidate });
                 Visit::Continue
@@ -203,7 +203,7 @@ fn a_visitor_may_shorten_the_ray_or_stop() {
     assert_eq!(all_hits(&scene, ray).len(), 100);
 
     let mut visits = 0;
-    scene.for_each_hit(ray, |_| {
+    visit_hits(&scene, ray, &mut |_| {
         visits += 1;
         Visit::Stop
     });
@@ -211,7 +211,7 @@ fn a_visitor_may_shorten_the_ray_or_stop() {
 
     let mut limit = f32::INFINITY;
     let mut kept = 0;
-    scene.for_each_hit(ray, |candidate| {
+    visit_hits(&scene, ray, &mut |candidate| {
         assert!(candidate.t < limit);
         limit = limit.min(10.0);
         kept += u32::from(candidate.t < 10.0);
@@ -221,7 +221,7 @@ fn a_visitor_may_shorten_the_ray_or_stop() {
 
     // A greater distance does not lengthen the ray again.
     let mut order = Vec::new();
-    scene.for_each_hit(ray, |candidate| {
+    visit_hits(&scene, ray, &mut |candidate| {
         order.push(candidate.t);
         Visit::ShrinkTo(if order.len() == 1 { candidate.t } else { 1e9 })
     });
@@ -389,7 +389,7 @@ fn the_number_of_threads_does_not_show() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let scene = pool.install(|| SceneGeometry::build(vec![mesh.clone().into()])).unwrap();
         let mut order = Vec::new();
-        scene.for_each_hit(ray, |candidate| {
+        visit_hits(&scene, ray, &mut |candidate| {
             order.push(candidate.primitive);
             Visit::Continue
         });

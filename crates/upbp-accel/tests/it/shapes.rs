@@ -1,6 +1,6 @@
 //! Shapes by themselves: validation, area sampling, inside and outside, leaving a surface.
 
-use crate::support::Random;
+use crate::support::{Random, visit_hits};
 use glam::{Affine3A, Quat, Vec3};
 use upbp_accel::{
     AxisBox, GeometryError, Quad, Ray, SceneGeometry, Shape, Sphere, TriangleMesh, Visit, offset_origin,
@@ -331,7 +331,7 @@ fn a_ray_that_leaves_a_surface_does_not_meet_it_again() {
                         let start = offset_origin(point.position, normal, direction);
                         assert!((start - point.position).length() <= 1e-5 * point.position.length() + 1e-30);
                         let mut again = 0;
-                        scene.for_each_hit(Ray::new(start, direction), |_| {
+                        visit_hits(&scene, Ray::new(start, direction), &mut |_| {
                             again += 1;
                             Visit::Continue
                         });

@@ -32,7 +32,7 @@ pub(super) fn rank(drafts: &[ShapeDraft]) -> Vec<Body> {
     for ((place, (index, shape, inside)), priority) in drafts.iter().enumerate().zip(0..) {
         let ior = inside.ior.unwrap_or_else(|| surrounding_ior(shape, &drafts[..place], &bodies));
         let interior = Interior { body: BodyId(place as u32), medium: inside.medium, priority, ior };
-        bodies.push(Body { shape: ShapeId(*index as u32), aabb: shape.aabb(), interior });
+        bodies.push(Body { shape: ShapeId(*index as u32), interior });
     }
     bodies
 }

@@ -14,7 +14,7 @@ mod surfaces;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use upbp_accel::SceneGeometry;
+use upbp_accel::{BoxTree, SceneGeometry};
 use upbp_estimators::scene::EmitterId;
 use upbp_media::{Homogeneous, MediumId};
 
@@ -123,11 +123,14 @@ impl Builder<'_> {
         lights.extend(volume_lights(&drafts, &bodies, &media, bounds.radius));
         let geometry = SceneGeometry::build(drafts.into_iter().map(|draft| draft.shape).collect());
         let geometry = geometry.map_err(|error| self.problem("shapes", error)).ok()?;
+        let body_boxes = BoxTree::new(bodies.iter().map(|body| geometry.shape(body.shape).aabb()));
+        let body_boxes = body_boxes.map_err(|error| self.problem("shapes", error)).ok()?;
         let (hash, files) = (self.hash.0, std::mem::take(&mut self.files));
         Some(ReadyScene {
             geometry,
             surfaces,
             bodies,
+            body_boxes,
             lights,
             media,
             camera,

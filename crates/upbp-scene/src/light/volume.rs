@@ -47,7 +47,7 @@ impl VolumeLight {
     /// apart.
     #[must_use]
     pub fn new(body: BodyId, shape: &Shape, medium: Homogeneous, scene_radius: f32) -> Option<Self> {
-        let inside = ShapeVolume::new(shape).filter(|_| medium.emits())?;
+        let inside = if medium.emits() { ShapeVolume::new(shape)? } else { return None };
         let mean_chord = 4.0 * inside.volume() / f64::from(shape.area());
         let depth = mean_chord.min(f64::from(medium.mean_free_path()));
         let source = f64::from(medium.source(Vec3::ZERO).mean());

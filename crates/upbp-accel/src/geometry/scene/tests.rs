@@ -1,6 +1,6 @@
 //! Answers equal those of the exact tests of all primitives, without a tree or a test in single precision.
 
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 
 use glam::{Affine3A, DVec3, Mat3};
 use proptest::prelude::*;
@@ -182,7 +182,58 @@ fn any_scale_and_place_equals_brute_force() {
     assert!(found > 50_000, "{found}");
 }
 
+/// A closed surface with dents, and triangles of all sizes.
+fn dented(random: &mut Random, centre: Vec3, radius: f32) -> Option<TriangleMesh> {
+    let (rings, steps) = (2 + random.below(12) as u32, 3 + random.below(20) as u32);
+    let mut positions = vec![centre + Vec3::Y * radius, centre - Vec3::Y * radius];
+    for ring in 1..rings {
+        for step in 0..steps {
+            let (theta, phi) = (PI * ring as f32 / rings as f32, TAU * step as f32 / steps as f32);
+            let outwards = Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            positions.push(centre + outwards * radius * (0.3 + random.unit()));
+        }
+    }
+    let at = |ring: u32, step: u32| match ring {
+        0 => 0,
+        ring if ring == rings => 1,
+        ring => 2 + (ring - 1) * steps + step % steps,
+    };
+    let faces = (0..rings).flat_map(|ring| (0..steps).map(move |step| (ring, step)));
+    let triangles = faces.flat_map(|(ring, step)| {
+        let [a, b] = [at(ring, step), at(ring, step + 1)];
+        let [c, d] = [at(ring + 1, step), at(ring + 1, step + 1)];
+        let halves = [(ring > 0).then_some([a, b, d]), (ring + 1 < rings).then_some([a, d, c])];
+        halves.into_iter().flatten()
+    });
+    TriangleMesh::new(positions, triangles.collect(), None).ok()
+}
+
 proptest! {
+    #[test]
+    fn contains_equals_the_test_of_all_triangles(seed: u64, exponent in -12_i32..12, far in 0_i32..4) {
+        let mut random = Random(Xoshiro256PlusPlus::seed_from_u64(seed));
+        let scale = 10_f32.powi(exponent);
+        let offset = random.cube() * scale * (10_f32.powi(far) - 1.0);
+        let mut shapes: Vec<_> = (0..6).filter_map(|_| random.shape(scale, offset)).collect();
+        for _ in 0..3 {
+            let (centre, radius) = (offset + random.place() * scale, scale * random.unit());
+            let Some(mesh) = dented(&mut random, centre, radius) else { continue };
+            shapes.extend(mesh.placed(&random.placement(scale, offset)).ok().map(Shape::from));
+            shapes.push(mesh.into());
+        }
+        let scene = SceneGeometry::build(shapes.clone()).unwrap();
+        let mut inside = 0;
+        for (shape, id) in shapes.iter().zip(0..) {
+            let (min, max) = shape.aabb();
+            for _ in 0..30 {
+                let point = min + (max - min) * (random.cube() * 0.6 + 0.5);
+                prop_assert_eq!(scene.contains(ShapeId(id), point), shape.contains(point), "{} {:?}", point, shape);
+                inside += usize::from(shape.contains(point) == Some(true));
+            }
+        }
+        prop_assert!(inside > 0);
+    }
+
     #[test]
     fn random_scenes_equal_brute_force(seed: u64, shapes in 0_usize..80, exponent in -12_i32..12, far in 0_i32..7) {
         let mut random = Random(Xoshiro256PlusPlus::seed_from_u64(seed));

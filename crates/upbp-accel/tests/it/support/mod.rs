@@ -4,6 +4,8 @@ use glam::Vec3;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use upbp_accel::Ray;
+#[cfg(feature = "geometry")]
+use upbp_accel::{Candidate, SceneGeometry, Visit};
 
 /// Uniform numbers from a fixed seed.
 pub(crate) struct Random(Xoshiro256PlusPlus);
@@ -47,6 +49,13 @@ impl Random {
     pub(crate) fn next_u64(&mut self) -> u64 {
         self.0.next_u64()
     }
+}
+
+/// [`SceneGeometry::for_each_hit`] for visitors of one type: its code is long, and a test program that
+/// compiles it for each visitor takes a minute more to build.
+#[cfg(feature = "geometry")]
+pub(crate) fn visit_hits(scene: &SceneGeometry, ray: Ray, visit: &mut dyn FnMut(&Candidate) -> Visit) {
+    scene.for_each_hit(ray, visit);
 }
 
 /// Distributions of positions.
