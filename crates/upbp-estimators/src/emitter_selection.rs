@@ -11,7 +11,7 @@ use crate::scene::EmitterId;
 pub struct EmitterShares {
     /// Light by emitter, in any unit; emitters that are left out bring nothing.
     pub light: Vec<f64>,
-    /// Samples that this was measured with.
+    /// [Independent samples](effective_samples) that this was measured with.
     pub samples: f64,
 }
 
@@ -33,14 +33,14 @@ impl EmitterShares {
     #[must_use]
     pub fn of(mut probabilities: Vec<f64>, samples: &[EmitterSample]) -> Self {
         let mut light = vec![0.0; probabilities.len()];
+        let mut each = vec![0.0; samples.len()];
         for _ in 0..ROUNDS {
             light.fill(0.0);
-            for sample in samples {
+            for (sample, each) in samples.iter().zip(&mut each) {
                 let emitter = sample.emitter.0 as usize;
                 let weight = probabilities[emitter] / (probabilities[emitter] + sample.others);
-                if weight > 0.0 {
-                    light[emitter] += sample.light * weight * weight;
-                }
+                *each = if weight > 0.0 { sample.light * weight * weight } else { 0.0 };
+                light[emitter] += *each;
             }
             let sum: f64 = light.iter().sum();
             if !(sum > 0.0 && sum.is_finite()) {
@@ -50,20 +50,32 @@ impl EmitterShares {
                 *probability = light / sum;
             }
         }
-        Self { light, samples: samples.len() as f64 }
+        Self { light, samples: effective_samples(each) }
     }
 }
 
-/// Steps towards probabilities that reproduce themselves.
-const ROUNDS: u32 = 16;
+/// The number of equal samples whose sum would be as uncertain as that of these (Kish 1965): a sum that a few
+/// large ones make says little, however many small ones there are.
+#[must_use]
+pub fn effective_samples(samples: impl IntoIterator<Item = f64>) -> f64 {
+    let add = |[sum, squares]: [f64; 2], x: f64| [sum + x, squares + x * x];
+    let [sum, squares] = samples.into_iter().fold([0.0; 2], add);
+    let count = sum * sum / squares;
+    if count.is_finite() { count } else { 0.0 }
+}
 
-/// Power keeps at least this share of a choice.
-const POWER_SHARE: f64 = 0.1;
+/// Steps towards probabilities that reproduce themselves. With many, the emitter that the samples at hand
+/// favour takes all from others like it, as far as another technique finds their light too.
+const ROUNDS: u32 = 4;
 
-/// Samples per emitter from which on a measured share counts more than power.
-const TELLING_SAMPLES: f64 = 16.0;
+/// Power and an even choice keep at least this share.
+const SPREAD_SHARE: f64 = 0.1;
 
-/// Even part of the choice by which lights are measured: what power alone never chooses is not learnt.
+/// Effective samples per emitter from which on a measured share counts more than power and an even choice.
+const TELLING_SAMPLES: f64 = 2.0;
+
+/// Even part of the choice by which lights are measured, and that stays where little is known: what power
+/// alone never chooses is not learnt.
 const EVEN: f64 = 0.5;
 
 /// Random numbers are multiples of 2⁻²⁴.
@@ -134,12 +146,14 @@ impl Selection {
         self.cumulative.last().is_none_or(|&end| end == 0)
     }
 
-    /// The distribution with a part that follows `shares`, the larger the more samples they stand on.
+    /// The [spread](Self::spread) distribution with a part that follows `shares`, the larger the more samples
+    /// they stand on; without any light this one.
     pub(crate) fn blend(&self, shares: &EmitterShares) -> Self {
+        let spread = self.spread();
         let count = self.cumulative.len();
-        let power = |i: usize| f64::from(self.probability(EmitterId(i as u32)));
+        let spread = |i: usize| f64::from(spread.probability(EmitterId(i as u32)));
         let light = |i: usize| match shares.light.get(i) {
-            Some(&light) if light > 0.0 && power(i) > 0.0 => light,
+            Some(&light) if light > 0.0 && spread(i) > 0.0 => light,
             _ => 0.0,
         };
         let sum: f64 = (0..count).map(light).sum();
@@ -147,9 +161,9 @@ impl Selection {
             return self.clone();
         }
         let evidence = shares.samples / TELLING_SAMPLES;
-        let trust = (1.0 - POWER_SHARE) * evidence / (evidence + count as f64);
+        let trust = (1.0 - SPREAD_SHARE) * evidence / (evidence + count as f64);
         let weights: Vec<f64> =
-            (0..count).map(|i| trust * light(i) / sum + (1.0 - trust) * power(i)).collect();
+            (0..count).map(|i| trust * light(i) / sum + (1.0 - trust) * spread(i)).collect();
         Self::new(&weights)
     }
 

@@ -28,7 +28,7 @@ pub mod trace;
 pub use counters::Counters;
 pub use emission_guide::{EmissionGuide, EmissionSample};
 pub use emitter_choice::EmitterChoice;
-pub use emitter_selection::{EmitterSample, EmitterShares};
+pub use emitter_selection::{EmitterSample, EmitterShares, effective_samples};
 pub use features::Features;
 pub use film_sample::CameraWalk;
 pub use iteration::{IterationChoices, IterationPlan, Kernels, PathLengths};

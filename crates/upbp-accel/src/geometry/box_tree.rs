@@ -36,7 +36,7 @@ impl BoxTree {
         let is_around = |(min, max): (Vec3, Vec3)| min.cmple(point).all() && point.cmple(max).all();
         let check = |index| {
             if is_around(self.boxes[index]) {
-                visit(index)
+                visit(index);
             }
         };
         run(Around { hierarchy: &self.hierarchy, point, check });

@@ -17,6 +17,7 @@ use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, StreamKind, TechniqueSet,
+    effective_samples,
 };
 use upbp_media::Lanes;
 
@@ -220,42 +221,60 @@ fn measure<S: Scene, L: Lanes>(
     for &(path, end) in &seen.starts {
         starts[path as usize] = Some((end, 0.0));
     }
-    let mut by_path = |seen: &[(u32, Contribution)], scale| {
+    // As with one light sub-path per pixel: fewer bring more each than any pixel has.
+    let per_pixel = f64::from(plan.light_paths) / pixels as f64;
+    seen.emission.iter_mut().for_each(|(_, contribution)| contribution.pixel *= per_pixel);
+
+    let camera_paths = (part * f64::from(camera_paths)).ceil() as u32;
+    let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
+        let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
+        let before = (seen.light, seen.emission.len(), seen.next_event.len());
+        let observer: &mut DynObserver<'_, S::Bsdf> = seen;
+        let counters = &mut Counters::default();
+        trace_camera_path(&context, &map, kind, pixel(film, index), index, scratch, counters, observer);
+        let pixel = seen.light - before.0;
+        let emission = seen.emission[before.1..].iter_mut().map(|(_, contribution)| contribution);
+        let next_events = seen.next_event[before.2..].iter_mut().map(|(.., contribution)| contribution);
+        emission.chain(next_events).for_each(|contribution| contribution.pixel = pixel);
+        true
+    })?;
+    // Light tracing fills the whole picture, camera sub-paths a part of it.
+    let scale = pixels as f64 / f64::from(camera_paths);
+    let mean = walks.iter().map(|seen| seen.light).sum::<f64>() / f64::from(camera_paths)
+        + seen.light / pixels as f64;
+    // Errors are relative: light counts by the part of its pixel, so that no bright spot decides for all.
+    let relative = |contribution: Contribution| {
+        if mean > 0.0 { mean / (mean + contribution.pixel) } else { 1.0 }
+    };
+    let mut by_path = |seen: &[(u32, Contribution)], scale: f64| {
         for &(path, contribution) in seen {
             if let Some((end, light)) = &mut starts[path as usize] {
+                let scale = scale * relative(contribution);
                 emission.push(contribution.of(end.emitter, emission_probability(end.emitter), scale));
                 *light += scale * contribution.value * contribution.weight;
             }
         }
     };
     by_path(&seen.emission, 1.0);
-
-    let camera_paths = (part * f64::from(camera_paths)).ceil() as u32;
-    let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
-        let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
-        let observer: &mut DynObserver<'_, S::Bsdf> = seen;
-        let counters = &mut Counters::default();
-        trace_camera_path(&context, &map, kind, pixel(film, index), index, scratch, counters, observer);
-        true
-    })?;
-    // Light tracing fills the whole picture, camera sub-paths a part of it.
-    let scale = pixels as f64 / f64::from(camera_paths);
     let mut guides = Evidence::default();
     let mut next_events = [Vec::new(), Vec::new()];
     for (piece, seen) in walks.into_iter().enumerate() {
         by_path(&seen.emission, scale);
         for (end, receiver, contribution) in seen.next_event {
             let chosen = f64::from(scene.next_event_probability(receiver, end.emitter));
-            let sample = contribution.of(end.emitter, chosen, scale);
+            let sample = contribution.of(end.emitter, chosen, scale * relative(contribution));
             next_events[piece % 2].push(NextEvent { receiver, sample, chosen });
             guides.lit.push((end, receiver));
         }
         guides.specular.extend(seen.specular);
     }
     guides.starts = starts.into_iter().flatten().collect();
+    // What one sub-path brings is no more than one sample.
+    let light_paths = effective_samples(guides.starts.iter().map(|&(_, light)| light));
     let probabilities = (0..emitters).map(|i| emission_probability(EmitterId(i as u32))).collect();
     let contributions = emission.len() + next_events.iter().map(Vec::len).sum::<usize>();
-    let emission = EmitterShares::of(probabilities, &emission);
+    let mut emission = EmitterShares::of(probabilities, &emission);
+    emission.samples = emission.samples.min(light_paths);
     Some(Measured { emission, next_events, guides, contributions })
 }
 
@@ -296,6 +315,8 @@ struct Seen {
     emission: Vec<(u32, Contribution)>,
     /// By light and receiver.
     next_event: Vec<(LightEnd, Vec3, Contribution)>,
+    /// Light that arrived in all.
+    light: f64,
     /// Places where camera sub-paths were reflected or refracted in one direction.
     specular: Vec<Vec3>,
 }
@@ -304,6 +325,7 @@ impl Seen {
     fn append(&mut self, mut more: Self) {
         self.starts.append(&mut more.starts);
         self.emission.append(&mut more.emission);
+        self.light += more.light;
     }
 }
 
@@ -312,6 +334,8 @@ struct Contribution {
     /// Before weighting.
     value: f64,
     weight: f64,
+    /// Light of its pixel, this included.
+    pixel: f64,
 }
 
 impl Contribution {
@@ -336,7 +360,9 @@ impl<B> Observer<B> for Seen {
     }
 
     fn sample(&mut self, sample: &ObservedSample<B>) {
-        let seen = Contribution { value: f64::from(sample.value.mean()), weight: sample.weight.value() };
+        let (value, weight) = (f64::from(sample.value.mean()), sample.weight.value());
+        let seen = Contribution { value, weight, pixel: value * weight };
+        self.light += seen.pixel;
         match sample.completion {
             Completion::Emission | Completion::Hit(_) => {}
             Completion::Nee { light, camera: (receiver, _) } => self.next_event.push((light, receiver, seen)),
