@@ -2,6 +2,7 @@
 
 mod adaptation;
 mod census;
+mod emitters;
 mod guides;
 mod radii;
 mod receivers;
