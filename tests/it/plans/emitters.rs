@@ -1,4 +1,4 @@
-//! What emitters are chosen for light sub-paths.
+//! The choice of emitters for light sub-paths.
 
 use upbp_core::Settings;
 use upbp_scene::ReadyScene;
@@ -51,7 +51,7 @@ fn shares(scene: &ReadyScene, seed: u64) -> Vec<f64> {
     starts.zip(&ends).map(|(start, end)| (end - start) / f64::from(1 << 24)).collect()
 }
 
-/// One that light sub-paths hardly ever choose has beams a hundred times as bright as those of the others.
+/// A lamp that light sub-paths hardly ever choose has beams a hundred times as bright as those of the others.
 #[test]
 fn of_lamps_that_are_alike_none_is_left_to_chance() {
     let scene = opal_lamps();

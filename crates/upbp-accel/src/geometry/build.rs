@@ -28,7 +28,7 @@ pub(super) struct Leaves {
 
 impl Leaves {
     pub(super) const PRIMITIVES: Self = Self { small: 48, block: WIDTH };
-    /// What is no primitive: all that a hierarchy knows of it is its box.
+    /// Anything but primitives: all that a hierarchy knows of it is its box.
     pub(super) const BOXES: Self = Self { small: 0, block: 1 };
 }
 

@@ -269,7 +269,7 @@ fn measure<S: Scene, L: Lanes>(
         guides.specular.extend(seen.specular);
     }
     guides.starts = starts.into_iter().flatten().collect();
-    // What one sub-path brings is no more than one sample.
+    // All that one sub-path brings is one sample.
     let light_paths = effective_samples(guides.starts.iter().map(|&(_, light)| light));
     let probabilities = (0..emitters).map(|i| emission_probability(EmitterId(i as u32))).collect();
     let contributions = emission.len() + next_events.iter().map(Vec::len).sum::<usize>();
