@@ -154,55 +154,66 @@ impl Hierarchy {
         visitor: &mut impl Visitor,
     ) -> ControlFlow<()> {
         let mut stack = Stack::new();
-        let mut next = Some(Entry::new(0.0, root));
+        let mut child = root;
         loop {
-            let child = match next.take().or_else(|| stack.pop()) {
-                Some(entry) if entry.distance() * (1.0 - SLAB_ROUNDING) > *t_max => continue,
-                Some(entry) => entry.child(),
-                None => return ControlFlow::Continue(()),
-            };
             if child.is_block() {
                 visitor.visit(wide, ray, child.as_block(), t_max)?;
+            } else if let Some(nearest) =
+                self.nearest_child::<IN_ORDER, W>(child, wide, (ray, slabs), *t_max, &mut stack)
+            {
+                child = nearest;
                 continue;
             }
-            let node = &self.nodes[child.index()];
-            let [near, far] = slabs.slabs(wide, &node.boxes, ray.t_min, wide.splat(*t_max));
-            let far = wide.mul(far, wide.splat(1.0 + SLAB_ROUNDING));
-            let far = wide.add(far, wide.splat(f32::MIN_POSITIVE));
-            let met = wide.less_equal(near, far) & node.existing;
-            let near = wide.store(near);
-            let entry = |lane: usize| Entry::new(near[lane & 7], node.children[lane & 7]);
-            // The nearest one goes on without the stack, and mostly there are no more than two.
-            let rest = met & met.wrapping_sub(1);
-            if met == 0 {
-                continue;
-            }
-            let first = entry(met.trailing_zeros() as usize);
-            if rest == 0 {
-                next = Some(first);
-                continue;
-            }
-            let second = entry(rest.trailing_zeros() as usize);
-            let (nearest, other) = (first.min(second), first.max(second));
-            let rest = rest & (rest - 1);
-            let bottom = stack.length;
-            stack.push(other);
-            next = Some(nearest);
-            if rest != 0 {
-                let mut nearest = nearest;
-                for lane in set_lanes(rest) {
-                    let entry = entry(lane);
-                    let farther = entry.max(nearest);
-                    nearest = entry.min(nearest);
-                    if IN_ORDER {
-                        stack.push_sorted(bottom, farther);
-                    } else {
-                        stack.push(farther);
-                    }
+            child = loop {
+                let Some(entry) = stack.pop() else { return ControlFlow::Continue(()) };
+                if entry.distance() * (1.0 - SLAB_ROUNDING) <= *t_max {
+                    break entry.child();
                 }
-                next = Some(nearest);
+            };
+        }
+    }
+
+    /// The nearest child of a node that the ray may meet; others that it may meet go to the stack.
+    #[inline(always)]
+    fn nearest_child<const IN_ORDER: bool, W: Wide>(
+        &self,
+        node: Child,
+        wide: W,
+        (ray, slabs): (&LaneRay<W>, &impl Slabs<W>),
+        t_max: f32,
+        stack: &mut Stack,
+    ) -> Option<Child> {
+        let node = &self.nodes[node.index()];
+        let [near, far] = slabs.slabs(wide, &node.boxes, ray.t_min, wide.splat(t_max));
+        let far = wide.mul(far, wide.splat(1.0 + SLAB_ROUNDING));
+        let far = wide.add(far, wide.splat(f32::MIN_POSITIVE));
+        let met = wide.less_equal(near, far) & node.existing;
+        if met == 0 {
+            return None;
+        }
+        let near = wide.store(near);
+        let entry = |lane: usize| Entry::new(near[lane & 7], node.children[lane & 7]);
+        // Mostly there are no more than two.
+        let first = met.trailing_zeros() as usize;
+        let rest = met & (met - 1);
+        if rest == 0 {
+            return Some(node.children[first & 7]);
+        }
+        let (first, second) = (entry(first), entry(rest.trailing_zeros() as usize));
+        let mut nearest = first.min(second);
+        let bottom = stack.length;
+        stack.push(first.max(second));
+        for lane in set_lanes(rest & (rest - 1)) {
+            let entry = entry(lane);
+            let farther = entry.max(nearest);
+            nearest = entry.min(nearest);
+            if IN_ORDER {
+                stack.push_sorted(bottom, farther);
+            } else {
+                stack.push(farther);
             }
         }
+        Some(nearest.child())
     }
 }
 

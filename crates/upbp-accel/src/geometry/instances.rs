@@ -220,13 +220,14 @@ impl<V: FnMut(&Candidate) -> Visit> Visitor for InstanceTriangles<'_, V> {
         block: BlockRef,
         own_t_max: &mut f32,
     ) -> ControlFlow<()> {
-        let triangles = self.model.triangles.blocks[block.index].placed(wide, &self.instance.placement);
+        let named = &self.model.triangles.0[block.index];
+        let triangles = named.block.placed(wide, &self.instance.placement);
         let lanes = LaneRay::new(wide, self.ray);
         for lane in set_lanes(triangles.may_meet(wide, &lanes, self.triangle_ray, self.t_max) & block.used) {
             let Some(hit) = self.triangle_ray.shear.intersect(triangles.corners(lane)) else { continue };
             let t = hit.t as f32;
             if t > self.ray.t_min && t < self.t_max {
-                let primitive = self.model.triangles.names[block.index][lane].triangle;
+                let primitive = named.names[lane].triangle;
                 let shape = ShapeId(self.instance.shape);
                 let candidate = Candidate { t, shape, primitive, uv: hit.weights };
                 (self.visit)(&candidate).apply(&mut self.t_max)?;

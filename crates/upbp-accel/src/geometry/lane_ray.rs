@@ -58,11 +58,11 @@ pub(super) trait Slabs<W: Wide> {
 }
 
 impl<W: Wide> SlabRay<W> {
-    /// `origins` as they are for the planes with the least and with the greatest coordinates.
+    /// `origins` as they are for the planes by which the ray enters and leaves.
     #[inline(always)]
     fn between(
         &self,
-        origins: [&[W::F; 3]; 2],
+        [enter_from, exit_from]: [&[W::F; 3]; 2],
         wide: W,
         planes: &Planes,
         [t_min, t_max]: [W::F; 2],
@@ -70,8 +70,8 @@ impl<W: Wide> SlabRay<W> {
         let (mut near, mut far) = (t_min, t_max);
         for (axis, planes) in planes.iter().enumerate() {
             let negative = self.negative[axis] & 1;
-            let enter = wide.sub(wide.load(&planes[negative]), origins[negative][axis]);
-            let exit = wide.sub(wide.load(&planes[1 - negative]), origins[1 - negative][axis]);
+            let enter = wide.sub(wide.load(&planes[negative]), enter_from[axis]);
+            let exit = wide.sub(wide.load(&planes[1 - negative]), exit_from[axis]);
             near = wide.greater_of(wide.mul(enter, self.inverse[axis]), near);
             far = wide.less_of(wide.mul(exit, self.inverse[axis]), far);
         }
@@ -98,7 +98,7 @@ impl<W: Wide> Slabs<W> for SlabRay<W> {
 /// A ray in every lane, prepared for the slabs of boxes that are wider than they are said to be.
 pub(super) struct Widened<W: Wide> {
     ray: SlabRay<W>,
-    /// For the planes with the least and with the greatest coordinates.
+    /// For the planes by which the ray enters and leaves.
     origins: [[W::F; 3]; 2],
 }
 
@@ -108,13 +108,21 @@ impl<W: Wide> Slabs<W> for Widened<W> {
     #[inline(always)]
     fn new(wide: W, ray: &LaneRay<W>, margins: Vec3) -> Self {
         let margins = wide.splat3(margins.to_array());
-        let origins = [wide.add3(ray.origin, margins), wide.sub3(ray.origin, margins)];
-        Self { ray: SlabRay::new(wide, ray, ()), origins }
+        // For the planes with the least and with the greatest coordinates.
+        let [above, below] = [wide.add3(ray.origin, margins), wide.sub3(ray.origin, margins)];
+        let mut origins = [above, below];
+        let ray = SlabRay::new(wide, ray, ());
+        for axis in 0..3 {
+            if ray.negative[axis] == 1 {
+                (origins[0][axis], origins[1][axis]) = (below[axis], above[axis]);
+            }
+        }
+        Self { ray, origins }
     }
 
     #[inline(always)]
     fn slabs(&self, wide: W, planes: &Planes, t_min: W::F, t_max: W::F) -> [W::F; 2] {
-        let [above, below] = &self.origins;
-        self.ray.between([above, below], wide, planes, [t_min, t_max])
+        let [enter_from, exit_from] = &self.origins;
+        self.ray.between([enter_from, exit_from], wide, planes, [t_min, t_max])
     }
 }

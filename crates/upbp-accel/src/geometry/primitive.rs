@@ -49,26 +49,30 @@ impl Name {
     }
 }
 
-/// Blocks of a kind with the names of their primitives.
-#[derive(Clone, Debug)]
-pub(super) struct Blocks<B> {
-    pub(super) blocks: Vec<B>,
-    pub(super) names: Vec<[Name; WIDTH]>,
+/// Up to eight primitives of a kind with their names: whoever meets one asks for its name at once.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(super) struct Named<B> {
+    pub(super) block: B,
+    pub(super) names: [Name; WIDTH],
 }
 
+/// Blocks of a kind.
+#[derive(Clone, Debug)]
+pub(super) struct Blocks<B>(pub(super) Vec<Named<B>>);
+
 impl<B: Block> Blocks<B> {
-    pub(super) const EMPTY: Self = Self { blocks: Vec::new(), names: Vec::new() };
+    pub(super) const EMPTY: Self = Self(Vec::new());
 
     /// Adds a block of up to eight primitives, returns its place.
     pub(super) fn push(&mut self, primitives: impl Iterator<Item = (Name, B::Primitive)>) -> usize {
-        let (mut block, mut names) = (B::EMPTY, [Name::default(); WIDTH]);
+        let mut named = Named { block: B::EMPTY, names: [Name::default(); WIDTH] };
         for (lane, (name, primitive)) in primitives.enumerate() {
-            block.set(lane, primitive);
-            names[lane] = name;
+            named.block.set(lane, primitive);
+            named.names[lane] = name;
         }
-        self.blocks.push(block);
-        self.names.push(names);
-        self.blocks.len() - 1
+        self.0.push(named);
+        self.0.len() - 1
     }
 }
 
@@ -129,7 +133,7 @@ impl<'a> Probe<'a> {
     /// `extent`: the greatest sum of coordinate differences between the ray's origin and any triangle.
     #[inline(always)]
     pub(super) fn new(shapes: &'a [Shape], primitives: &'a Primitives, ray: &Ray, extent: f32) -> Self {
-        let triangles = !primitives.triangles.blocks.is_empty();
+        let triangles = !primitives.triangles.0.is_empty();
         let triangle_ray = triangles.then(|| TriangleRay::new(ray.origin, ray.direction, extent));
         Self { shapes, primitives, ray: *ray, triangle_ray }
     }
@@ -158,18 +162,18 @@ impl<'a> Probe<'a> {
         match block.kind {
             Kind::Triangle => {
                 let Some(ray) = &self.triangle_ray else { return ControlFlow::Continue(()) };
-                let triangles = &self.primitives.triangles.blocks[index];
+                let Named { block: triangles, names } = &self.primitives.triangles.0[index];
                 for lane in set_lanes(triangles.may_meet(wide, lanes, ray, *t_max) & block.used) {
                     if let Some(hit) = ray.shear.intersect(triangles.corners(lane)) {
-                        let name = self.primitives.triangles.names[index][lane];
+                        let name = names[lane];
                         at(hit.t, name, name.triangle, hit.weights, t_max)?;
                     }
                 }
             }
             Kind::Quad => {
-                let quads = &self.primitives.quads;
-                for lane in set_lanes(quads.blocks[index].may_meet(wide, lanes, &(), *t_max) & block.used) {
-                    let name = quads.names[index][lane];
+                let Named { block: quads, names } = &self.primitives.quads.0[index];
+                for lane in set_lanes(quads.may_meet(wide, lanes, &(), *t_max) & block.used) {
+                    let name = names[lane];
                     if let Some((t, uv)) = self.quad(name).and_then(|quad| quad.intersect(origin, direction))
                     {
                         at(t, name, 0, uv, t_max)?;
@@ -177,9 +181,9 @@ impl<'a> Probe<'a> {
                 }
             }
             Kind::Sphere => {
-                let spheres = &self.primitives.spheres;
-                for lane in set_lanes(spheres.blocks[index].may_meet(wide, lanes, &(), *t_max) & block.used) {
-                    let name = spheres.names[index][lane];
+                let Named { block: spheres, names } = &self.primitives.spheres.0[index];
+                for lane in set_lanes(spheres.may_meet(wide, lanes, &(), *t_max) & block.used) {
+                    let name = names[lane];
                     let sphere = self.sphere(name);
                     if let Some([entry, exit]) = sphere.and_then(|sphere| sphere.intersect(origin, direction))
                     {
@@ -189,9 +193,9 @@ impl<'a> Probe<'a> {
                 }
             }
             Kind::Box => {
-                let boxes = &self.primitives.boxes;
-                for lane in set_lanes(boxes.blocks[index].may_meet(wide, lanes, &(), *t_max) & block.used) {
-                    let name = boxes.names[index][lane];
+                let Named { block: boxes, names } = &self.primitives.boxes.0[index];
+                for lane in set_lanes(boxes.may_meet(wide, lanes, &(), *t_max) & block.used) {
+                    let name = names[lane];
                     let axis_box = self.axis_box(name);
                     if let Some([entry, exit]) = axis_box.and_then(|b| b.intersect(origin, direction)) {
                         at(entry.0, name, entry.1, [0.0; 2], t_max)?;
