@@ -4,6 +4,7 @@
 //! Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017).
 //! The builder degenerates to a list when many boxes share a centre, so such boxes are grouped before.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -79,10 +80,10 @@ pub(super) fn build(
         post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
         ..BvhBuildParams::medium_build()
     };
-    let binary = build_bvh2(&groups, params, &mut Duration::default());
-    let mut collapse =
-        Collapse { boxes, leaves, members, groups, subtrees: Vec::new(), binary, nodes: Vec::new(), pack };
-    collapse.weigh();
+    let tree = build_bvh2(&groups, params, &mut Duration::default());
+    let binary = Binary { boxes, leaves, members, groups, tree };
+    let choices = binary.choices();
+    let mut collapse = Collapse { binary, choices, nodes: Vec::new(), pack };
     let roots = vec![collapse.emit()];
     Hierarchy { nodes: collapse.nodes, roots }
 }
@@ -121,163 +122,126 @@ fn group_by_centre(boxes: &[Boxed]) -> (Vec<u32>, Vec<Group>) {
     (members.into_iter().map(|(_, index)| index).collect(), groups)
 }
 
-/// Least costs of a binary node and all below it, by the number of children of a wide node that they may
-/// take up.
+/// Least costs of a binary node and all below it.
 #[derive(Clone, Copy)]
 struct Subtree {
-    /// Cost with up to one, two, ... seven children.
+    /// Cost with up to one, two, ... seven children of a wide node.
     cost: [f32; WIDTH - 1],
-    /// Children that the left half gets, of two, three, ... eight; zero: one fewer is as good.
-    left: [u8; WIDTH - 1],
-    /// Whether a single child is a block, instead of a node.
-    is_block: bool,
     /// Kind of the primitives if it is the same for all, and their number if that fits into a block.
     uniform: Option<(Kind, u32)>,
 }
 
-struct Collapse<'a, P> {
+/// What a binary node and all below it become at the least cost.
+#[derive(Clone, Copy)]
+struct Choice {
+    /// Of two, three, ... eight children of a wide node, those that the left half gets; zero: one fewer is as
+    /// good.
+    left: [u8; WIDTH - 1],
+    /// Whether a single child is a block, instead of a node.
+    is_block: bool,
+}
+
+impl Choice {
+    const LEAF: Self = Self { left: [0; WIDTH - 1], is_block: true };
+}
+
+/// Subtrees whose choices are found in parallel, at least.
+const PIECES: usize = 64;
+
+/// The binary hierarchy over groups of primitives.
+struct Binary<'a> {
     boxes: &'a [Boxed],
     leaves: Leaves,
     members: Vec<u32>,
     groups: Vec<Group>,
-    binary: Bvh2,
-    /// By the binary node.
-    subtrees: Vec<Subtree>,
-    nodes: Vec<Node>,
-    pack: P,
+    tree: Bvh2,
 }
 
-impl<P: FnMut(Kind, &[u32]) -> Child> Collapse<'_, P> {
-    /// Finds the costs of all subtrees, from the leaves up.
-    fn weigh(&mut self) {
-        let nodes = &self.binary.nodes;
-        let mut order = vec![0];
-        let mut place = 0;
-        while let Some(&index) = order.get(place) {
-            let node = &nodes[index as usize];
-            if !node.is_leaf() {
-                order.extend([node.first_index, node.first_index + 1]);
-            }
-            place += 1;
-        }
-        let area = |index: u32| {
-            let aabb = nodes[index as usize].aabb();
-            let size = aabb.max.as_dvec3() - aabb.min.as_dvec3();
-            size.x * size.y + size.y * size.z + size.z * size.x
-        };
-        let whole = area(0).max(f64::MIN_POSITIVE);
-        let none = Subtree { cost: [0.0; 7], left: [0; 7], is_block: true, uniform: None };
-        self.subtrees = vec![none; nodes.len()];
-        for &index in order.iter().rev() {
-            let node = &nodes[index as usize];
-            let area = (area(index) / whole) as f32;
-            self.subtrees[index as usize] = if node.is_leaf() {
-                let members = self.members_of(index);
-                let kind = self.boxes[members[0] as usize].kind;
-                let same = members.iter().all(|&index| self.boxes[index as usize].kind == kind);
-                let uniform =
-                    (same && members.len() <= self.leaves.block).then_some((kind, members.len() as u32));
-                Subtree { cost: [area * BLOCK_COST; 7], uniform, ..none }
-            } else {
-                let children = [0, 1].map(|i| &self.subtrees[(node.first_index + i) as usize]);
-                Subtree::over(children, self.leaves, area)
-            };
-        }
+impl Binary<'_> {
+    /// Both halves of a node, unless it is a leaf.
+    fn halves(&self, index: u32) -> Option<[u32; 2]> {
+        let node = &self.tree.nodes[index as usize];
+        (!node.is_leaf()).then_some([node.first_index, node.first_index + 1])
     }
 
-    /// Primitives of a leaf of the binary hierarchy.
+    /// Primitives of a leaf.
     fn members_of(&self, leaf: u32) -> &[u32] {
-        let node = &self.binary.nodes[leaf as usize];
-        let group = &self.groups[self.binary.primitive_indices[node.first_index as usize] as usize];
+        let node = &self.tree.nodes[leaf as usize];
+        let group = &self.groups[self.tree.primitive_indices[node.first_index as usize] as usize];
         &self.members[group.members.clone()]
     }
 
-    /// Makes the wide hierarchy; returns its root.
-    fn emit(&mut self) -> Child {
-        let mut waiting = Vec::new();
-        let root = self.child(0, &mut waiting);
-        while let Some((index, node)) = waiting.pop() {
-            let first = self.binary.nodes[index as usize].first_index;
-            let left = self.subtrees[index as usize].left[WIDTH - 2];
-            let mut below = Vec::with_capacity(WIDTH);
-            self.gather(first, left, &mut below);
-            self.gather(first + 1, WIDTH as u8 - left, &mut below);
-            let children = below.into_iter().map(|index| {
-                let aabb = *self.binary.nodes[index as usize].aabb();
-                (self.child(index, &mut waiting), (aabb.min.into(), aabb.max.into()))
-            });
-            let children: Vec<_> = children.collect();
-            self.nodes[node] = Node::new(&children);
+    /// What each node becomes.
+    fn choices(&self) -> Vec<Choice> {
+        let whole = surface_area(self.tree.nodes[0].aabb()).max(f64::MIN_POSITIVE);
+        let (mut above, mut roots) = (Vec::new(), vec![0]);
+        while roots.len() < PIECES && roots.iter().any(|&root| self.halves(root).is_some()) {
+            let mut below = Vec::new();
+            for root in roots {
+                match self.halves(root) {
+                    Some(halves) => {
+                        above.push((root, halves));
+                        below.extend(halves);
+                    }
+                    None => below.push(root),
+                }
+            }
+            roots = below;
         }
-        root
-    }
-
-    /// Binary nodes that become the children of a wide node, if this one may take up `room` of them.
-    fn gather(&self, index: u32, room: u8, found: &mut Vec<u32>) {
-        let node = &self.binary.nodes[index as usize];
-        let left = if room < 2 || node.is_leaf() {
-            0
-        } else {
-            self.subtrees[index as usize].left[room as usize - 2]
-        };
-        if left > 0 {
-            self.gather(node.first_index, left, found);
-            self.gather(node.first_index + 1, room - left, found);
-        } else if room > 2 && !node.is_leaf() {
-            self.gather(index, room - 1, found);
-        } else {
-            found.push(index);
-        }
-    }
-
-    /// The child that a binary node becomes; a node is reserved and filled later.
-    fn child(&mut self, index: u32, waiting: &mut Vec<(u32, usize)>) -> Child {
-        let subtree = self.subtrees[index as usize];
-        if !subtree.is_block {
-            waiting.push((index, self.nodes.len()));
-            self.nodes.push(Node::new(&[]));
-            return Child::node(self.nodes.len() - 1);
-        }
-        let mut members = Vec::with_capacity(WIDTH);
-        let mut below = vec![index];
-        while let Some(index) = below.pop() {
-            let node = &self.binary.nodes[index as usize];
-            if node.is_leaf() {
-                members.extend_from_slice(self.members_of(index));
-            } else {
-                below.extend([node.first_index + 1, node.first_index]);
+        let found: Vec<_> = roots.par_iter().map(|&root| self.choices_below(root, whole)).collect();
+        let mut choices = vec![Choice::LEAF; self.tree.nodes.len()];
+        let mut subtrees = BTreeMap::new();
+        for (root, (subtree, below)) in roots.into_iter().zip(found) {
+            subtrees.insert(root, subtree);
+            for (index, choice) in below {
+                choices[index as usize] = choice;
             }
         }
-        self.blocks(&members)
-    }
-
-    /// Blocks of any number of primitives, below nodes of their own if there are several.
-    fn blocks(&mut self, members: &[u32]) -> Child {
-        let mut level = Vec::new();
-        by_kind(self.boxes, self.leaves, members, |kind, members| {
-            let around = members.iter().map(|&index| &self.boxes[index as usize]);
-            let bounds =
-                around.map(|boxed| (boxed.min, boxed.max)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-            level.push(((self.pack)(kind, members), bounds.unwrap_or_default()));
-        });
-        while level.len() > 1 {
-            let above = level.chunks(WIDTH).map(|children| {
-                self.nodes.push(Node::new(children));
-                let bounds = children.iter().map(|child| child.1).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-                (Child::node(self.nodes.len() - 1), bounds.unwrap_or_default())
-            });
-            level = above.collect();
+        for (index, halves) in above.into_iter().rev() {
+            let (subtree, choice) = self.over(index, halves.map(|half| &subtrees[&half]), whole);
+            subtrees.insert(index, subtree);
+            choices[index as usize] = choice;
         }
-        level[0].0
+        choices
     }
-}
 
-impl Subtree {
-    /// The subtree over two others; `area` of its box.
-    fn over([a, b]: [&Self; 2], leaves: Leaves, area: f32) -> Self {
+    /// The subtree at a node, and what those in it become that are no leaves.
+    fn choices_below(&self, root: u32, whole: f64) -> (Subtree, Vec<(u32, Choice)>) {
+        let (mut order, mut waiting) = (Vec::new(), vec![root]);
+        while let Some(index) = waiting.pop() {
+            order.push(index);
+            waiting.extend(self.halves(index).into_iter().flatten());
+        }
+        // Backwards every node follows on its second half, and that on the first.
+        let mut choices = Vec::with_capacity(order.len() / 2);
+        let mut done: Vec<Subtree> = Vec::new();
+        for index in order.into_iter().rev() {
+            let subtree = if let (Some(_), [.., first, second]) = (self.halves(index), &done[..]) {
+                let (subtree, choice) = self.over(index, [first, second], whole);
+                choices.push((index, choice));
+                done.truncate(done.len() - 2);
+                subtree
+            } else {
+                self.leaf(index, whole)
+            };
+            done.push(subtree);
+        }
+        (done[0], choices)
+    }
+
+    fn leaf(&self, index: u32, whole: f64) -> Subtree {
+        let members = self.members_of(index);
+        let kind = self.boxes[members[0] as usize].kind;
+        let same = members.iter().all(|&index| self.boxes[index as usize].kind == kind);
+        let uniform = (same && members.len() <= self.leaves.block).then_some((kind, members.len() as u32));
+        Subtree { cost: [self.area(index, whole) * BLOCK_COST; WIDTH - 1], uniform }
+    }
+
+    /// The subtree at a node over those at both halves.
+    fn over(&self, index: u32, [a, b]: [&Subtree; 2], whole: f64) -> (Subtree, Choice) {
         let uniform = match (a.uniform, b.uniform) {
             (Some((kind, count)), Some((other, more)))
-                if kind == other && (count + more) as usize <= leaves.block =>
+                if kind == other && (count + more) as usize <= self.leaves.block =>
             {
                 Some((kind, count + more))
             }
@@ -294,6 +258,7 @@ impl Subtree {
                 }
             }
         }
+        let area = self.area(index, whole);
         let as_node = area + split[WIDTH - 2];
         let as_block = if uniform.is_some() { area * BLOCK_COST } else { f32::INFINITY };
         let is_block = as_block <= as_node && uniform.is_some();
@@ -305,6 +270,96 @@ impl Subtree {
                 (cost[place], left[place - 1]) = (cost[place - 1], 0);
             }
         }
-        Self { cost, left, is_block, uniform }
+        (Subtree { cost, uniform }, Choice { left, is_block })
+    }
+
+    /// Surface area of a node's box, as a part of `whole`.
+    fn area(&self, index: u32, whole: f64) -> f32 {
+        (surface_area(self.tree.nodes[index as usize].aabb()) / whole) as f32
+    }
+}
+
+/// Half of the surface area of a box.
+fn surface_area(aabb: &Aabb) -> f64 {
+    let size = aabb.max.as_dvec3() - aabb.min.as_dvec3();
+    size.x * size.y + size.y * size.z + size.z * size.x
+}
+
+/// The wide hierarchy in the making.
+struct Collapse<'a, P> {
+    binary: Binary<'a>,
+    choices: Vec<Choice>,
+    nodes: Vec<Node>,
+    pack: P,
+}
+
+impl<P: FnMut(Kind, &[u32]) -> Child> Collapse<'_, P> {
+    /// Makes the wide hierarchy; returns its root.
+    fn emit(&mut self) -> Child {
+        let (mut waiting, mut below, mut children) = (Vec::new(), Vec::new(), Vec::new());
+        let root = self.child(0, &mut waiting);
+        while let Some((index, node)) = waiting.pop() {
+            self.gather(index, WIDTH as u8, &mut below);
+            for index in below.drain(..) {
+                let aabb = *self.binary.tree.nodes[index as usize].aabb();
+                children.push((self.child(index, &mut waiting), (aabb.min.into(), aabb.max.into())));
+            }
+            self.nodes[node] = Node::new(&children);
+            children.clear();
+        }
+        root
+    }
+
+    /// Binary nodes that become the children of a wide node, if this one may take up `room` of them.
+    fn gather(&self, index: u32, room: u8, found: &mut Vec<u32>) {
+        let Some([first, second]) = self.binary.halves(index).filter(|_| room > 1) else {
+            return found.push(index);
+        };
+        let left = self.choices[index as usize].left[room as usize - 2];
+        if left > 0 {
+            self.gather(first, left, found);
+            self.gather(second, room - left, found);
+        } else {
+            self.gather(index, room - 1, found);
+        }
+    }
+
+    /// The child that a binary node becomes; a node is reserved and filled later.
+    fn child(&mut self, index: u32, waiting: &mut Vec<(u32, usize)>) -> Child {
+        if !self.choices[index as usize].is_block {
+            waiting.push((index, self.nodes.len()));
+            self.nodes.push(Node::new(&[]));
+            return Child::node(self.nodes.len() - 1);
+        }
+        let mut members = Vec::with_capacity(WIDTH);
+        let mut below = vec![index];
+        while let Some(index) = below.pop() {
+            match self.binary.halves(index) {
+                Some([first, second]) => below.extend([second, first]),
+                None => members.extend_from_slice(self.binary.members_of(index)),
+            }
+        }
+        self.blocks(&members)
+    }
+
+    /// Blocks of any number of primitives, below nodes of their own if there are several.
+    fn blocks(&mut self, members: &[u32]) -> Child {
+        let Binary { boxes, leaves, .. } = self.binary;
+        let mut level = Vec::new();
+        by_kind(boxes, leaves, members, |kind, members| {
+            let around = members.iter().map(|&index| &boxes[index as usize]);
+            let bounds =
+                around.map(|boxed| (boxed.min, boxed.max)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+            level.push(((self.pack)(kind, members), bounds.unwrap_or_default()));
+        });
+        while level.len() > 1 {
+            let above = level.chunks(WIDTH).map(|children| {
+                self.nodes.push(Node::new(children));
+                let bounds = children.iter().map(|child| child.1).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+                (Child::node(self.nodes.len() - 1), bounds.unwrap_or_default())
+            });
+            level = above.collect();
+        }
+        level[0].0
     }
 }

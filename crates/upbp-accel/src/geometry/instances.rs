@@ -18,7 +18,7 @@ use super::hit::{Candidate, ShapeId, Visit};
 use super::lane_ray::{LaneRay, ROUNDING, SLAB_ROUNDING, SlabRay, Widened};
 use super::mesh::TriangleMesh;
 use super::placement::Placement;
-use super::primitive::{Blocks, Name};
+use super::primitive::{Blocks, Name, Packing};
 use super::primitive_block::{Block as _, TriangleRay, Triangles};
 use super::shape::Shape;
 use crate::ray::Ray;
@@ -95,11 +95,11 @@ impl Model {
         }
         let boxed = |triangle| Boxed::triangle(mesh.corners(triangle));
         let boxes: Vec<_> = (0..count).into_par_iter().with_min_len(1024).map(boxed).collect();
-        let mut triangles = Blocks::EMPTY;
-        let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| {
+        let mut packing = Packing::default();
+        let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| packing.add(kind, members));
+        let triangles = packing.pack(Kind::Triangle, |triangle| {
             // Each copy is a shape of its own.
-            let named = |&triangle: &u32| (Name { shape: u32::MAX, triangle }, mesh.corners(triangle));
-            Child::block(kind, triangles.push(members.iter().map(named)), members.len())
+            Some((Name { shape: u32::MAX, triangle }, mesh.corners(triangle)))
         });
         Ok(Self { hierarchy, triangles })
     }

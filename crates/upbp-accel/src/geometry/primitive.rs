@@ -1,6 +1,8 @@
 //! The primitives under the leaves of the hierarchy, and a ray's exact test against one.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
+
+use rayon::prelude::*;
 
 use super::axis_box::AxisBox;
 use super::build::Boxed;
@@ -61,18 +63,40 @@ pub(super) struct Named<B> {
 #[derive(Clone, Debug)]
 pub(super) struct Blocks<B>(pub(super) Vec<Named<B>>);
 
-impl<B: Block> Blocks<B> {
-    pub(super) const EMPTY: Self = Self(Vec::new());
+/// Primitives, by the blocks that they are going to be in.
+#[derive(Default)]
+pub(super) struct Packing {
+    members: Vec<u32>,
+    /// By kind.
+    blocks: [Vec<Range<usize>>; 4],
+}
 
-    /// Adds a block of up to eight primitives, returns its place.
-    pub(super) fn push(&mut self, primitives: impl Iterator<Item = (Name, B::Primitive)>) -> usize {
-        let mut named = Named { block: B::EMPTY, names: [Name::default(); WIDTH] };
-        for (lane, (name, primitive)) in primitives.enumerate() {
-            named.block.set(lane, primitive);
-            named.names[lane] = name;
-        }
-        self.0.push(named);
-        self.0.len() - 1
+impl Packing {
+    /// Adds a block of up to eight primitives of a kind.
+    pub(super) fn add(&mut self, kind: Kind, members: &[u32]) -> Child {
+        let start = self.members.len();
+        self.members.extend_from_slice(members);
+        let blocks = &mut self.blocks[kind as usize];
+        blocks.push(start..self.members.len());
+        Child::block(kind, blocks.len() - 1, members.len())
+    }
+
+    /// Fills the blocks of a kind.
+    pub(super) fn pack<B: Block>(
+        &self,
+        kind: Kind,
+        primitive: impl Fn(u32) -> Option<(Name, B::Primitive)> + Sync,
+    ) -> Blocks<B> {
+        let block = |members: &Range<usize>| {
+            let mut named = Named { block: B::EMPTY, names: [Name::default(); WIDTH] };
+            let primitives = self.members[members.clone()].iter().filter_map(|&index| primitive(index));
+            for (lane, (name, primitive)) in primitives.enumerate() {
+                named.block.set(lane, primitive);
+                named.names[lane] = name;
+            }
+            named
+        };
+        Blocks(self.blocks[kind as usize].par_iter().with_min_len(256).map(block).collect())
     }
 }
 
@@ -86,37 +110,27 @@ pub(super) struct Primitives {
 }
 
 impl Primitives {
-    pub(super) const EMPTY: Self =
-        Self { triangles: Blocks::EMPTY, quads: Blocks::EMPTY, spheres: Blocks::EMPTY, boxes: Blocks::EMPTY };
-
-    /// Makes a block of up to eight primitives of a kind.
-    pub(super) fn pack(
-        &mut self,
-        shapes: &[Shape],
-        kind: Kind,
-        names: impl ExactSizeIterator<Item = Name>,
-    ) -> Child {
-        let count = names.len();
-        let shape = |name: Name| &shapes[name.shape as usize];
-        let index = match kind {
-            Kind::Triangle => self.triangles.push(names.filter_map(|name| match shape(name) {
-                Shape::Mesh(mesh) => Some((name, mesh.corners(name.triangle))),
+    /// The blocks of a packing of all `names`.
+    pub(super) fn new(shapes: &[Shape], names: &[Name], packing: &Packing) -> Self {
+        let find = |index: u32| (names[index as usize], &shapes[names[index as usize].shape as usize]);
+        Self {
+            triangles: packing.pack(Kind::Triangle, |index| match find(index) {
+                (name, Shape::Mesh(mesh)) => Some((name, mesh.corners(name.triangle))),
                 _ => None,
-            })),
-            Kind::Quad => self.quads.push(names.filter_map(|name| match shape(name) {
-                Shape::Quad(quad) => Some((name, *quad)),
+            }),
+            quads: packing.pack(Kind::Quad, |index| match find(index) {
+                (name, Shape::Quad(quad)) => Some((name, *quad)),
                 _ => None,
-            })),
-            Kind::Sphere => self.spheres.push(names.filter_map(|name| match shape(name) {
-                Shape::Sphere(sphere) => Some((name, *sphere)),
+            }),
+            spheres: packing.pack(Kind::Sphere, |index| match find(index) {
+                (name, Shape::Sphere(sphere)) => Some((name, *sphere)),
                 _ => None,
-            })),
-            Kind::Box => self.boxes.push(names.filter_map(|name| match shape(name) {
-                Shape::Box(axis_box) => Some((name, *axis_box)),
+            }),
+            boxes: packing.pack(Kind::Box, |index| match find(index) {
+                (name, Shape::Box(axis_box)) => Some((name, *axis_box)),
                 _ => None,
-            })),
-        };
-        Child::block(kind, index, count)
+            }),
+        }
     }
 }
 

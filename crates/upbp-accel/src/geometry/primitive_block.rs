@@ -15,7 +15,7 @@ use super::triangle::RayShear;
 use crate::simd::{WIDTH, Wide};
 
 /// Up to eight primitives of a kind. What unused lanes hold is of no matter.
-pub(super) trait Block: Copy {
+pub(super) trait Block: Copy + Send {
     /// A primitive.
     type Primitive: Copy;
     /// Values of a ray that only tests of this kind need, computed once per ray.

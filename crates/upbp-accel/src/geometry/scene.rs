@@ -12,7 +12,7 @@ use super::hierarchy::{BlockRef, Hierarchy, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, SurfacePoint, Visit};
 use super::instances::{InstanceSearch, Instances};
 use super::lane_ray::{LaneRay, SlabRay};
-use super::primitive::{Name, Primitives, Probe};
+use super::primitive::{Name, Packing, Primitives, Probe};
 use super::shape::Shape;
 use super::sphere::Sphere;
 use crate::ray::Ray;
@@ -37,10 +37,9 @@ impl SceneGeometry {
             return Err(GeometryError::TooManyPrimitives { count: names.len() });
         }
         let boxes: Vec<_> = names.par_iter().with_min_len(1024).map(|name| name.boxed(&shapes)).collect();
-        let mut primitives = Primitives::EMPTY;
-        let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| {
-            primitives.pack(&shapes, kind, members.iter().map(|&index| names[index as usize]))
-        });
+        let mut packing = Packing::default();
+        let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| packing.add(kind, members));
+        let primitives = Primitives::new(&shapes, &names, &packing);
         let each = shapes.iter().map(Shape::aabb);
         let bounds = each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((Vec3::ZERO, Vec3::ZERO));
         let instances = Instances::of(&shapes)?;
