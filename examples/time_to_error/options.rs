@@ -63,7 +63,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FILE")]
     pub(crate) settings: Option<PathBuf>,
     /// Folder for the CSV file and the plots; it is made if it is not there
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "FOLDER", default_value = "out/errors")]
     pub(crate) out: PathBuf,
     /// Threads [default: one per core; at most 16 per core]
     #[arg(long, value_name = "T")]
