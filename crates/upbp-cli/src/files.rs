@@ -65,6 +65,25 @@ impl Images {
         write_png(&self.png, shown, ToneMapping::default())
     }
 
+    /// What to say of a PNG whose pixels are mostly too bright by more than a stop: a sky may be white.
+    pub(crate) fn too_bright(&self, image: &Image, tones: ToneMapping) -> Option<String> {
+        /// Where the median of the brightest channels would lie, as a part of white.
+        const MIDDLE: f32 = 0.5;
+        let darker = ToneMapping { exposure: tones.exposure - 1.0, ..tones };
+        let is_white = |pixel: &&[f32; 3]| darker.apply(**pixel).iter().any(|value| *value >= 1.0);
+        let (white, all) = (image.pixels.iter().filter(is_white).count(), image.pixels.len());
+        if 2 * white <= all {
+            return None;
+        }
+        let mut brightest: Vec<_> = image.pixels.iter().map(|&[r, g, b]| r.max(g).max(b)).collect();
+        let (_, median, _) = brightest.select_nth_unstable_by(all / 2, f32::total_cmp);
+        let stops = (MIDDLE / *median).log2().round().clamp(-20.0, 20.0);
+        let (percent, png) = (100 * white / all, self.png.display());
+        Some(format!(
+            "{percent} % of {png} are brighter than white by more than a stop: try --exposure {stops}"
+        ))
+    }
+
     /// The names of the files, for messages.
     pub(crate) fn names(&self) -> String {
         self.outputs().map(|file| file.path.display().to_string()).collect::<Vec<_>>().join(" and ")

@@ -74,6 +74,11 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     Failure::all(&failures)?;
     if !options.quiet {
         say(report.to_string().trim_end())?;
+        let too_bright =
+            |images: &Images| images.too_bright(&merged.film().image(), options.image.look.tones());
+        if let Some(hint) = options.image.output.as_ref().and_then(too_bright) {
+            say(&hint)?;
+        }
     }
     Ok(())
 }

@@ -180,6 +180,9 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
                 .to_owned()
         };
         say(&format!("{report}{wrote}"))?;
+        if let Some(hint) = images.too_bright(&state.film().image(), options.image.look.tones()) {
+            say(&hint)?;
+        }
     }
     if reason == StopReason::Cancelled {
         let kept = match &options.saving.state {

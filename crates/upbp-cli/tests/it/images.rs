@@ -141,6 +141,23 @@ fn the_picture_of_an_error_says_where_it_is_and_of_which_sign() {
 }
 
 #[test]
+fn a_png_that_is_mostly_white_comes_with_an_exposure_that_shows_it() {
+    let folder = folder("bright");
+    let bright = SMALL.replace("Point(position: (0, 3, 0), intensity: (5, 5, 5))", "Constant((20, 10, 5))");
+    fs::write(folder.join("scene.ron"), bright).expect("a writable folder");
+    let render = |more: &[&str]| {
+        let arguments = ["scene.ron", "--techniques", "pt", "--iterations", "1", "-o", "bright.png"];
+        let output = command("render", &folder, &[&arguments[..], more].concat()).output().expect("it runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let said = String::from_utf8(output.stdout).expect("text");
+        said.split_once("--exposure ").map(|(_, stops)| stops.trim().to_owned())
+    };
+    let stops = render(&[]).expect("most is white");
+    assert!(stops.parse::<f32>().is_ok_and(|stops| stops < -2.0), "{stops}");
+    assert_eq!(render(&["--exposure", &stops]), None);
+}
+
+#[test]
 fn exposure_and_tone_change_the_png_and_nothing_else() {
     let folder = folder("tones");
     fs::write(folder.join("scene.ron"), SMALL.replace("(5, 5, 5)", "(200, 100, 50)"))
