@@ -42,19 +42,21 @@ impl Images {
         exr.into_iter().chain([Output { role, path: &self.png, content: Content::Png }])
     }
 
-    /// Writes a render with all its layers.
+    /// Writes a render with all its layers; returns a hint if the PNG shows little of it.
     pub(crate) fn write_render(
         &self,
         state: &State,
         report: &Report,
         tones: ToneMapping,
-    ) -> Result<(), OutputError> {
+    ) -> Result<Option<String>, OutputError> {
         if let Some(path) = &self.exr {
             let identity = state.identity();
             let metadata = Metadata { scene: &identity.scene, settings: &identity.settings, report };
             write_exr(path, state.film(), &metadata)?;
         }
-        write_png(&self.png, &state.film().image(), tones)
+        let image = state.film().image();
+        write_png(&self.png, &image, tones)?;
+        Ok(self.too_bright(&image, tones))
     }
 
     /// Writes an image, and another one to look at.
@@ -65,8 +67,8 @@ impl Images {
         write_png(&self.png, shown, ToneMapping::default())
     }
 
-    /// What to say of a PNG whose pixels are mostly too bright by more than a stop: a sky may be white.
-    pub(crate) fn too_bright(&self, image: &Image, tones: ToneMapping) -> Option<String> {
+    /// A hint for a PNG whose pixels are mostly too bright by more than a stop: a sky may be white.
+    fn too_bright(&self, image: &Image, tones: ToneMapping) -> Option<String> {
         /// Where the median of the brightest channels would lie, as a part of white.
         const MIDDLE: f32 = 0.5;
         let darker = ToneMapping { exposure: tones.exposure - 1.0, ..tones };

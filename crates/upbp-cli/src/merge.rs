@@ -65,8 +65,10 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     if let Some(path) = &options.state {
         attempt(merged.save(path));
     }
+    let mut hint = None;
     if let Some(images) = &options.image.output {
-        attempt(images.write_render(&merged, &report, options.image.look.tones()));
+        let written = images.write_render(&merged, &report, options.image.look.tones());
+        attempt(written.map(|found| hint = found));
     }
     if let Some(path) = &options.report {
         attempt(files::write_report(&report, path));
@@ -74,9 +76,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     Failure::all(&failures)?;
     if !options.quiet {
         say(report.to_string().trim_end())?;
-        let too_bright =
-            |images: &Images| images.too_bright(&merged.film().image(), options.image.look.tones());
-        if let Some(hint) = options.image.output.as_ref().and_then(too_bright) {
+        if let Some(hint) = hint {
             say(&hint)?;
         }
     }

@@ -57,7 +57,6 @@ fn of_lamps_that_are_alike_none_is_left_to_chance() {
     let scene = opal_lamps();
     for seed in 0..6 {
         let shares = shares(&scene, seed);
-        println!("{seed}: {shares:.3?}");
         let lamps = &shares[1..];
         assert_eq!(lamps.len(), 3);
         assert!(lamps.iter().all(|&share| share > 0.1), "{seed}: {shares:?}");

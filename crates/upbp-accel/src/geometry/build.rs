@@ -131,7 +131,7 @@ struct Subtree {
     uniform: Option<(Kind, u32)>,
 }
 
-/// What a binary node and all below it become at the least cost.
+/// The form that a binary node and all below it take at the least cost.
 #[derive(Clone, Copy)]
 struct Choice {
     /// Of two, three, ... eight children of a wide node, those that the left half gets; zero: one fewer is as
@@ -171,9 +171,9 @@ impl Binary<'_> {
         &self.members[group.members.clone()]
     }
 
-    /// What each node becomes.
+    /// The choice for every node.
     fn choices(&self) -> Vec<Choice> {
-        let whole = surface_area(self.tree.nodes[0].aabb()).max(f64::MIN_POSITIVE);
+        let whole = half_area(self.tree.nodes[0].aabb()).max(f64::MIN_POSITIVE);
         let (mut above, mut roots) = (Vec::new(), vec![0]);
         while roots.len() < PIECES && roots.iter().any(|&root| self.halves(root).is_some()) {
             let mut below = Vec::new();
@@ -205,7 +205,7 @@ impl Binary<'_> {
         choices
     }
 
-    /// The subtree at a node, and what those in it become that are no leaves.
+    /// The subtree at a node, and the choices for all in it that are no leaves.
     fn choices_below(&self, root: u32, whole: f64) -> (Subtree, Vec<(u32, Choice)>) {
         let (mut order, mut waiting) = (Vec::new(), vec![root]);
         while let Some(index) = waiting.pop() {
@@ -229,6 +229,7 @@ impl Binary<'_> {
         (done[0], choices)
     }
 
+    /// The subtree that a leaf is.
     fn leaf(&self, index: u32, whole: f64) -> Subtree {
         let members = self.members_of(index);
         let kind = self.boxes[members[0] as usize].kind;
@@ -275,12 +276,12 @@ impl Binary<'_> {
 
     /// Surface area of a node's box, as a part of `whole`.
     fn area(&self, index: u32, whole: f64) -> f32 {
-        (surface_area(self.tree.nodes[index as usize].aabb()) / whole) as f32
+        (half_area(self.tree.nodes[index as usize].aabb()) / whole) as f32
     }
 }
 
 /// Half of the surface area of a box.
-fn surface_area(aabb: &Aabb) -> f64 {
+fn half_area(aabb: &Aabb) -> f64 {
     let size = aabb.max.as_dvec3() - aabb.min.as_dvec3();
     size.x * size.y + size.y * size.z + size.z * size.x
 }

@@ -165,8 +165,10 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
     let (report, images) = (state.report(), options.images());
     // Before the first pixels there is no picture.
     let rendered = !state.film().is_empty();
+    let mut hint = None;
     if rendered {
-        attempt(images.write_render(state, &report, options.image.look.tones()));
+        let written = images.write_render(state, &report, options.image.look.tones());
+        attempt(written.map(|found| hint = found));
     }
     if let Some(path) = &options.messages.report {
         attempt(files::write_report(&report, path));
@@ -180,7 +182,7 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
                 .to_owned()
         };
         say(&format!("{report}{wrote}"))?;
-        if let Some(hint) = images.too_bright(&state.film().image(), options.image.look.tones()) {
+        if let Some(hint) = hint {
             say(&hint)?;
         }
     }
