@@ -1,5 +1,7 @@
 //! Light vertices and photon beams of an iteration, in trees for the queries of camera sub-paths.
 
+use std::hint::black_box;
+
 use upbp_accel::{PointTree, SegmentTree, SplitParams};
 use upbp_media::Lanes;
 
@@ -56,6 +58,15 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
             medium: PointTree::build(Vec::new()),
             beam_tree: SegmentTree::build(Vec::new(), SplitParams::default()),
         }
+    }
+
+    /// Reads a vertex that is about to be merged, so that it is in the cache by then: fields in each of the
+    /// three lines that it lies in.
+    #[inline(always)]
+    pub(crate) fn read_ahead(&self, index: u32) {
+        let vertex = &self.vertices[index as usize];
+        let is_surface = matches!(vertex.interaction, Interaction::Surface(_));
+        black_box((is_surface, vertex.mis.distance_factor, vertex.path));
     }
 
     /// Bytes that the map occupies.

@@ -67,9 +67,18 @@ impl<P: Copy + Send + Sync> PointTree<P> {
     /// Visits every point nearer than `radius` to `centre`, in scene units; `visit` gets the payload and the
     /// squared distance.
     pub fn in_ball(&self, centre: Vec3, radius: f32, visit: impl FnMut(P, f32)) {
+        self.in_ball_ahead(centre, radius, |_| {}, visit);
+    }
+
+    /// [`in_ball`](Self::in_ball) that says ahead what it will visit: `ahead` gets the payloads of some dozen
+    /// points before the first of them is visited.
+    ///
+    /// Where payloads are indices, `ahead` may [read](std::hint::black_box) what they refer to: reads that
+    /// miss the cache then wait together.
+    pub fn in_ball_ahead(&self, centre: Vec3, radius: f32, ahead: impl Fn(P), visit: impl FnMut(P, f32)) {
         if radius > 0.0 {
             let ball = Ball::exact(centre, radius);
-            self.tree.search(ball, InBall { centre, radius2: radius * radius, visit });
+            self.tree.search(ball, InBall { centre, radius2: radius * radius, ahead, visit });
         }
     }
 
@@ -78,28 +87,41 @@ impl<P: Copy + Send + Sync> PointTree<P> {
     /// `visit` gets the payload, the distance along the ray to the foot of the perpendicular, in `[t_min,
     /// t_max)`, and the squared distance between foot and point, in scene units.
     pub fn around_ray(&self, ray: &Ray, radius: impl Into<SearchRadius>, visit: impl FnMut(P, f32, f32)) {
+        self.around_ray_ahead(ray, radius, |_| {}, visit);
+    }
+
+    /// [`around_ray`](Self::around_ray) that says ahead what it will visit, as
+    /// [`in_ball_ahead`](Self::in_ball_ahead) does.
+    pub fn around_ray_ahead(
+        &self,
+        ray: &Ray,
+        radius: impl Into<SearchRadius>,
+        ahead: impl Fn(P),
+        visit: impl FnMut(P, f32, f32),
+    ) {
         match radius.into() {
-            SearchRadius::Constant(radius) => self.within(ray, radius, visit),
-            SearchRadius::Growing(radius) => self.within(ray, GrowingAlong::new(&radius, ray), visit),
+            SearchRadius::Constant(radius) => self.within(ray, radius, ahead, visit),
+            SearchRadius::Growing(radius) => self.within(ray, GrowingAlong::new(&radius, ray), ahead, visit),
         }
     }
 
-    fn within(&self, ray: &Ray, radius: impl RadiusAlong, visit: impl FnMut(P, f32, f32)) {
+    fn within(&self, ray: &Ray, radius: impl RadiusAlong, ahead: impl Fn(P), visit: impl FnMut(P, f32, f32)) {
         if radius.largest() > 0.0 {
             let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin));
-            self.tree.search(region, AroundRay { ray: *ray, radius, visit });
+            self.tree.search(region, AroundRay { ray: *ray, radius, ahead, visit });
         }
     }
 }
 
 /// Points nearer than a radius to a centre; finds squared distances.
-struct InBall<V> {
+struct InBall<A, V> {
     centre: Vec3,
     radius2: f32,
+    ahead: A,
     visit: V,
 }
 
-impl<P: Copy, V: FnMut(P, f32)> Query<Block<P>> for InBall<V> {
+impl<P: Copy, A: Fn(P), V: FnMut(P, f32)> Query<Block<P>> for InBall<A, V> {
     type Found = [f32; WIDTH];
 
     #[inline(always)]
@@ -110,19 +132,25 @@ impl<P: Copy, V: FnMut(P, f32)> Query<Block<P>> for InBall<V> {
     }
 
     #[inline(always)]
+    fn announce(&self, block: &Block<P>, lane: usize) {
+        (self.ahead)(block.payload[lane]);
+    }
+
+    #[inline(always)]
     fn report(&mut self, block: &Block<P>, distance2: &Self::Found, lane: usize) {
         (self.visit)(block.payload[lane], distance2[lane]);
     }
 }
 
 /// Points nearer than a radius to a ray; finds distances along it and squared distances from it.
-struct AroundRay<R, V> {
+struct AroundRay<R, A, V> {
     ray: Ray,
     radius: R,
+    ahead: A,
     visit: V,
 }
 
-impl<P: Copy, R: RadiusAlong, V: FnMut(P, f32, f32)> Query<Block<P>> for AroundRay<R, V> {
+impl<P: Copy, R: RadiusAlong, A: Fn(P), V: FnMut(P, f32, f32)> Query<Block<P>> for AroundRay<R, A, V> {
     type Found = [[f32; WIDTH]; 2];
 
     #[inline(always)]
@@ -135,6 +163,11 @@ impl<P: Copy, R: RadiusAlong, V: FnMut(P, f32, f32)> Query<Block<P>> for AroundR
             & wide.less_equal(wide.splat(self.ray.t_min), t)
             & wide.less(t, wide.splat(self.ray.t_max));
         (inside, [t, distance2].map(|lanes| wide.store(lanes)))
+    }
+
+    #[inline(always)]
+    fn announce(&self, block: &Block<P>, lane: usize) {
+        (self.ahead)(block.payload[lane]);
     }
 
     #[inline(always)]

@@ -1,5 +1,7 @@
 //! Look-ups of points equal a test of every point.
 
+use std::cell::RefCell;
+
 use crate::support::{Random, SCALES_AND_PLACES, SPREADS, any_direction, any_ray, positions};
 use glam::Vec3;
 use proptest::prelude::*;
@@ -13,8 +15,13 @@ fn tree(points: &[Vec3]) -> PointTree<u32> {
 }
 
 fn ball(tree: &PointTree<u32>, centre: Vec3, radius: f32) -> Hits {
-    let mut hits = Vec::new();
-    tree.in_ball(centre, radius, |index, distance2| hits.push((index, distance2.to_bits(), 0)));
+    let (mut hits, announced) = (Hits::new(), RefCell::new(Vec::new()));
+    let ahead = |index| announced.borrow_mut().push(index);
+    tree.in_ball_ahead(centre, radius, ahead, |index, distance2| {
+        assert_eq!(announced.borrow()[hits.len()], index, "said before it is visited, in the same order");
+        hits.push((index, distance2.to_bits(), 0));
+    });
+    assert_eq!(announced.borrow().len(), hits.len());
     hits.sort_unstable();
     hits
 }
@@ -25,8 +32,13 @@ fn brute_ball(points: &[Vec3], centre: Vec3, radius: f32) -> Hits {
 }
 
 fn around(tree: &PointTree<u32>, ray: &Ray, radius: f32) -> Hits {
-    let mut hits = Vec::new();
-    tree.around_ray(ray, radius, |index, t, distance2| hits.push((index, t.to_bits(), distance2.to_bits())));
+    let (mut hits, announced) = (Hits::new(), RefCell::new(Vec::new()));
+    let ahead = |index| announced.borrow_mut().push(index);
+    tree.around_ray_ahead(ray, radius, ahead, |index, t, distance2| {
+        assert_eq!(announced.borrow()[hits.len()], index, "said before it is visited, in the same order");
+        hits.push((index, t.to_bits(), distance2.to_bits()));
+    });
+    assert_eq!(announced.borrow().len(), hits.len());
     hits.sort_unstable();
     hits
 }

@@ -23,7 +23,8 @@ pub(crate) fn pb2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Pb2d) {
         out.observer.enter_technique(Some(Technique::Pb2d));
         let radius = plan.radius_field.search_radius(kernel.radius());
-        map.medium.around_ray(&beam, radius, |index, t, distance2| {
+        let ahead = |index| map.read_ahead(index);
+        map.medium.around_ray_ahead(&beam, radius, ahead, |index, t, distance2| {
             let scale = plan.radius_field.at(beam.at(t));
             let kernel = kernel.scaled(scale).value(distance2);
             let photon = &map.vertices[index as usize];

@@ -24,7 +24,8 @@ pub(crate) fn pp3d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     }
     let kernel = plan.kernels.pp3d.scaled(vertex.scale);
     out.observer.enter_technique(Some(Technique::Pp3d));
-    map.medium.in_ball(vertex.position, kernel.radius(), |index, distance2| {
+    let ahead = |index| map.read_ahead(index);
+    map.medium.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
         let photon = &map.vertices[index as usize];
         if matches!(photon.interaction, Interaction::Medium(other) if other == medium)
             && plan.lengths.contain(vertex.depth + photon.depth)

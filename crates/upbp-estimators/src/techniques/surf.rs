@@ -29,7 +29,8 @@ pub(crate) fn surf<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let plan = context.plan;
     let kernel = plan.kernels.surf.scaled(vertex.scale);
     out.observer.enter_technique(Some(Technique::Surf));
-    map.surface.in_ball(vertex.position, kernel.radius(), |index, distance2| {
+    let ahead = |index| map.read_ahead(index);
+    map.surface.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
         let photon = &map.vertices[index as usize];
         if plan.lengths.contain(vertex.depth + photon.depth)
             && lies_on(surface, vertex, photon, kernel.radius())
