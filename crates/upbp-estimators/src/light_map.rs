@@ -62,7 +62,7 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
 
     /// Reads a vertex that is about to be merged, so that it is in the cache by then: fields in each of the
     /// three lines that it lies in.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn read_ahead(&self, index: u32) {
         let vertex = &self.vertices[index as usize];
         let is_surface = matches!(vertex.interaction, Interaction::Surface(_));

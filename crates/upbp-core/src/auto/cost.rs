@@ -15,8 +15,13 @@ use crate::plan::Plan;
 const NS_PER_EDGE: f64 = 300.0;
 /// Part of a camera edge's time if no query beam has to know what is beyond the end of the edge.
 const SHORT: f64 = 0.85;
-/// Nanoseconds of a call of each technique.
-const NS_PER_CALL: ByTechnique<f64> = [0.0, 220.0, 330.0, 150.0, 110.0, 110.0, 250.0, 200.0, 270.0];
+/// Nanoseconds of a call of each technique; of a query, among as many photons or beams as
+/// [`USUAL_PHOTONS`] and [`USUAL_BEAMS`] say.
+const NS_PER_CALL: ByTechnique<f64> = [0.0, 220.0, 330.0, 150.0, 110.0, 110.0, 260.0, 200.0, 450.0];
+/// Light vertices among which a query takes the time of the table.
+const USUAL_PHOTONS: f64 = 65_536.0;
+/// The same of beams.
+const USUAL_BEAMS: f64 = 4096.0;
 /// Nanoseconds of a sample that a call of each technique finds.
 const NS_PER_SAMPLE: ByTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 70.0, 90.0, 150.0, 200.0, 215.0];
 /// Nanoseconds of storing a light vertex.
@@ -66,7 +71,7 @@ impl<'a> Cost<'a> {
         let mut camera = NS_PER_PIXEL + work.camera_edges[roulette] * NS_PER_EDGE * beyond;
         for technique in plan.techniques.without(light_tracing).iter() {
             let i = technique as usize;
-            let calls = work.calls[i][roulette] * NS_PER_CALL[i] * self.depth(technique, plan);
+            let calls = work.calls[i][roulette] * NS_PER_CALL[i] * self.growth(technique, plan);
             let samples = self.0.relative_photons(technique, plan) * work.samples[i][roulette];
             camera += plan.active_part(technique) * (calls + samples * NS_PER_SAMPLE[i]);
         }
@@ -86,15 +91,18 @@ impl<'a> Cost<'a> {
         self.0.pixels * camera + light_paths * light + beam_paths * work.beams * NS_PER_TREE_BEAM
     }
 
-    /// Time of a call among the photons or beams of a plan over that among those of the pilot render's plan:
-    /// by the depth of their tree.
-    fn depth(self, technique: Technique, plan: &Plan) -> f64 {
-        let per_path = match technique {
-            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => return 1.0,
-            Technique::Surf | Technique::Pp3d | Technique::Pb2d => self.0.work.vertices,
-            Technique::Bp2d | Technique::Bb1d => self.0.work.beams,
-        };
-        let levels = |plan: &Plan| (2.0 + f64::from(plan.paths_of(technique)) * per_path).ln();
-        levels(plan) / levels(&self.0.plan)
+    /// Time of a call among the photons or beams of a plan over that of the table: by the depth of their
+    /// tree, and for points around a query beam by the number of boxes that a line through the tree meets,
+    /// most of which hold nothing that is near; in small trees these are about the same.
+    fn growth(self, technique: Technique, plan: &Plan) -> f64 {
+        let paths = f64::from(plan.paths_of(technique));
+        let (photons, beams) = (paths * self.0.work.vertices, paths * self.0.work.beams);
+        let levels = |count: f64, usual: f64| (2.0 + count).ln() / (2.0 + usual).ln();
+        match technique {
+            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 1.0,
+            Technique::Surf | Technique::Pp3d => levels(photons, USUAL_PHOTONS),
+            Technique::Pb2d => (photons / USUAL_PHOTONS).cbrt().max(1.0),
+            Technique::Bp2d | Technique::Bb1d => levels(beams, USUAL_BEAMS),
+        }
     }
 }
