@@ -60,8 +60,8 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
         }
     }
 
-    /// Reads a vertex that is about to be merged, so that it is in the cache by then: fields in each of the
-    /// three lines that it lies in.
+    /// Reads a vertex that is about to be merged, so that it is in the cache by then: fields that the
+    /// compiler lays out in different lines.
     #[inline]
     pub(crate) fn read_ahead(&self, index: u32) {
         let vertex = &self.vertices[index as usize];

@@ -70,7 +70,7 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         self.in_ball_ahead(centre, radius, |_| {}, visit);
     }
 
-    /// [`in_ball`](Self::in_ball) that says ahead what it will visit: `ahead` gets the payloads of some dozen
+    /// [`in_ball`](Self::in_ball) that says ahead what it will visit: `ahead` gets the payloads of a batch of
     /// points before the first of them is visited.
     ///
     /// Where payloads are indices, `ahead` may [read](std::hint::black_box) what they refer to: reads that
@@ -131,6 +131,8 @@ impl<P: Copy, A: Fn(P), V: FnMut(P, f32)> Query<Block<P>> for InBall<A, V> {
         (wide.less(distance2, wide.splat(self.radius2)), wide.store(distance2))
     }
 
+    const ANNOUNCES: bool = true;
+
     #[inline(always)]
     fn announce(&self, block: &Block<P>, lane: usize) {
         (self.ahead)(block.payload[lane]);
@@ -164,6 +166,8 @@ impl<P: Copy, R: RadiusAlong, A: Fn(P), V: FnMut(P, f32, f32)> Query<Block<P>> f
             & wide.less(t, wide.splat(self.ray.t_max));
         (inside, [t, distance2].map(|lanes| wide.store(lanes)))
     }
+
+    const ANNOUNCES: bool = true;
 
     #[inline(always)]
     fn announce(&self, block: &Block<P>, lane: usize) {

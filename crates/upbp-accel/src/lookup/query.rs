@@ -21,6 +21,9 @@ pub(super) trait Query<B> {
     /// The items of a block that are wanted, one bit per lane.
     fn test<W: Wide>(&self, wide: W, block: &B) -> (u32, Self::Found);
 
+    /// Whether wanted items are announced.
+    const ANNOUNCES: bool = false;
+
     /// Hears of a wanted item before any of its list is reported, so that what reports will read can be
     /// fetched for all of them at the same time.
     #[inline(always)]
@@ -100,10 +103,12 @@ impl<L: Boxes, B, R: Region, Q: Query<B>> Traversal<'_, L, B, R, Q> {
         for ((wanted, found), &block) in wanted.iter_mut().zip(&mut found).zip(blocks) {
             (*wanted, *found) = self.query.test(wide, &tree.blocks[block as usize]);
         }
-        for (&wanted, &block) in wanted.iter().zip(blocks) {
-            let block = &tree.blocks[block as usize];
-            for lane in set_lanes(wanted) {
-                self.query.announce(block, lane);
+        if Q::ANNOUNCES {
+            for (&wanted, &block) in wanted.iter().zip(blocks) {
+                let block = &tree.blocks[block as usize];
+                for lane in set_lanes(wanted) {
+                    self.query.announce(block, lane);
+                }
             }
         }
         for ((&wanted, found), &block) in wanted.iter().zip(&found).zip(blocks) {
