@@ -21,10 +21,19 @@ const MOST_SPLITS: u8 = 20;
 const SHARES: u16 = 4096;
 /// The least share of a half.
 const LEAST_SHARE: u16 = 4;
-/// Bins per axis by which a cell is judged.
+/// Bins per axis by which a cell is judged along one axis.
 const BINS: usize = 8;
+/// Bins per axis by which a cell is judged over both axes of a pair.
+const COARSE_BINS: usize = 4;
 /// Concentration of the light in the bins of a cell, 1 if it is even, from which on the cell is split.
 const UNEVEN: f64 = 1.15;
+/// Part of the light of a sample that is spread around it, and the number of places that get it.
+const SPREAD: f64 = 0.5;
+const SPREAD_PLACES: usize = 3;
+/// Steps of a sequence that fills the unit hypercube evenly (Roberts 2018): powers of one over the root of
+/// `x⁵ = x + 1`.
+const SPREAD_STEPS: [f64; AXES] =
+    [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_809, 0.538_597_257_223_610];
 
 /// A start of a light sub-path with the light that it brought to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,11 +75,53 @@ impl EmissionGuide {
     pub fn fit(samples: &[EmissionSample], axes: [bool; 4]) -> Option<Self> {
         let mut samples: Vec<_> =
             samples.iter().filter(|sample| sample.light > 0.0 && sample.light.is_finite()).copied().collect();
+        let cells = Self::grow(&mut samples, axes)?;
+        // What lies beside the cells of the few samples there are would be bright and rare.
+        Self::grow(&mut cells.spread(&samples, axes), axes)
+    }
+
+    /// The guide to just these samples.
+    fn grow(samples: &mut [EmissionSample], axes: [bool; 4]) -> Option<Self> {
         let total: f64 = samples.iter().map(|sample| sample.light).sum();
         let mut fit = Fit { nodes: Vec::new(), axes, total };
         let cell = Cell { low: [0.0; AXES], splits: [0; AXES] };
-        (total > 0.0 && total.is_finite()).then(|| fit.grow(cell, &mut samples));
+        (total > 0.0 && total.is_finite()).then(|| fit.grow(cell, samples));
         (fit.nodes.len() > 1).then_some(Self { nodes: fit.nodes })
+    }
+
+    /// The samples with a part of their light spread around them, as far as the cell of each is wide.
+    fn spread(&self, samples: &[EmissionSample], axes: [bool; 4]) -> Vec<EmissionSample> {
+        let own =
+            samples.iter().map(|sample| EmissionSample { light: (1.0 - SPREAD) * sample.light, ..*sample });
+        let around = samples.iter().enumerate().flat_map(|(index, sample)| {
+            let widths = self.cell_at(sample.at).widths();
+            let light = SPREAD / SPREAD_PLACES as f64 * sample.light;
+            (0..SPREAD_PLACES).map(move |place| {
+                let number = (index * SPREAD_PLACES + place) as f64;
+                let at = std::array::from_fn(|axis| {
+                    if !axes[axis] {
+                        return sample.at[axis];
+                    }
+                    let offset = 2.0 * (number * SPREAD_STEPS[axis]).fract() - 1.0;
+                    mirrored(f64::from(sample.at[axis]) + offset * f64::from(widths[axis]))
+                });
+                EmissionSample { at, light }
+            })
+        });
+        own.chain(around).collect()
+    }
+
+    /// The cell at random numbers.
+    fn cell_at(&self, at: [f32; 4]) -> Cell {
+        let mut cell = Cell { low: [0.0; AXES], splits: [0; AXES] };
+        let mut index = 0;
+        while !self.nodes[index].is_leaf() {
+            let node = self.nodes[index];
+            let [lower, upper] = cell.halves(node.0 as usize);
+            let is_lower = at[node.0 as usize] < upper.low[node.0 as usize];
+            (cell, index) = if is_lower { (lower, index + 1) } else { (upper, node.1 as usize) };
+        }
+        cell
     }
 
     /// Maps uniform random numbers to guided ones; returns the guided density there, relative to uniform.
@@ -154,8 +205,21 @@ impl Cell {
         0.5_f32.powi(i32::from(self.splits[axis]))
     }
 
+    fn widths(&self) -> [f32; AXES] {
+        std::array::from_fn(|axis| self.width(axis))
+    }
+
     fn volume(&self) -> f64 {
-        (0..AXES).map(|axis| f64::from(self.width(axis))).product()
+        self.widths().iter().map(|width| f64::from(*width)).product()
+    }
+
+    /// The lower and the upper half along an axis.
+    fn halves(&self, axis: usize) -> [Self; 2] {
+        let mut lower = *self;
+        lower.splits[axis] += 1;
+        let mut upper = lower;
+        upper.low[axis] += lower.width(axis);
+        [lower, upper]
     }
 }
 
@@ -175,14 +239,10 @@ impl Fit {
         let Some(axis) = self.axis_to_split(&cell, samples, light) else {
             return DEFENSIVE * cell.volume() + (1.0 - DEFENSIVE) * light / self.total;
         };
-        let half = 0.5 * cell.width(axis);
-        let middle = cell.low[axis] + half;
-        samples.sort_unstable_by(|a, b| a.at[axis].total_cmp(&b.at[axis]));
-        let (below, above) = samples.split_at_mut(samples.partition_point(|sample| sample.at[axis] < middle));
-        let mut lower = cell;
-        lower.splits[axis] += 1;
-        let mut upper = lower;
-        upper.low[axis] = middle;
+        let [lower, upper] = cell.halves(axis);
+        samples.sort_unstable_by_key(|sample| sample.at[axis] >= upper.low[axis]);
+        let below = samples.partition_point(|sample| sample.at[axis] < upper.low[axis]);
+        let (below, above) = samples.split_at_mut(below);
         let lower = self.grow(lower, below);
         let start = self.nodes.len() as u32;
         let upper = self.grow(upper, above);
@@ -198,23 +258,66 @@ impl Fit {
         }
         let squares: f64 = samples.iter().map(|sample| sample.light * sample.light).sum();
         let effective = light * light / squares;
-        let concentration = |axis: usize| {
-            let mut bins = [0.0; BINS];
-            for sample in samples {
-                let place = (sample.at[axis] - cell.low[axis]) / cell.width(axis) * BINS as f32;
-                bins[(place as usize).min(BINS - 1)] += sample.light / light;
-            }
-            BINS as f64 * bins.iter().map(|bin| bin * bin).sum::<f64>()
-        };
         // Even light in few samples has a concentration of its own.
-        let least = UNEVEN + 2.0 * (BINS - 1) as f64 / effective;
-        (0..AXES)
-            .filter(|&axis| self.axes[axis] && cell.splits[axis] < MOST_SPLITS)
-            .map(|axis| (axis, concentration(axis)))
-            .filter(|(_, concentration)| *concentration > least)
+        let least = |bins: usize| UNEVEN + 2.0 * (bins - 1) as f64 / effective;
+        let splits = |pair: usize| {
+            let axes = [2 * pair, 2 * pair + 1];
+            let shares = shares(cell, samples, axes, light);
+            let along = [
+                shares.map(|row| row.iter().sum()),
+                std::array::from_fn(|column| shares.iter().map(|row| row[column]).sum::<f64>()),
+            ];
+            // Light on a slope may be even along both axes.
+            let is_uneven = concentration(&coarse(&shares)) > least(COARSE_BINS * COARSE_BINS);
+            let along = along.map(|shares| concentration(&shares));
+            std::iter::zip(axes, along)
+                .filter(|(axis, _)| cell.splits[*axis] < MOST_SPLITS)
+                .filter(move |(_, concentration)| is_uneven || *concentration > least(BINS))
+        };
+        [0, 1]
+            .into_iter()
+            .filter(|pair| self.axes[2 * pair])
+            .flat_map(splits)
             .max_by(|a, b| a.1.total_cmp(&b.1))
             .map(|(axis, _)| axis)
     }
+}
+
+/// Shares of the light of a cell in bins over two axes.
+fn shares(cell: &Cell, samples: &[EmissionSample], axes: [usize; 2], light: f64) -> [[f64; BINS]; BINS] {
+    let mut shares = [[0.0; BINS]; BINS];
+    for sample in samples {
+        let [row, column] = axes.map(|axis| {
+            let place = (sample.at[axis] - cell.low[axis]) / cell.width(axis) * BINS as f32;
+            (place as usize).min(BINS - 1)
+        });
+        shares[row][column] += sample.light / light;
+    }
+    shares
+}
+
+/// The same in larger bins.
+fn coarse(shares: &[[f64; BINS]; BINS]) -> [f64; COARSE_BINS * COARSE_BINS] {
+    const SIDE: usize = BINS / COARSE_BINS;
+    let mut sums = [0.0; COARSE_BINS * COARSE_BINS];
+    for (row, shares) in shares.iter().enumerate() {
+        for (column, share) in shares.iter().enumerate() {
+            sums[row / SIDE * COARSE_BINS + column / SIDE] += share;
+        }
+    }
+    sums
+}
+
+/// How unequal shares of a whole are: 1 if all are alike, their number if all is in one.
+fn concentration(shares: &[f64]) -> f64 {
+    shares.len() as f64 * shares.iter().map(|share| share * share).sum::<f64>()
+}
+
+/// A number beyond the ends of the unit interval, mirrored there; it is less than one away from them.
+fn mirrored(number: f64) -> f32 {
+    let number = number.abs();
+    let within = if number < 1.0 { number } else { 2.0 - number };
+    (within as f32).min(1.0_f32.next_down())
 }
 
 #[cfg(test)]
@@ -289,6 +392,50 @@ mod tests {
                 .count();
             assert!(hits > 400, "{hits} of 1000");
             assert!(guide.nodes.len() < 500, "{}", guide.nodes.len());
+        }
+    }
+
+    /// Along a diagonal every part of an axis has as much light as any other.
+    #[test]
+    fn light_on_a_slope_is_found() {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
+        let axes = [true, true, false, false];
+        let on_slope = |random: &mut Xoshiro256PlusPlus| {
+            let [along, across, ..] = uniform(random);
+            [along, (along + 0.04 * across).fract(), 0.5, 0.5]
+        };
+        let samples: Vec<_> =
+            (0..1000).map(|_| EmissionSample { at: on_slope(&mut random), light: 1.0 }).collect();
+        let guide = EmissionGuide::fit(&samples, axes).expect("uneven light");
+        let logarithms: f32 = (0..1000).map(|_| guide.density(on_slope(&mut random)).ln()).sum();
+        // 13 with cells as narrow as the light.
+        let gain = (logarithms / 1000.0).exp();
+        assert!(gain > 4.0, "{gain}");
+    }
+
+    /// A slanted window of which few starts are known: what these have missed is bright and rare.
+    #[test]
+    fn no_part_of_what_was_met_is_left_out() {
+        let axes = [true, true, false, false];
+        for seed in 0..20 {
+            let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let in_window = |random: &mut Xoshiro256PlusPlus| {
+                let [u, v, ..] = uniform(random);
+                [0.31 + 0.06 * u + 0.03 * v, 0.57 + 0.1 * v - 0.02 * u, 0.5, 0.5]
+            };
+            let samples: Vec<_> =
+                (0..200).map(|_| EmissionSample { at: in_window(&mut random), light: 1.0 }).collect();
+            let guide = EmissionGuide::fit(&samples, axes).expect("uneven light");
+            let mut densities: Vec<_> = (0..2000).map(|_| guide.density(in_window(&mut random))).collect();
+            densities.sort_unstable_by(f32::total_cmp);
+            let [rarest, usual] = [0, 1000].map(|index| f64::from(densities[index]));
+            // The second moment of light that is even in the window, 1 if all of it had the usual density.
+            // Guides to nothing but the samples have 1.6 to 4.2 and a hundredth of the usual density.
+            let moment = usual * densities.iter().map(|q| f64::from(*q).recip()).sum::<f64>() / 2000.0;
+            assert!(
+                usual > 20.0 && rarest > 0.05 * usual && moment < 1.5,
+                "{seed}: {rarest}, {usual}, {moment}"
+            );
         }
     }
 

@@ -214,6 +214,26 @@ impl IterationPlan {
         Self { light_paths, beam_paths: beam_paths.min(self.beam_paths).min(light_paths), ..self.clone() }
     }
 
+    /// The iteration with other numbers of light sub-paths, for runs that ask where light goes. Weights stay
+    /// those of the whole number, and with fewer light sub-paths kernels are so much wider, within limits,
+    /// that photon points are merged as often: what is found is blurred instead of rare.
+    #[must_use]
+    pub fn blurred(&self, light_paths: u32, beam_paths: u32) -> Self {
+        /// The most times that a radius grows.
+        const WIDEST: f32 = 10.0;
+        let fewer = (self.light_paths as f32 / light_paths.max(1) as f32).max(1.0);
+        let [square, cube] = [fewer.sqrt(), fewer.cbrt()].map(|factor| factor.min(WIDEST));
+        let Kernels { surf, pp3d, pb2d, bp2d, bb1d } = self.kernels;
+        let kernels = Kernels {
+            surf: surf.scaled(square),
+            pp3d: pp3d.scaled(cube),
+            pb2d: pb2d.scaled(square),
+            bp2d,
+            bb1d,
+        };
+        Self { light_paths, beam_paths: beam_paths.min(light_paths), kernels, ..self.clone() }
+    }
+
     /// Whether vertices of light sub-paths are stored, for connections or merges.
     #[must_use]
     pub fn stores_vertices(&self) -> bool {

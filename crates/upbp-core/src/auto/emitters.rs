@@ -21,8 +21,9 @@ use upbp_estimators::{
 };
 use upbp_media::Lanes;
 
-use super::full_plan::{iteration_plan, plan_with};
+use super::full_plan::{full_plan, iteration_plan, plan_with};
 use super::guides::{self, Evidence, Starts};
+use super::memory_limit::Room;
 use super::parallel_walks::{in_pieces, pixel};
 use super::statistics;
 use crate::deadline::{Budget, Halt};
@@ -37,8 +38,9 @@ const LIGHT_PATHS: u32 = 4096;
 const GUIDED_LIGHT_PATHS: u32 = 16384;
 /// Emitters from which on the number of sub-paths does not grow any more.
 const MANY: usize = 8;
+/// Light sub-paths for each one that leaves beams.
+const PATHS_PER_BEAM_PATH: u32 = 8;
 /// Contributions that are enough, and the part of the sub-paths that tells how many there are going to be.
-/// Where all photons meet all camera sub-paths they are as many as pairs.
 const CONTRIBUTIONS: (f64, f64) = (1e6, 1.0 / 16.0);
 /// Light vertices that are enough.
 const LIGHT_VERTICES: f64 = 2e5;
@@ -46,8 +48,10 @@ const LIGHT_VERTICES: f64 = 2e5;
 const MORE_CAMERA_PATHS: u32 = 4;
 /// The most that a choice by receiver may leave of the second moment of next events.
 const WORTH: f64 = 0.9;
-/// Runs, if starts are guided: one that looks for places, and two that are guided there.
-const GUIDED_ROUNDS: u32 = 3;
+/// Runs, if starts are guided: one that looks for places, and two that are guided there. Each has a part of
+/// the time, and at most so many times as many sub-paths, as far as the plan has: the guide of the last
+/// one stays.
+const GUIDED_ROUNDS: [(f64, u32); 3] = [(0.25, 1), (0.25, 1), (0.5, 4)];
 
 /// Part of the time of a preparation that this may take.
 const PART: f64 = 0.2;
@@ -64,6 +68,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     settings: &CheckedSettings,
     techniques: TechniqueSet,
     lanes: Option<[f64; 3]>,
+    room: &Room,
     budget: &Budget<'_>,
 ) -> Result<(), RenderError> {
     let emitters = scene.scene.emitters().len();
@@ -86,16 +91,21 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     // What tells enough of so many emitters, or of starts.
     let part = if is_guided { 1.0 } else { emitters.min(MANY) as f64 / MANY as f64 };
     let paths = [light_paths, f64::from(camera_paths)].map(|paths| (paths * part) as u32);
-    let plan = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / 8]);
-    let plan = iteration_plan(scene, settings, &plan, 0);
-    let rounds = if is_guided { GUIDED_ROUNDS } else { 1 };
-    let part = (1.0 - QUICK_LOOK) * PART / f64::from(rounds);
+    // Light is weighted as with so many light sub-paths, for a plan may have far fewer than the full one.
+    let few = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / PATHS_PER_BEAM_PATH]);
+    let full = full_plan(scene, settings, techniques, &statistics, room, budget);
+    let [few, full] = [few, full].map(|plan| iteration_plan(scene, settings, &plan, 0));
+    let plan = IterationPlan { mis: few.mis, ..full };
+    let most = (plan.light_paths / paths[0].max(1)).max(1);
+    let rounds: &[_] = if is_guided { &GUIDED_ROUNDS } else { &[(1.0, 1)] };
     let mut first = Vec::new();
-    for round in 0..rounds {
+    for (round, &(part, times)) in rounds.iter().enumerate() {
         // Each round has random numbers of its own.
-        let plan = IterationPlan { iteration: plan.iteration + u64::from(round), ..plan.clone() };
-        let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths[1], part, halt);
-        let seen = budget.part(part).largest(run).ok_or(RenderError::Cancelled)?;
+        let plan = IterationPlan { iteration: plan.iteration + round as u64, ..plan.clone() };
+        let paths = paths.map(|count| times.min(most) * count);
+        let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, halt);
+        let allowance = budget.part((1.0 - QUICK_LOOK) * PART * part);
+        let seen = allowance.largest(run).ok_or(RenderError::Cancelled)?;
         if emitters > 1 {
             scene.choose_emitters_by(&seen.emission, &shares(&seen.next_events, emitters));
             choose_by_receiver(scene, &seen.next_events);
@@ -175,15 +185,15 @@ fn second_moment<S: Scene>(scene: &PreparedScene<'_, S>, seen: &[NextEvent]) -> 
 fn measure_enough<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
-    camera_paths: u32,
+    paths: [u32; 2],
     part: f64,
     halt: &Halt<'_>,
 ) -> Option<Measured> {
     let (enough, few) = CONTRIBUTIONS;
     let mut next = part.min(few);
     loop {
-        let seen = measure::<S, L>(scene, plan, camera_paths, next, halt)?;
-        let most = next * (enough / (seen.contributions as f64).max(1.0)).sqrt();
+        let seen = measure::<S, L>(scene, plan, paths, next, halt)?;
+        let most = next * enough / (seen.contributions as f64).max(1.0);
         let affordable = part.min(most);
         if affordable < 2.0 * next {
             return Some(seen);
@@ -192,20 +202,18 @@ fn measure_enough<S: Scene, L: Lanes>(
     }
 }
 
-/// Traces the light sub-paths of `plan` and some camera sub-paths, or a part of both. `None` if it was
-/// halted.
+/// Traces numbers of light and camera sub-paths, or a part of both. Light counts as it does under `plan`.
+/// `None` if it was halted.
 fn measure<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
-    camera_paths: u32,
+    paths: [u32; 2],
     part: f64,
     halt: &Halt<'_>,
 ) -> Option<Measured> {
-    let mut plan = plan.clone();
-    // Fewer light sub-paths, each of which counts for more; weights as in the plan.
-    let fewer = |count: u32| (part * f64::from(count)).ceil() as u32;
-    (plan.light_paths, plan.beam_paths) = (fewer(plan.light_paths), fewer(plan.beam_paths));
-    let plan = &plan;
+    let [light_paths, camera_paths] = paths.map(|count| (part * f64::from(count)).ceil() as u32);
+    let beam_paths = light_paths.div_ceil(PATHS_PER_BEAM_PATH).min(plan.beam_paths);
+    let plan = &plan.blurred(light_paths, beam_paths);
     let context = Context { prepared: scene, plan };
     // The whole film: a crop shows the same camera samples.
     let (width, height) = scene.scene.camera().resolution();
@@ -225,7 +233,6 @@ fn measure<S: Scene, L: Lanes>(
     let per_pixel = f64::from(plan.light_paths) / pixels as f64;
     seen.emission.iter_mut().for_each(|(_, contribution)| contribution.pixel *= per_pixel);
 
-    let camera_paths = (part * f64::from(camera_paths)).ceil() as u32;
     let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
         let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
         let before = (seen.light, seen.emission.len(), seen.next_event.len());

@@ -20,8 +20,8 @@ const FIRST: f64 = 0.3;
 /// Points of specular surfaces that are enough.
 const MOST_POINTS: usize = 4096;
 /// Factor by which a guide has to multiply the starts that lead to the light, a geometric mean over this
-/// light. Half of the starts stay where they are, so that other light loses up to a
-/// factor of two, of which a small run may see nothing.
+/// light. Half of the starts stay where they are, so that other light loses up to a factor of two, of which a
+/// small run may see nothing.
 const WORTH: f64 = 2.0;
 /// The most that one start may count of the light of all: one that is bright because it is rare would draw
 /// most of the guided starts to its own cell.
@@ -53,6 +53,20 @@ impl Starts {
 
     fn light(&self) -> f64 {
         self.samples.iter().map(|sample| sample.light).sum()
+    }
+
+    /// Two halves, of every other start.
+    fn halves(&self) -> [Self; 2] {
+        let every_other = |first| self.samples.iter().copied().skip(first).step_by(2).collect();
+        [0, 1].map(|first| Self { axes: self.axes, samples: every_other(first) })
+    }
+
+    /// How many times as many starts a guide leads to this light as there are without it, a geometric mean
+    /// over the light; 1 without light.
+    fn gain(&self, guide: &EmissionGuide) -> f64 {
+        let logarithms: f64 =
+            self.samples.iter().map(|sample| sample.light * f64::from(guide.density(sample.at)).ln()).sum();
+        (logarithms / self.light().max(f64::MIN_POSITIVE)).exp()
     }
 
     /// Lets no start count for more than a part of the light of all.
@@ -136,8 +150,8 @@ pub(super) fn first<S: Scene>(
     starts
 }
 
-/// Guides to the starts that brought light to the picture, at emitters whose guide has been worth it: the one
-/// that was followed is judged, since it does not know what it brought. Logarithms are compared, for second
+/// Guides to the starts that brought light to the picture, at emitters where they are worth it: where a guide
+/// that was made of one half of these starts leads to the other half. Logarithms are compared, for second
 /// moments of so few starts are those of the brightest.
 pub(super) fn next<S: Scene>(
     scene: &PreparedScene<'_, S>,
@@ -145,24 +159,22 @@ pub(super) fn next<S: Scene>(
     first: &[Starts],
 ) -> Vec<Option<EmissionGuide>> {
     let mut starts = vec![Starts::default(); scene.scene.emitters().len()];
-    // Light, and the same times the logarithm of how many times as many starts lead to it.
-    let mut sums = vec![[0.0; 2]; starts.len()];
     for (end, light) in &seen.starts {
-        let on_ray = end.point.position;
-        let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, on_ray);
+        let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, end.point.position);
         let Some((at, axes)) = at else { continue };
-        let emitter = end.emitter.0 as usize;
-        let factor = f64::from(scene.emission_factor(end.emitter, &end.point, end.direction, on_ray));
-        starts[emitter].axes = axes;
-        starts[emitter].samples.push(EmissionSample { at, light: *light });
-        sums[emitter][0] += light;
-        sums[emitter][1] += light * factor.ln();
+        let starts = &mut starts[end.emitter.0 as usize];
+        starts.axes = axes;
+        starts.samples.push(EmissionSample { at, light: *light });
     }
-    for (starts, first) in starts.iter_mut().zip(first) {
-        starts.clip(BRIGHTEST);
-        starts.add(first, FIRST);
-    }
-    let is_worth = |[light, logarithms]: [f64; 2]| logarithms > WORTH.ln() * light;
-    let guides = starts.iter().zip(sums);
-    guides.map(|(starts, sums)| is_worth(sums).then(|| starts.fit()).flatten()).collect()
+    let guide = |(starts, first): (Starts, &Starts)| {
+        let with_first = |mut starts: Starts| {
+            starts.clip(BRIGHTEST);
+            starts.add(first, FIRST);
+            starts.fit()
+        };
+        let [some, others] = starts.halves();
+        let is_worth = with_first(some).is_some_and(|guide| others.gain(&guide) > WORTH);
+        if is_worth { with_first(starts) } else { None }
+    };
+    starts.into_iter().zip(first).map(guide).collect()
 }

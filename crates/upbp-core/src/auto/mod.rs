@@ -111,7 +111,7 @@ fn choose_in<S: Scene, L: Lanes>(
     let is_auto = settings.techniques == Techniques::Auto;
     let techniques = support.techniques;
     if given.is_none() {
-        emitters::choose::<S, L>(scene, settings, techniques, lanes, budget)?;
+        emitters::choose::<S, L>(scene, settings, techniques, lanes, &room, budget)?;
     }
     budget.step("looking around", 0.3)?;
     let allowance = budget.part(TIME_FOR_STATISTICS);
@@ -131,7 +131,7 @@ fn choose_in<S: Scene, L: Lanes>(
                 // Next events have to find what light sub-paths would have found.
                 scene.choose_emitters_by_power();
                 let techniques = techniques.intersection(TechniqueSet::PT);
-                emitters::choose::<S, L>(scene, settings, techniques, lanes, budget)?;
+                emitters::choose::<S, L>(scene, settings, techniques, lanes, &room, budget)?;
             }
             plan
         } else {
