@@ -268,18 +268,15 @@ impl Fit {
                 std::array::from_fn(|column| shares.iter().map(|row| row[column]).sum::<f64>()),
             ];
             // Light on a slope may be even along both axes.
-            let is_uneven = concentration(&coarse(&shares)) > least(COARSE_BINS * COARSE_BINS);
+            let is_uneven = axes.iter().all(|axis| self.axes[*axis])
+                && concentration(&coarse(&shares)) > least(COARSE_BINS * COARSE_BINS);
             let along = along.map(|shares| concentration(&shares));
             std::iter::zip(axes, along)
-                .filter(|(axis, _)| cell.splits[*axis] < MOST_SPLITS)
+                .filter(|(axis, _)| self.axes[*axis] && cell.splits[*axis] < MOST_SPLITS)
                 .filter(move |(_, concentration)| is_uneven || *concentration > least(BINS))
         };
-        [0, 1]
-            .into_iter()
-            .filter(|pair| self.axes[2 * pair])
-            .flat_map(splits)
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(axis, _)| axis)
+        let pairs = (0..AXES / 2).filter(|pair| self.axes[2 * pair] || self.axes[2 * pair + 1]);
+        pairs.flat_map(splits).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(axis, _)| axis)
     }
 }
 
@@ -363,6 +360,7 @@ mod tests {
         ) {
             let Some(guide) = EmissionGuide::fit(&spot(seed, centre, width, axes), axes) else { return Ok(()) };
             prop_assert!(guide.is_valid());
+            prop_assert!(guide.nodes.iter().all(|node| node.is_leaf() || axes[node.0 as usize]));
             let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
             // The mean of 1 / density over guided numbers is the volume: one.
             let (mut volume, mut squares, n) = (0.0, 0.0, 20_000);
