@@ -76,7 +76,7 @@ impl EmissionGuide {
         let mut samples: Vec<_> =
             samples.iter().filter(|sample| sample.light > 0.0 && sample.light.is_finite()).copied().collect();
         let cells = Self::grow(&mut samples, axes)?;
-        // What lies beside the cells of the few samples there are would be bright and rare.
+        // Light beside the cells of the few samples that there are would be bright and rare.
         Self::grow(&mut cells.spread(&samples, axes), axes)
     }
 
@@ -305,7 +305,7 @@ fn coarse(shares: &[[f64; BINS]; BINS]) -> [f64; COARSE_BINS * COARSE_BINS] {
     sums
 }
 
-/// How unequal shares of a whole are: 1 if all are alike, their number if all is in one.
+/// Concentration of a whole in some of its shares: 1 if all are alike, their number if one has it all.
 fn concentration(shares: &[f64]) -> f64 {
     shares.len() as f64 * shares.iter().map(|share| share * share).sum::<f64>()
 }

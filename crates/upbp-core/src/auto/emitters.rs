@@ -25,7 +25,7 @@ use super::full_plan::{full_plan, iteration_plan, plan_with};
 use super::guides::{self, Evidence, Starts};
 use super::memory_limit::Room;
 use super::parallel_walks::{in_pieces, pixel};
-use super::statistics;
+use super::statistics::{self, PATHS_PER_BEAM_PATH};
 use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
 use crate::settings::CheckedSettings;
@@ -38,8 +38,6 @@ const LIGHT_PATHS: u32 = 4096;
 const GUIDED_LIGHT_PATHS: u32 = 16384;
 /// Emitters from which on the number of sub-paths does not grow any more.
 const MANY: usize = 8;
-/// Light sub-paths for each one that leaves beams.
-const PATHS_PER_BEAM_PATH: u32 = 8;
 /// Contributions that are enough, and the part of the sub-paths that tells how many there are going to be.
 const CONTRIBUTIONS: (f64, f64) = (1e6, 1.0 / 16.0);
 /// Light vertices that are enough.
@@ -202,7 +200,7 @@ fn measure_enough<S: Scene, L: Lanes>(
     }
 }
 
-/// Traces numbers of light and camera sub-paths, or a part of both. Light counts as it does under `plan`.
+/// Traces numbers of light and camera sub-paths, or a part of both. Light is weighted as under `plan`.
 /// `None` if it was halted.
 fn measure<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,

@@ -61,8 +61,8 @@ impl Starts {
         [0, 1].map(|first| Self { axes: self.axes, samples: every_other(first) })
     }
 
-    /// How many times as many starts a guide leads to this light as there are without it, a geometric mean
-    /// over the light; 1 without light.
+    /// The factor by which a guide multiplies the starts that lead to this light, a geometric mean over the
+    /// light; 1 without light.
     fn gain(&self, guide: &EmissionGuide) -> f64 {
         let logarithms: f64 =
             self.samples.iter().map(|sample| sample.light * f64::from(guide.density(sample.at)).ln()).sum();

@@ -28,7 +28,7 @@ pub(crate) const LIGHT_PATHS: u32 = 8192;
 /// Light vertices that are enough: sub-paths are added until there are about as many.
 const ENOUGH_VERTICES: f64 = 24_576.0;
 /// Light sub-paths for each one that leaves beams.
-const PATHS_PER_BEAM_PATH: u32 = 8;
+pub(super) const PATHS_PER_BEAM_PATH: u32 = 8;
 /// Camera sub-paths.
 const CAMERA_PATHS: u32 = 1024;
 /// Queries of each kind that are measured.
