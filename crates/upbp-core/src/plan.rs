@@ -12,6 +12,8 @@ use crate::radius_schedule::RadiusSchedule;
 
 /// Samples of a technique that a camera vertex may have on average.
 pub(crate) const PER_VERTEX: RangeInclusive<f32> = 0.001..=1000.0;
+/// Camera factors of a plan.
+const CAMERA_FACTORS: RangeInclusive<f32> = 0.001..=1000.0;
 
 /// Techniques, sample counts and radii of all iterations of a render.
 ///
@@ -30,6 +32,9 @@ pub struct Plan {
     pub connections: f32,
     /// Points on lights that every camera vertex is connected to, on average.
     pub next_events: f32,
+    /// Factor of emission hits, next events and connections in the weights, whose samples are independent
+    /// where photons and beams are shared (`docs/theory.md`, section 3.4); 1 is the plain heuristic.
+    pub camera_factor: f32,
     /// Russian roulette.
     pub roulette: Roulette,
     /// Periods of photon queries.
@@ -81,6 +86,8 @@ impl Plan {
                 "connections, next_events: expected {PER_VERTEX:?}, found {} and {}",
                 self.connections, self.next_events
             ))
+        } else if !CAMERA_FACTORS.contains(&self.camera_factor) {
+            Err(format!("camera_factor: expected {CAMERA_FACTORS:?}, found {}", self.camera_factor))
         } else if matches!(self.roulette, Roulette::Below(least) if !(least > 0.0 && least <= 1.0)) {
             Err(format!("roulette: expected Off, or Below a number in (0, 1], found {:?}", self.roulette))
         } else if !(0.0..f64::INFINITY).contains(&self.vertices_per_light_path) {
@@ -151,6 +158,9 @@ impl fmt::Display for Plan {
         if self.next_events != 1.0 && self.techniques.has(Technique::Nee) {
             write!(f, ", {} next events per vertex", self.next_events)?;
         }
+        if self.camera_factor != 1.0 {
+            write!(f, ", camera factor {}", self.camera_factor)?;
+        }
         match self.roulette {
             Roulette::Off => write!(f, ", no roulette")?,
             Roulette::Below(least) => write!(f, ", roulette below {least}")?,
@@ -195,6 +205,7 @@ mod tests {
             beam_paths: 0,
             connections: 1.0,
             next_events: 2.0,
+            camera_factor: 4.0,
             roulette: Roulette::Below(0.5),
             periods: MergePeriods { surf: NonZeroU32::new(4).unwrap(), ..MergePeriods::ONE },
             vertices_per_light_path: 3.1,
@@ -220,7 +231,7 @@ mod tests {
         assert_eq!(FrozenPlan::from_ron(&text), Ok(frozen));
         assert_eq!(
             plan().to_string(),
-            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, roulette below 0.5, distances by channel, surf in one of 4 pixels"
+            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, camera factor 4, roulette below 0.5, distances by channel, surf in one of 4 pixels"
         );
     }
 
@@ -233,6 +244,7 @@ mod tests {
             FrozenPlan::from_ron(&frozen.to_ron()).unwrap_err().to_string()
         };
         assert!(wrong(|p| p.roulette = Roulette::Below(0.0)).contains("roulette"));
+        assert!(wrong(|p| p.camera_factor = 0.0).contains("camera_factor"));
         assert!(wrong(|p| p.light_paths = 0).contains("light_paths"));
         assert!(wrong(|p| p.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|p| p.radii.pb2d = f32::NAN).contains("radii"));

@@ -96,6 +96,10 @@ pub struct IterationChoices {
     /// Points on lights that each camera vertex is connected to, on average: finite, not negative; a fraction
     /// is a probability.
     pub next_events: f32,
+    /// Factor of emission hits, next events and connections in the weights (`docs/theory.md`, section 3.4):
+    /// finite, positive. Their samples are independent where photons and beams are shared, by the merges of a
+    /// camera sub-path and by pixels; one is the plain heuristic.
+    pub camera_factor: f32,
     /// Expected number of connectible vertices of a light sub-path. Must be known before the iteration: a
     /// figure of the iteration itself would correlate with its samples.
     pub vertices_per_light_path: f64,
@@ -172,11 +176,12 @@ impl IterationPlan {
             0.0
         };
         let merges = techniques.iter().any(Technique::merges);
+        let camera_factor = f64::from(choices.camera_factor);
         let mis = MisPlan {
             heuristic: choices.heuristic,
-            hit: on(Technique::Hit, 1.0),
-            nee: on(Technique::Nee, f64::from(choices.next_events)),
-            connect,
+            hit: on(Technique::Hit, camera_factor),
+            nee: on(Technique::Nee, camera_factor * f64::from(choices.next_events)),
+            connect: camera_factor * connect,
             light_tracing: on(Technique::LightTracing, paths),
             surf: merge(Technique::Surf, &kernels.surf),
             volume: scene.media().iter().map(in_medium).collect(),

@@ -34,6 +34,7 @@ fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoice
         beam_paths: SIZE * SIZE / 2,
         connections: 1.0,
         next_events: 1.0,
+        camera_factor: 1.0,
         periods: MergePeriods::ONE,
         vertices_per_light_path: 2.3,
         lengths,
@@ -238,6 +239,7 @@ fn seldom_look_ups_and_other_counts() {
     let other = IterationChoices {
         seed: 201,
         next_events: 3.0,
+        camera_factor: 4.0,
         connections: 0.4,
         periods: MergePeriods::from_fn(|technique| NonZeroU32::new(1 + technique as u32 % 3).unwrap()),
         ..usual.clone()

@@ -42,6 +42,7 @@ fn choices() -> IterationChoices {
         beam_paths: 500,
         connections: 2.0,
         next_events: 1.0,
+        camera_factor: 1.0,
         periods: MergePeriods::ONE,
         vertices_per_light_path: 2.3,
         lengths: PathLengths { min: 1, max: 8 },
@@ -170,6 +171,14 @@ fn emitters_chosen_by_receiver() {
 fn the_power_heuristic() {
     let choices = IterationChoices { heuristic: Heuristic::Power, ..choices() };
     audit("power heuristic", CAMERAS[1], 48, &choices, 1000);
+}
+
+#[test]
+fn a_camera_factor() {
+    for heuristic in [Heuristic::Balance, Heuristic::Power] {
+        let choices = IterationChoices { camera_factor: 4.0, heuristic, ..choices() };
+        audit(&format!("camera factor, {heuristic:?}"), CAMERAS[1], 48, &choices, 1000);
+    }
 }
 
 #[test]

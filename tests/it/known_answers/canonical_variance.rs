@@ -249,6 +249,7 @@ impl Setup {
                 beam_paths: paths,
                 connections: 1.0,
                 next_events: 1.0,
+                camera_factor: 1.0,
                 periods: MergePeriods::ONE,
                 vertices_per_light_path: 1.0,
                 lengths: PathLengths { min: 2, max: 2 },

@@ -37,6 +37,7 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             beam_paths: 1,
             connections: 1.0,
             next_events: 1.0,
+            camera_factor: 1.0,
             periods: MergePeriods::ONE,
             vertices_per_light_path: 1.0,
             lengths: PathLengths { min: 1, max: 1_000_000 },

@@ -170,6 +170,7 @@ fn kernels_of_fewer_light_sub_paths_hold_as_many_photons() {
             beam_paths: 5000,
             connections: 1.0,
             next_events: 1.0,
+            camera_factor: 1.0,
             periods: MergePeriods::ONE,
             vertices_per_light_path: 1.0,
             lengths: PathLengths { min: 1, max: 8 },

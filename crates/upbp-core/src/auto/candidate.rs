@@ -20,6 +20,9 @@ const LIGHT_PATHS: [f64; 5] = [0.0625, 0.25, 1.0, 4.0, 16.0];
 /// Numbers of light sub-paths with beams, relative to the full plan's: fewer are fast, and more of them show
 /// less as rays.
 const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
+/// Factors of emission hits, next events and connections in the weights: photons and beams tell less than as
+/// many independent samples would, by how much depends on what they share.
+const CAMERA_FACTORS: [f32; 3] = [1.0, 2.0, 4.0];
 /// Period of queries that only some pixels make.
 const PERIOD: NonZeroU32 = NonZeroU32::new(8).unwrap();
 /// Factor by which an iteration may take longer with the safeguard.
@@ -139,6 +142,12 @@ impl Candidates {
         steps.into_iter().map(possible).filter(|step| step != from).collect()
     }
 
+    /// A plan with each camera factor, if it has light sub-paths.
+    pub(super) fn camera_factors(from: &Plan) -> Vec<Plan> {
+        let factors = if from.uses_light_paths() { CAMERA_FACTORS.as_slice() } else { &[] };
+        factors.iter().map(|&camera_factor| Plan { camera_factor, ..*from }).collect()
+    }
+
     /// A plan with each number of light sub-paths, if it has any.
     pub(super) fn light_paths(&self, from: &Plan) -> Vec<Plan> {
         let counts = if from.uses_light_paths() { self.light_paths.as_slice() } else { &[] };
@@ -172,7 +181,8 @@ impl Candidates {
 pub(super) fn finished(plan: Plan) -> Plan {
     let light_paths = if plan.uses_light_paths() { plan.light_paths } else { 0 };
     let beam_paths = if plan.techniques.intersects(BEAMS) { plan.beam_paths.min(light_paths) } else { 0 };
-    Plan { light_paths, beam_paths, ..plan }
+    let camera_factor = if light_paths > 0 { plan.camera_factor } else { 1.0 };
+    Plan { light_paths, beam_paths, camera_factor, ..plan }
 }
 
 /// A plan with beams from no more light sub-paths than it has.
@@ -237,6 +247,7 @@ mod tests {
             beam_paths: 800,
             connections: 1.0,
             next_events: 1.0,
+            camera_factor: 1.0,
             roulette: roulette::OF_PILOT,
             periods: MergePeriods::ONE,
             vertices_per_light_path: 1.0,

@@ -53,10 +53,15 @@ pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let least = camera.or_better(paths, usual).or_better(everything, usual);
     let (gain, error) = least.gain_over(&camera);
     let best = if camera.plan.uses_light_paths() || !(gain <= error) { least } else { camera };
+    let is_clear = !judge.known.iter().any(|other| other.may_beat(&best));
+    // After all else: plans with light sub-paths are not compared with others at their best, by predictions
+    // that favour them already.
+    let factors = judge.judge(&Candidates::camera_factors(&best.plan));
+    let best = factors.into_iter().fold(best, |a, b| if b.product() < a.product() { b } else { a });
     let plan = finished(candidates.with_safeguard(best.plan, cost));
     Found {
         plan,
-        is_clear: !judge.known.iter().any(|other| other.may_beat(&best)),
+        is_clear,
         variance: variance.relative(&best.plan).iter().sum(),
         cost: cost.iteration(&plan),
     }
@@ -187,6 +192,7 @@ mod tests {
             beam_paths: 0,
             connections: 1.0,
             next_events: 1.0,
+            camera_factor: 1.0,
             roulette: Roulette::Off,
             periods: MergePeriods::from_fn(|_| NonZeroU32::MIN),
             vertices_per_light_path: 1.0,

@@ -124,6 +124,7 @@ fn nominal_plan<S: Scene>(
         beam_paths: light_paths / PATHS_PER_BEAM_PATH,
         connections: 1.0,
         next_events: 1.0,
+        camera_factor: 1.0,
         periods: MergePeriods::ONE,
         vertices_per_light_path: 1.0,
         lengths: PathLengths { min: settings.min_length, max: settings.max_length },

@@ -89,7 +89,7 @@ impl Identity {
     }
 }
 
-fn plan_fields(plan: &Plan) -> [(&'static str, String); 16] {
+fn plan_fields(plan: &Plan) -> [(&'static str, String); 17] {
     let r = &plan.radii;
     [
         ("techniques", plan.techniques.to_string()),
@@ -97,6 +97,7 @@ fn plan_fields(plan: &Plan) -> [(&'static str, String); 16] {
         ("beams", plan.beam_paths.to_string()),
         ("connections", plan.connections.to_string()),
         ("next_events", plan.next_events.to_string()),
+        ("camera_factor", plan.camera_factor.to_string()),
         ("roulette", format!("{:?}", plan.roulette)),
         ("periods", format!("{:?}", plan.periods)),
         ("vertices per light sub-path", plan.vertices_per_light_path.to_string()),

@@ -100,17 +100,18 @@ pub enum MergeKind {
 
 /// Sample counts and kernel volumes of one iteration.
 ///
-/// Counts are relative to one camera sub-path. A technique that does not run has count zero. The same
+/// Counts are relative to one camera sub-path, and those of emission hits, next events and connections
+/// contain the camera factor of the iteration. A technique that does not run has count zero. The same
 /// predicate that zeroes a count must decide whether the technique runs, else weights do not sum to one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MisPlan {
     /// Balance or power heuristic.
     pub heuristic: Heuristic,
-    /// Emission hits: 0 or 1.
+    /// Emission hits: 1 times the camera factor, or 0.
     pub hit: f64,
-    /// Light samples per camera vertex.
+    /// Light samples per camera vertex, times the camera factor.
     pub nee: f64,
-    /// Expected number of times that a pair of vertices is connected.
+    /// Expected number of times that a pair of vertices is connected, times the camera factor.
     pub connect: f64,
     /// Light sub-paths that are connected to the camera.
     pub light_tracing: f64,

@@ -43,6 +43,8 @@ struct Counts {
     paths: [f64; 2],
     /// Part of the camera sub-paths that make the queries of a technique, which `relative` contains.
     active: ByTechnique<f64>,
+    /// Factor of emission hits, next events and connections in the weights.
+    camera_factor: f64,
     /// The number of the roulette.
     roulette: usize,
     /// Times as rarely that a path may be found and be charged for just that.
@@ -59,6 +61,7 @@ impl Counts {
             relative: [0.0; TECHNIQUES],
             paths: [Technique::Surf, Technique::Bb1d].map(|technique| pilot.relative_paths(technique, plan)),
             active: [1.0; TECHNIQUES],
+            camera_factor: f64::from(plan.camera_factor),
             roulette: pilot.roulette(plan),
             trusted: TRUSTED,
             light_paths: f64::from(if plan.techniques.intersects(BEAMS) {

@@ -90,6 +90,10 @@ pub(super) struct View<'a> {
     roulette: usize,
     /// Samples of each technique relative to the pilot render's plan.
     relative: [f32; TECHNIQUES],
+    /// The same, times their factors in the weights.
+    weighted: [f32; TECHNIQUES],
+    /// The factor of emission hits, next events and connections.
+    camera_factor: f32,
     trusted: f32,
     /// Pairs of samples of one camera sub-path that count beside those of independent samples: it makes the
     /// queries for both or for none.
@@ -110,6 +114,12 @@ impl<'a> View<'a> {
             looks,
             roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
+            weighted: Technique::ALL.map(|technique| {
+                let of_camera = matches!(technique, Technique::Hit | Technique::Nee | Technique::Connect);
+                let factor = if of_camera { counts.camera_factor } else { 1.0 };
+                (factor * counts.relative[technique as usize]) as f32
+            }),
+            camera_factor: counts.camera_factor as f32,
             trusted: counts.trusted,
             common: counts.active.map(|p| (1.0 / p - 1.0) as f32),
             more: [0, 1].map(|i| (pilot.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
@@ -142,7 +152,7 @@ impl<'a> View<'a> {
             result.single += f64::from(rarity * share.single(seen.square));
             result.light += f64::from(rarity * share.light(seen.square));
             result.excess.add(&share.excess(rarity * seen.square));
-            let weight = self.relative[i] * share.inverse;
+            let weight = self.weighted[i] * share.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
                 continue;
@@ -176,7 +186,7 @@ impl<'a> View<'a> {
 
     /// The factor of a sample under the plan.
     pub(super) fn weight(&self, technique: Technique, shares: &[f32; TECHNIQUES]) -> f32 {
-        self.relative[technique as usize] * self.share(shares).inverse
+        self.weighted[technique as usize] * self.share(shares).inverse
     }
 
     /// Pairs of merges with one light sub-path, by two camera sub-paths, over those of the pilot render.
@@ -190,17 +200,27 @@ impl<'a> View<'a> {
         let [a, b, c, d, e, f, g, h, i]: [f32; TECHNIQUES] =
             std::array::from_fn(|i| shares[i] * self.relative[i]);
         // Not one after the other, and one division: the search has nothing else to wait for.
-        let (camera, merges) = ((a + b) + c, ((e + f) + (g + h)) + i);
-        let inverse = 1.0 / ((camera + d) + merges);
-        Share { splats: d, merges, inverse, trusted: self.trusted }
+        let (camera, light) = ((a + b) + c, (((e + f) + (g + h)) + i) + d);
+        let weighted = self.camera_factor * camera;
+        Share {
+            light,
+            all: self.camera_factor * weighted + light,
+            rarity: 1.0 / (camera + light),
+            inverse: 1.0 / (weighted + light),
+            trusted: self.trusted,
+        }
     }
 }
 
-/// Densities of light tracing and of merges relative to those of the pilot render.
+/// Densities of techniques relative to those of the pilot render.
 pub(super) struct Share {
-    splats: f32,
-    merges: f32,
+    /// Of light tracing and of merges.
+    light: f32,
+    /// Of all, each with the square of its factor in the weights.
+    all: f32,
     /// One over the sum of all.
+    rarity: f32,
+    /// One over the sum of all with their factors.
     inverse: f32,
     trusted: f32,
 }
@@ -209,20 +229,20 @@ impl Share {
     /// The part in the second moment of single samples of one whose square is `square`.
     #[inline]
     pub(super) fn single(&self, square: f32) -> f32 {
-        square * self.inverse
+        square * self.inverse * (self.all * self.inverse)
     }
 
     /// The part of it that is due to splats and merges.
     #[inline]
     fn light(&self, square: f32) -> f32 {
-        square * self.inverse * ((self.splats + self.merges) * self.inverse)
+        square * self.inverse * (self.light * self.inverse)
     }
 
     /// The charge for such a sample beyond its part.
     #[inline]
     pub(super) fn excess(&self, square: f32) -> Excess {
-        let charge = f64::from(square * self.inverse * ((self.inverse / self.trusted).max(1.0).sqrt() - 1.0));
-        Excess { charge, by_rarity: charge * f64::from(self.inverse) }
+        let charge = f64::from(self.single(square) * ((self.rarity / self.trusted).max(1.0).sqrt() - 1.0));
+        Excess { charge, by_rarity: charge * f64::from(self.rarity) }
     }
 }
 

@@ -75,6 +75,7 @@ fn planned(paths: u32) -> Plan {
         beam_paths: paths,
         connections: 1.0,
         next_events: 1.0,
+        camera_factor: 1.0,
         roulette: OF_PILOT,
         periods: MergePeriods::ONE,
         vertices_per_light_path: 1.0,
@@ -88,6 +89,7 @@ fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts
         relative: [0.0; TECHNIQUES],
         paths: [paths; 2],
         active: [1.0; TECHNIQUES],
+        camera_factor: 1.0,
         roulette: PILOT,
         trusted: TRUSTED,
         light_paths: 1.0,
@@ -117,24 +119,28 @@ fn variances_are_those_of_the_estimators() {
     let relative = 1.0 / (1.0 + DARKNESS);
     for other in [Technique::Connect, Technique::Surf] {
         let prediction = Variance::of(pilot_of(other));
-        for [hits, others] in [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
-            let counts = counts([(Technique::Hit, hits), (other, others)], 1.0);
+        for [hits, others, camera_factor] in
+            [[1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, 4.0], [1.0, 0.0, 4.0]]
+        {
+            let counts = Counts { camera_factor, ..counts([(Technique::Hit, hits), (other, others)], 1.0) };
+            let factor = if other == Technique::Surf { 1.0 } else { camera_factor };
             // n samples of a technique have the variance ∫ (w f)² / (n p) − (∫ w f)² / n, where w is the part
-            // of n p in a sum.
-            let part = |n: f64, p: Function<'_>, sum: Function<'_>| {
+            // of c n p in a sum, c the factor of the technique.
+            let part = |n: f64, c: f64, p: Function<'_>, sum: Function<'_>| {
                 if n == 0.0 {
                     return 0.0;
                 }
-                let contribution = |x: f64| f(x) / sum(x);
+                let contribution = |x: f64| c * f(x) / sum(x);
                 let mean = quadrature(|x| n * p(x) * contribution(x));
                 quadrature(|x| n * p(x) * contribution(x).powi(2)) - mean * mean / n
             };
-            let sum = |x: f64| hits + others * 2.0 * x;
-            let expected = relative * (part(hits, &|_| 1.0, &sum) + part(others, &|x| 2.0 * x, &sum));
+            let sum = |x: f64| camera_factor * hits + factor * others * 2.0 * x;
+            let expected = relative
+                * (part(hits, camera_factor, &|_| 1.0, &sum) + part(others, factor, &|x| 2.0 * x, &sum));
             let found: f64 = prediction.with(&counts).iter().sum();
             assert!(
                 (found / expected - 1.0).abs() < 0.1,
-                "{other:?}, {hits}, {others}: {found}, expected {expected}"
+                "{other:?}, {hits}, {others}, {camera_factor}: {found}, expected {expected}"
             );
         }
     }
@@ -308,8 +314,13 @@ fn no_part_is_more_than_the_largest() {
 
 /// A sample under a plan.
 fn weighted(sample: &Sample, counts: &Counts) -> DVec3 {
-    let share: f64 = sample.shares.iter().zip(counts.relative).map(|(s, n)| f64::from(*s) * n).sum();
-    sample.value.as_dvec3() * counts.relative[sample.technique as usize] / share
+    let in_weights = |technique: Technique| {
+        let of_camera = [Technique::Hit, Technique::Nee, Technique::Connect].contains(&technique);
+        counts.relative[technique as usize] * if of_camera { counts.camera_factor } else { 1.0 }
+    };
+    let share: f64 =
+        Technique::ALL.iter().map(|t| f64::from(sample.shares[*t as usize]) * in_weights(*t)).sum();
+    sample.value.as_dvec3() * in_weights(sample.technique) / share
 }
 
 /// Pairs of merges with one light sub-path under a plan, over those of the pilot render.
@@ -408,12 +419,13 @@ proptest! {
         paths in prop::array::uniform2(0.25_f64..4.0),
         periodic in prop::array::uniform(proptest::bool::ANY),
         thinning in prop::array::uniform2(0.1_f64..1.0),
+        camera_factor in 0.5_f64..16.0,
         weight in 0.1_f64..100.0,
     ) {
         let periodic: [bool; TECHNIQUES] = periodic;
         let active: [f64; TECHNIQUES] = std::array::from_fn(|i| if periodic[i] { 0.25 } else { 1.0 });
         let counts =
-            Counts { relative: active.map(|p| 0.5 + p), paths, active, ..counts([], 1.0) };
+            Counts { relative: active.map(|p| 0.5 + p), paths, active, camera_factor, ..counts([], 1.0) };
         let mut expected = 0.0;
         for a in &own {
             for b in &other {
@@ -435,6 +447,7 @@ proptest! {
         paths in prop::array::uniform2(0.25_f64..4.0),
         periodic in prop::array::uniform(proptest::bool::ANY),
         thinning in prop::array::uniform2(0.1_f64..1.0),
+        camera_factor in 0.5_f64..16.0,
     ) {
         let periodic: [bool; TECHNIQUES] = periodic;
         samples.sort_by_key(|sample| sample.merged);
@@ -442,7 +455,7 @@ proptest! {
             if periodic[i] && Technique::ALL[i].merges() { 0.25 } else { 1.0 }
         });
         let relative = active.map(|p| 0.5 + p);
-        let counts = Counts { relative, paths, active, roulette, ..counts([], 1.0) };
+        let counts = Counts { relative, paths, active, camera_factor, roulette, ..counts([], 1.0) };
         let expected = products(&samples, thinning, &counts);
         let pilot = PilotRender { cells: 1, passes: 1, ends: vec![samples.len() as u32], samples, thinning, ..pilot() };
         let looks = sample_pairs::Looks::new(&pilot);
