@@ -54,8 +54,8 @@ pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let (gain, error) = least.gain_over(&camera);
     let best = if camera.plan.uses_light_paths() || !(gain <= error) { least } else { camera };
     let is_clear = !judge.known.iter().any(|other| other.may_beat(&best));
-    // After all else: plans with light sub-paths are not compared with others at their best, by predictions
-    // that favour them already.
+    // After all else: a factor makes plans with light sub-paths look better, and predictions favour these
+    // already where they are compared with plans without.
     let factors = judge.judge(&Candidates::camera_factors(&best.plan));
     let best = factors.into_iter().fold(best, |a, b| if b.product() < a.product() { b } else { a });
     let plan = finished(candidates.with_safeguard(best.plan, cost));

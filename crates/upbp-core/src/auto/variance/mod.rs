@@ -74,13 +74,20 @@ impl Counts {
         for technique in techniques.iter() {
             let active = plan.active_part(technique);
             counts.active[technique as usize] = active;
-            counts.relative[technique as usize] = match technique {
-                Technique::Hit | Technique::Nee | Technique::Connect => 1.0,
-                _ => active * pilot.relative_photons(technique, plan),
+            counts.relative[technique as usize] = if has_camera_factor(technique) {
+                1.0
+            } else {
+                active * pilot.relative_photons(technique, plan)
             };
         }
         counts
     }
+}
+
+/// Whether a technique has the camera factor in its weights: as many samples as camera vertices make, however
+/// many light sub-paths there are.
+const fn has_camera_factor(technique: Technique) -> bool {
+    matches!(technique, Technique::Hit | Technique::Nee | Technique::Connect)
 }
 
 /// A pilot render, made ready for predictions.

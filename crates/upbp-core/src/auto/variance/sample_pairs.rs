@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use glam::{DVec3, Vec3};
 use upbp_estimators::Technique;
 
-use super::Counts;
+use super::{Counts, has_camera_factor};
 use crate::auto::pilot_render::PilotRender;
 use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
 use crate::auto::roulette::{COUNT, relative_pass_probability};
@@ -115,8 +115,7 @@ impl<'a> View<'a> {
             roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
             weighted: Technique::ALL.map(|technique| {
-                let of_camera = matches!(technique, Technique::Hit | Technique::Nee | Technique::Connect);
-                let factor = if of_camera { counts.camera_factor } else { 1.0 };
+                let factor = if has_camera_factor(technique) { counts.camera_factor } else { 1.0 };
                 (factor * counts.relative[technique as usize]) as f32
             }),
             camera_factor: counts.camera_factor as f32,
