@@ -68,6 +68,7 @@ pub struct Preparing {
 ///
 /// A preparation takes samples of the scene, and any number of samples will do: so they are made to fit.
 pub(crate) struct Budget<'a> {
+    pub(crate) start: Instant,
     pub(crate) canceller: Canceller,
     /// The rules by which the render is going to end.
     pub(crate) stop: Stop,
@@ -97,6 +98,20 @@ impl Budget<'_> {
         let seconds = self.stop.seconds.map(|seconds| part * preparation_of(seconds));
         Allowance::new(&self.canceller, seconds)
     }
+
+    /// What the steps so far have left of the time for the preparation, less the part that those to come may
+    /// take; at least the part `least`, and unlimited if the render's time is.
+    pub(crate) fn rest(&self, to_come: f64, least: f64) -> Allowance<'_> {
+        let spent = self.start.elapsed().as_secs_f64();
+        let seconds =
+            self.stop.seconds.map(|seconds| rest_of(preparation_of(seconds), spent, to_come, least));
+        Allowance::new(&self.canceller, seconds)
+    }
+}
+
+/// What is left when `spent` is, less the part `to_come` of all, but at least the part `least`.
+fn rest_of(all: f64, spent: f64, to_come: f64, least: f64) -> f64 {
+    ((1.0 - to_come) * all - spent).max(least * all)
 }
 
 /// Seconds of a render that its preparation may take.
@@ -134,10 +149,11 @@ impl<'a> Allowance<'a> {
         Halt { canceller: self.canceller, deadline }
     }
 
-    /// Whether there is time for work that takes `times` as long as all that was done so far.
-    pub(crate) fn has_time_for(&self, times: f64) -> bool {
-        let spent = self.start.elapsed().as_secs_f64();
-        self.time.is_none_or(|time| (1.0 + times) * spent <= time.as_secs_f64())
+    /// What is left of the time over the time that `work` took. Infinite without a limit.
+    pub(crate) fn left_over(&self, work: Duration) -> f64 {
+        self.time.map_or(f64::INFINITY, |time| {
+            time.saturating_sub(self.start.elapsed()).as_secs_f64() / work.as_secs_f64().max(1e-9)
+        })
     }
 
     /// The largest run that there is time for: `run` is given the part of the full work that it is to do, and
@@ -149,16 +165,16 @@ impl<'a> Allowance<'a> {
         /// The first part.
         const FIRST: f64 = 1.0 / 128.0;
         let unlimited = Halt { canceller: self.canceller, deadline: None };
-        let Some(time) = self.time else { return run(1.0, &unlimited) };
+        if !self.is_limited() {
+            return run(1.0, &unlimited);
+        }
         let (mut part, mut best) = (FIRST, None);
         loop {
             let halt = if best.is_none() { unlimited } else { self.halt() };
             let began = Instant::now();
             let Some(result) = run(part, &halt) else { return best };
             best = Some(result);
-            let left = time.saturating_sub(self.start.elapsed()).as_secs_f64();
-            let affordable = part * left / began.elapsed().as_secs_f64().max(1e-9);
-            let next = affordable.min(1.0);
+            let next = (part * self.left_over(began.elapsed())).min(1.0);
             if part >= 1.0 || next < 2.0 * part {
                 return best;
             }
@@ -222,12 +238,20 @@ mod tests {
     #[test]
     fn more_is_done_as_long_as_there_is_time() {
         let canceller = Canceller::default();
-        assert!(Allowance::new(&canceller, None).has_time_for(1e9));
-        assert!(Allowance::new(&canceller, Some(1e9)).has_time_for(2.0));
+        let second = Duration::from_secs(1);
+        assert_eq!(Allowance::new(&canceller, None).left_over(second), f64::INFINITY);
+        let left = Allowance::new(&canceller, Some(1e6)).left_over(second);
+        assert!(left > 0.9e6 && left <= 1e6, "{left}");
         let none = Allowance::new(&canceller, Some(0.0));
         assert!(none.halt().now() && none.is_limited());
-        std::thread::sleep(Duration::from_millis(1));
-        assert!(!none.has_time_for(0.0));
+        assert_eq!(none.left_over(second), 0.0);
+    }
+
+    #[test]
+    fn the_last_steps_have_what_the_others_leave() {
+        for (spent, left) in [(0.0, 40.0), (10.0, 30.0), (45.0, 20.0), (100.0, 20.0)] {
+            assert_eq!(rest_of(50.0, spent, 0.2, 0.4), left);
+        }
     }
 
     #[test]

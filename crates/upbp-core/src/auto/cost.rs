@@ -52,13 +52,20 @@ impl<'a> Cost<'a> {
 
     /// Processor nanoseconds of the pilot render and of the search in it.
     pub(super) fn of_pilot(self) -> f64 {
+        let pilot = self.0;
         // All passes of each cell's pixel, and its partner.
-        let part = (self.0.cells * (self.0.passes + 1)) as f64 / self.0.pixels;
-        RECORDING * part * self.iteration(&self.0.plan)
+        let camera = (pilot.cells * (pilot.passes + 1)) as f64 * self.camera_path(&pilot.plan);
+        let light = pilot.passes as f64 * pilot.thinning[0] * self.light_paths(&pilot.plan);
+        RECORDING * (camera + light)
     }
 
     /// Processor nanoseconds of an iteration.
     pub(super) fn iteration(self, plan: &Plan) -> f64 {
+        self.0.pixels * self.camera_path(plan) + self.light_paths(plan)
+    }
+
+    /// Processor nanoseconds of a pixel of an iteration.
+    fn camera_path(self, plan: &Plan) -> f64 {
         let work = &self.0.work;
         // The part of the camera sub-paths that run any of some techniques.
         let any = |techniques: TechniqueSet| {
@@ -75,10 +82,16 @@ impl<'a> Cost<'a> {
             let samples = self.0.relative_photons(technique, plan) * work.samples[i][roulette];
             camera += plan.active_part(technique) * (calls + samples * NS_PER_SAMPLE[i]);
         }
+        camera
+    }
+
+    /// Processor nanoseconds of all light sub-paths of an iteration, and of what is built of them.
+    fn light_paths(self, plan: &Plan) -> f64 {
+        let work = &self.0.work;
         let mut light = work.light_edges * NS_PER_EDGE;
         if plan.techniques.has(Technique::LightTracing) {
             let i = Technique::LightTracing as usize;
-            light += work.calls[i][roulette] * NS_PER_CALL[i];
+            light += work.calls[i][self.0.roulette(plan)] * NS_PER_CALL[i];
         }
         if plan.techniques.intersects(PHOTON_POINTS.with(Technique::Connect)) {
             light += work.vertices * NS_PER_VERTEX;
@@ -88,7 +101,7 @@ impl<'a> Cost<'a> {
         }
         let light_paths = if plan.uses_light_paths() { f64::from(plan.light_paths) } else { 0.0 };
         let beam_paths = if plan.techniques.intersects(BEAMS) { f64::from(plan.beam_paths) } else { 0.0 };
-        self.0.pixels * camera + light_paths * light + beam_paths * work.beams * NS_PER_TREE_BEAM
+        light_paths * light + beam_paths * work.beams * NS_PER_TREE_BEAM
     }
 
     /// Time of a call among the photons or beams of a plan over that of the table: by the depth of their

@@ -12,8 +12,9 @@
 //! with the least product of both. Predictions are noisy, so there is one rule for all steps of the search: a
 //! step must gain more than [a fixed part](search::GAIN) and more than its own standard error.
 //!
-//! The pilot render grows until no other candidate is likely to be better by more than that part, or until it
-//! has taken [2 %](PILOT_PART) of the work that the render is going to do, whichever comes first.
+//! The pilot render grows until no other candidate is likely to be better by more than that part and until it
+//! has as many light sub-paths as the full plan, but takes at most [2 %](PILOT_PART) of the work that the
+//! render is going to do, or the time that is left for the preparation.
 //!
 //! None of these samples is part of the picture: whatever is chosen, the picture is unbiased. The choice
 //! counts work and looks at no clock, so that it can be repeated, unless a limit of time holds.
@@ -41,7 +42,7 @@ use upbp_estimators::TechniqueSet;
 use upbp_estimators::scene::Scene;
 use upbp_media::Lanes;
 
-use crate::deadline::Budget;
+use crate::deadline::{Budget, Clock};
 use crate::error::RenderError;
 use crate::plan::{FrozenPlan, Plan};
 use crate::settings::{CheckedSettings, Techniques};
@@ -57,12 +58,21 @@ pub(crate) use full_plan::iteration_plan;
 
 /// Part of the render's work that pilot renders may take, unless the first one takes more.
 const PILOT_PART: f64 = 0.02;
-/// Factor by which a pilot render grows.
-const GROWTH: u32 = 2;
-/// Parts of the time of a preparation that the statistics and the pilot renders may take, if there is a limit
-/// of time.
+/// Factors by which a pilot render grows at most: the pixels of one that is too small to be trusted, as the
+/// first ones are where time is limited; those of one that leaves candidates in doubt; and the light
+/// sub-paths for each pixel, since what was not met at all leaves nothing in doubt.
+const GROWTH_AT_FIRST: u32 = 8;
+const GROWTH_IN_DOUBT: u32 = 2;
+const GROWTH_OF_LIGHT: u32 = 4;
+/// Part of what is left of the time, and of all room for samples, that the next pilot render is planned to
+/// take: both grow faster than its size.
+const PLANNED: f64 = 0.7;
+/// Part of the time of a preparation that the statistics may take, if there is a limit of time.
 const TIME_FOR_STATISTICS: f64 = 0.2;
+/// Part that pilot renders may take at least: they have what the steps before them leave.
 const TIME_FOR_PILOT: f64 = 0.4;
+/// Part that is kept for what may come after them, another choice of emitters.
+const TIME_AFTER_PILOT: f64 = 0.2;
 
 /// A plan, with what was learnt on the way to it.
 pub(crate) struct Choice {
@@ -153,34 +163,51 @@ fn best_plan<S: Scene, L: Lanes>(
     candidates: &Candidates,
     budget: &Budget<'_>,
 ) -> Plan {
-    let allowance = budget.part(TIME_FOR_PILOT);
-    let enough = Size::enough(scene, candidates.full.techniques);
-    let most = Size::most(scene);
-    let mut size = if allowance.is_limited() { Size::LEAST } else { enough };
+    let allowance = budget.rest(TIME_AFTER_PILOT, TIME_FOR_PILOT);
+    let enough = Size::enough_pixels(scene, candidates.full.techniques);
+    let most = Size::most_pixels(scene);
+    let mut size = Size::LEAST;
+    if !allowance.is_limited() {
+        size.pixels = enough;
+    }
     let (mut plan, mut spent) = (None, 0.0);
     loop {
+        let mut clock = Clock::start();
         let Some(pilot) =
             PilotRender::run::<S, L>(scene, settings, &candidates.full, size, &allowance.halt())
         else {
             // No time, or more samples than there is room for.
-            if plan.is_some() || allowance.halt().now() || size <= Size::LEAST {
+            if plan.is_some() || allowance.halt().now() || size.pixels <= Size::LEAST.pixels {
                 return plan.unwrap_or(candidates.usual());
             }
-            size = Size(size.0 / 4);
+            size.pixels /= 4;
             continue;
         };
         let variance = Variance::of(pilot);
         let found = search::best(&variance, candidates);
-        let cost = Cost::of(variance.pilot()).of_pilot();
-        spent += cost;
         plan = Some(found.plan);
-        let is_done = size >= enough
-            && (found.is_clear
-                || size >= most
-                || spent + f64::from(GROWTH) * cost > PILOT_PART * found.work(&budget.stop));
-        if is_done || !allowance.has_time_for(1.0) {
+        let pilot = variance.pilot();
+        let affordable = PLANNED * allowance.left_over(clock.lap()).min(pilot.room_taken.recip());
+        let at_most = |growth: u32| affordable.min(f64::from(growth)) as u32;
+        if 2 * size.pixels < enough {
+            let growth = at_most(GROWTH_AT_FIRST);
+            if growth < 2 {
+                return found.plan;
+            }
+            size.pixels = (growth * size.pixels).min(enough);
+            continue;
+        }
+        let in_doubt = !found.is_clear && size.pixels < most;
+        let (part, growth) = if in_doubt {
+            (&mut size.pixels, at_most(GROWTH_IN_DOUBT))
+        } else {
+            (&mut size.light_paths, at_most(GROWTH_OF_LIGHT).min(pilot.more_light_paths as u32))
+        };
+        let cost = Cost::of(pilot).of_pilot();
+        spent += cost;
+        if growth < 2 || spent + f64::from(growth) * cost > PILOT_PART * found.work(&budget.stop) {
             return found.plan;
         }
-        size = size.times(GROWTH);
+        *part *= growth;
     }
 }

@@ -49,7 +49,7 @@ pub(super) fn prepare<'a, S: Scene>(
     let begun = Instant::now();
     let Start { plan, canceller, stop, progress } = start;
     let stop = if settings.deterministic { Stop::default() } else { stop };
-    let mut budget = Budget { canceller: canceller.clone(), stop, progress };
+    let mut budget = Budget { start: begun, canceller: canceller.clone(), stop, progress };
     let mut prepared = PreparedScene::new(scene)?;
     let choice = auto::choose(&mut prepared, &settings, plan, &mut budget)?;
     let rect = scene.camera().crop();

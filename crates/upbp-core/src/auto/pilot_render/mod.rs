@@ -31,33 +31,33 @@ use recorder::{ByRoulette, ByTechnique, MOST_SAMPLES, Recorder, Room, Sample, TE
 pub(super) const PASSES: u32 = 2;
 /// Light vertices of a pass, at most.
 const LIGHT_VERTICES: f64 = 5e5;
-/// Light sub-paths per pixel that is looked at. What is rare to photons, as a few that are bright in front of
-/// the camera, is all that tells some plans from others.
-const LIGHT_PATHS_PER_PIXEL: u32 = 8;
 
-/// The number of pixels that a pilot render looks at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Size(pub(super) u32);
+/// The size of a pilot render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Size {
+    /// Pixels that it looks at.
+    pub(super) pixels: u32,
+    /// Light sub-paths for each of them. What is rare to photons, as a few that are bright in front of the
+    /// camera, is all that tells some plans from others.
+    pub(super) light_paths: u32,
+}
 
 impl Size {
-    /// With fewer pixels nothing can be told.
-    pub(super) const LEAST: Self = Self(25);
+    /// With less nothing can be told.
+    pub(super) const LEAST: Self = Self { pixels: 25, light_paths: 8 };
+
     /// Pixels beyond which too little would be learnt.
-    pub(super) fn most<S: Scene>(scene: &PreparedScene<'_, S>) -> Self {
+    pub(super) fn most_pixels<S: Scene>(scene: &PreparedScene<'_, S>) -> u32 {
         let crop = scene.scene.camera().crop();
-        Self(crop.width.saturating_mul(crop.height).min(16_384))
+        crop.width.saturating_mul(crop.height).min(16_384)
     }
 
     /// Pixels from which on a choice is trusted: more where no media make them slow.
-    pub(super) fn enough<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> Self {
+    pub(super) fn enough_pixels<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> u32 {
         let crop = scene.scene.camera().crop();
         let media = techniques.intersects(TechniqueSet::VOLUME_MERGES);
         let part = if media { 12 } else { 4 };
-        Self((crop.width.saturating_mul(crop.height) / part).clamp(400, 2048))
-    }
-
-    pub(super) const fn times(self, factor: u32) -> Self {
-        Self(self.0.saturating_mul(factor))
+        (crop.width.saturating_mul(crop.height) / part).clamp(400, 2048)
     }
 }
 
@@ -84,6 +84,10 @@ pub(super) struct PilotRender {
     /// Light sub-paths per pass over those of the plan, and the same of those with beams.
     pub(super) thinning: [f64; 2],
     pub(super) work: Work,
+    /// Part of the room for samples that these take.
+    pub(super) room_taken: f64,
+    /// Light sub-paths that there might be over those that there are.
+    pub(super) more_light_paths: f64,
 }
 
 /// Merges with one light sub-path at the pixel of a cell and at another one near it.
@@ -119,12 +123,13 @@ impl PilotRender {
         scene: &PreparedScene<'_, S>,
         settings: &CheckedSettings,
         plan: &Plan,
-        Size(pixels): Size,
+        size: Size,
         halt: &Halt<'_>,
     ) -> Option<Self> {
-        let grid = Grid::new(scene.scene.camera().crop(), pixels);
+        let grid = Grid::new(scene.scene.camera().crop(), size.pixels);
         let most_paths = (LIGHT_VERTICES / plan.vertices_per_light_path.max(1.0)).max(64.0) as u32;
-        let paths = (LIGHT_PATHS_PER_PIXEL * grid.cells()).min(most_paths).min(plan.light_paths);
+        let most_paths = most_paths.min(plan.light_paths);
+        let paths = size.light_paths.saturating_mul(grid.cells()).min(most_paths);
         let beam_paths = plan.beam_paths.min(paths);
         let part = |traced: u32, planned: u32| f64::from(traced) / f64::from(planned.max(1));
         let mut pilot = Self {
@@ -139,6 +144,8 @@ impl PilotRender {
             splats: Vec::new(),
             thinning: [part(paths, plan.light_paths), part(beam_paths, plan.beam_paths)],
             work: Work::default(),
+            room_taken: 0.0,
+            more_light_paths: f64::from(most_paths) / f64::from(paths.max(1)),
         };
         let mut thinned = iteration_plan(scene, settings, plan, 0).thinned(paths, beam_paths);
         let room = Room::new(MOST_SAMPLES);
@@ -158,6 +165,7 @@ impl PilotRender {
         for pass in &mut passes {
             pilot.splats.append(&mut pass.splats);
         }
+        pilot.room_taken = room.taken();
         let camera_paths = f64::from(grid.cells() * PASSES);
         pilot.work = pilot.work(&passes, camera_paths, [paths, beam_paths].map(|n| f64::from(n * PASSES)));
         let partners = std::mem::take(&mut passes[0].partners);

@@ -141,6 +141,11 @@ impl Room {
         Self { taken: AtomicUsize::new(0), most }
     }
 
+    /// The part of it that is taken.
+    pub(super) fn taken(&self) -> f64 {
+        self.taken.load(Ordering::Relaxed) as f64 / self.most as f64
+    }
+
     /// Takes room for more samples; whether there was enough.
     fn take(&self, samples: usize) -> bool {
         samples <= self.most && self.taken.fetch_add(samples, Ordering::Relaxed) + samples <= self.most

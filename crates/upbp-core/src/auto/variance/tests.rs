@@ -54,6 +54,8 @@ fn pilot_of(other: Technique) -> PilotRender {
         splats: Vec::new(),
         thinning: [1.0; 2],
         work: Work::default(),
+        room_taken: 0.0,
+        more_light_paths: 1.0,
     }
 }
 
