@@ -7,11 +7,14 @@
 
 use crate::film::BLOCK_SIDES;
 
+/// Steps of a sequence that fills the unit square evenly (Roberts's R2).
+const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+
 /// The farthest that pixels of a block are apart in a row.
 const FARTHEST: u32 = 15;
 
 /// Pairs of pixels at an offset in a block, over the pixels of the block; mean over all [sides](BLOCK_SIDES).
-fn weight([x, y]: [i32; 2]) -> f64 {
+pub(super) fn weight([x, y]: [i32; 2]) -> f64 {
     let of_side = |side: u32| {
         let pairs = side.saturating_sub(x.unsigned_abs()) * side.saturating_sub(y.unsigned_abs());
         f64::from(pairs) / f64::from(side * side)
@@ -19,11 +22,17 @@ fn weight([x, y]: [i32; 2]) -> f64 {
     BLOCK_SIDES.map(of_side).iter().sum::<f64>() / BLOCK_SIDES.len() as f64
 }
 
+/// Another of `count` elements than the one at `index`, the n-th one that is drawn: all others are as likely.
+pub(super) fn another(n: usize, index: usize, count: usize) -> usize {
+    let others = count - 1;
+    let drawn = (n as f64 * STEPS[0]).fract() * others as f64;
+    (index + 1 + (drawn as usize).min(others - 1)) % count
+}
+
 /// The offset of the n-th pair of pixels, and its weight over its probability. Half as far is as likely:
 /// there is more in common the nearer they are.
 pub(super) fn offset(n: u32) -> ([i32; 2], f64) {
-    // Places of a sequence that fills the unit square evenly (Roberts's R2).
-    let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3].map(|step| (f64::from(n) * step).fract());
+    let [u, v] = STEPS.map(|step| (f64::from(n) * step).fract());
     let all: f64 = (1..=FARTHEST).map(|ring| f64::from(ring).recip()).sum();
     let mut rest = u * all;
     let mut ring = 1;
@@ -56,6 +65,24 @@ mod tests {
         let expected = BLOCK_SIDES.map(|side| f64::from(side * side - 1)).iter().sum::<f64>() / 4.0;
         let sum: f64 = offsets().map(weight).sum();
         assert!((sum / expected - 1.0).abs() < 1e-12, "{sum}, expected {expected}");
+    }
+
+    #[test]
+    fn every_other_one_is_drawn_alike() {
+        for count in [2, 3, 10] {
+            let mut drawn = vec![[0_usize; 10]; count];
+            let draws = 10_000;
+            for n in 0..draws * count {
+                drawn[n % count][another(n, n % count, count)] += 1;
+            }
+            let expected = draws / (count - 1);
+            for (index, drawn) in drawn.iter().enumerate() {
+                for (other, &found) in drawn[..count].iter().enumerate() {
+                    let expected = if other == index { 0 } else { expected };
+                    assert!(found.abs_diff(expected) <= expected / 100, "{index}, {other}: {found}");
+                }
+            }
+        }
     }
 
     /// Sums over all offsets are estimated without bias, whatever they are of.

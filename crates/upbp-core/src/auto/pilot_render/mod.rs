@@ -10,7 +10,7 @@ pub(super) mod recorder;
 
 use std::ops::Range;
 
-use upbp_estimators::path::{Context, LightChunk};
+use upbp_estimators::path::{Context, LightChunk, Splat};
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
@@ -29,6 +29,8 @@ use recorder::{ByRoulette, ByTechnique, MOST_SAMPLES, Recorder, Room, Sample, TE
 
 /// Looks at each pixel: enough to tell what they have in common.
 pub(super) const PASSES: u32 = 2;
+/// Splats that are asked what they have in common with others of their light sub-path, about.
+const ASKED_SPLATS: usize = 1 << 16;
 /// Light vertices of a pass, at most.
 const LIGHT_VERTICES: f64 = 5e5;
 
@@ -77,7 +79,7 @@ pub(super) struct PilotRender {
     pub(super) samples: Vec<Sample>,
     /// Ends of samples: `ends[cell * passes + pass]` is behind the last one of each.
     pub(super) ends: Vec<u32>,
-    /// Merges with light sub-paths that are seen at two pixels of a block.
+    /// What light sub-paths bring to two pixels of a block, by merges or by splats.
     pub(super) shared: Vec<Shared>,
     /// Splats by cell. Light sub-paths fill the whole picture.
     pub(super) splats: Vec<(u32, Sample)>,
@@ -90,7 +92,7 @@ pub(super) struct PilotRender {
     pub(super) more_light_paths: f64,
 }
 
-/// Merges with one light sub-path at the pixel of a cell and at another one near it.
+/// Merges with one light sub-path, or splats of one, at a pixel of a cell and at another one near it.
 pub(super) struct Shared {
     pub(super) cell: u32,
     /// Part of their product in the mean error of blocks.
@@ -169,6 +171,7 @@ impl PilotRender {
         let camera_paths = f64::from(grid.cells() * PASSES);
         pilot.work = pilot.work(&passes, camera_paths, [paths, beam_paths].map(|n| f64::from(n * PASSES)));
         let partners = std::mem::take(&mut passes[0].partners);
+        pilot.shared = std::mem::take(&mut passes[0].shared_splats);
         pilot.sort(passes);
         pilot.share(&partners, &grid);
         Some(pilot)
@@ -299,6 +302,8 @@ struct Pass {
     /// Recorders of the partners of cells' pixels, in the same order.
     partners: Vec<Recorder>,
     splats: Vec<(u32, Sample)>,
+    /// What splats have in common with others of their light sub-path, if there are partners.
+    shared_splats: Vec<Shared>,
     counters: Counters,
 }
 
@@ -326,13 +331,20 @@ impl Pass {
             camera: Vec::new(),
             partners: Vec::new(),
             splats: Vec::new(),
+            shared_splats: Vec::new(),
             counters: Counters::default(),
         };
+        let splats: usize = pieces.iter().map(|(recorder, _)| recorder.samples.len()).sum();
+        let step = splats.div_ceil(ASKED_SPLATS).max(1);
         let (mut vertices, mut beams) = (Vec::new(), Vec::new());
         for (recorder, out) in pieces {
             vertices.extend(out.vertices);
             beams.extend(out.beams);
             pass.counters.add(&out.counters);
+            if with_partners {
+                let first = pass.splats.len();
+                pass.shared_splats.extend(shared_splats(&recorder, &out.splats, first, step, grid));
+            }
             // A splat goes with each sample.
             let cells = out.splats.iter().map(|splat| grid.cell(splat.pixel));
             pass.splats.extend(cells.zip(recorder.samples.iter().copied()));
@@ -377,5 +389,84 @@ impl Pass {
             })?;
         }
         Some(pass)
+    }
+}
+
+/// What splats of light sub-paths have in common: every one in `step` with another one of its sub-path, which
+/// is drawn and stands for all others. The first splat is the `first` one of its pass.
+fn shared_splats<'a>(
+    recorder: &'a Recorder,
+    splats: &'a [Splat],
+    first: usize,
+    step: usize,
+    grid: &'a Grid,
+) -> impl Iterator<Item = Shared> + 'a {
+    let per_pixel = f64::from(grid.cells()) / grid.pixels();
+    let of_path = move |range: Range<usize>| {
+        let count = range.len();
+        let asked = (0..count).filter(move |i| count > 1 && (first + range.start + i).is_multiple_of(step));
+        asked.filter_map(move |i| {
+            let [own, other] =
+                [i, blocks::another(first + range.start + i, i, count)].map(|i| range.start + i);
+            let [from, to] = [own, other].map(|i| splats[i].pixel.map(u32::cast_signed));
+            let weight = blocks::weight([to[0] - from[0], to[1] - from[1]]);
+            let samples = [own, other].map(|i| vec![recorder.samples[i]]);
+            let weight = weight * ((count - 1) * step) as f64 * per_pixel;
+            (weight > 0.0).then(|| Shared { cell: grid.cell(splats[own].pixel), weight, samples })
+        })
+    };
+    recorder.ranges().flat_map(of_path)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use upbp_estimators::scene::PixelRect;
+    use upbp_media::Spectrum;
+
+    use super::*;
+
+    #[test]
+    fn drawn_pairs_of_splats_stand_for_all() {
+        let grid = Grid::new(PixelRect { x: 0, y: 0, width: 64, height: 48 }, 192);
+        let (mut recorder, mut splats) = (Recorder::default(), Vec::new());
+        let mut expected = 0.0;
+        for count in [3, 0, 1, 2, 9] {
+            let first = splats.len();
+            let room = Room::new(1);
+            recorder.record(&room, |recorder| {
+                for i in first..first + count {
+                    let value = Vec3::splat(1.0 + i as f32);
+                    let technique = Technique::LightTracing;
+                    recorder.samples.push(Sample {
+                        technique,
+                        merged: None,
+                        albedos: 1.0,
+                        value,
+                        shares: [0.0; TECHNIQUES],
+                    });
+                    let pixel = [(11 * i % 24) as u32, (7 * i % 20) as u32];
+                    splats.push(Splat { pixel, value: Spectrum::splat(1.0) });
+                }
+            });
+            for (i, j) in (first..first + count).flat_map(|i| (first..first + count).map(move |j| (i, j))) {
+                let [a, b] = [i, j].map(|i| splats[i].pixel.map(u32::cast_signed));
+                if i != j {
+                    let product = ((i + 1) * (j + 1)) as f64;
+                    expected += blocks::weight([a[0] - b[0], a[1] - b[1]]) * product / 16.0;
+                }
+            }
+        }
+        for step in [1, 3] {
+            let draws = 30_000;
+            let mut found = 0.0;
+            for first in 0..draws {
+                for shared in shared_splats(&recorder, &splats, first, step, &grid) {
+                    let [own, other] = shared.samples.each_ref().map(|samples| f64::from(samples[0].value.x));
+                    found += shared.weight * own * other / draws as f64;
+                }
+            }
+            assert!((found / expected - 1.0).abs() < 0.01, "{step}: {found}, expected {expected}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Samples with the parts of all techniques in their weights, and counts of work, as the walks of a pilot
 //! render make them.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
@@ -106,8 +107,17 @@ impl Recorder {
 
     /// The samples of the i-th sub-path.
     pub(super) fn of_path(&self, i: usize) -> &[Sample] {
+        &self.samples[self.range(i)]
+    }
+
+    /// The places of the samples of each sub-path.
+    pub(super) fn ranges(&self) -> impl Iterator<Item = Range<usize>> {
+        (0..self.ends.len()).map(|i| self.range(i))
+    }
+
+    fn range(&self, i: usize) -> Range<usize> {
         let start = if i == 0 { 0 } else { self.ends[i - 1] };
-        &self.samples[start as usize..self.ends[i] as usize]
+        start as usize..self.ends[i] as usize
     }
 
     /// Another edge of a camera sub-path.
