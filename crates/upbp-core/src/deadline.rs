@@ -68,6 +68,7 @@ pub struct Preparing {
 ///
 /// A preparation takes samples of the scene, and any number of samples will do: so they are made to fit.
 pub(crate) struct Budget<'a> {
+    /// The beginning of the preparation.
     pub(crate) start: Instant,
     pub(crate) canceller: Canceller,
     /// The rules by which the render is going to end.
@@ -99,7 +100,7 @@ impl Budget<'_> {
         Allowance::new(&self.canceller, seconds)
     }
 
-    /// What the steps so far have left of the time for the preparation, less the part that those to come may
+    /// Time that the steps so far have left of that for the preparation, less the part that those to come may
     /// take; at least the part `least`, and unlimited if the render's time is.
     pub(crate) fn rest(&self, to_come: f64, least: f64) -> Allowance<'_> {
         let spent = self.start.elapsed().as_secs_f64();
@@ -109,7 +110,7 @@ impl Budget<'_> {
     }
 }
 
-/// What is left when `spent` is, less the part `to_come` of all, but at least the part `least`.
+/// Time left of `all` after `spent`, less the part `to_come` of all, but at least the part `least`.
 fn rest_of(all: f64, spent: f64, to_come: f64, least: f64) -> f64 {
     ((1.0 - to_come) * all - spent).max(least * all)
 }
@@ -149,7 +150,7 @@ impl<'a> Allowance<'a> {
         Halt { canceller: self.canceller, deadline }
     }
 
-    /// What is left of the time over the time that `work` took. Infinite without a limit.
+    /// The time that is left over the time that `work` took. Infinite without a limit.
     pub(crate) fn left_over(&self, work: Duration) -> f64 {
         self.time.map_or(f64::INFINITY, |time| {
             time.saturating_sub(self.start.elapsed()).as_secs_f64() / work.as_secs_f64().max(1e-9)

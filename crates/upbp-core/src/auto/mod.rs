@@ -13,8 +13,9 @@
 //! step must gain more than [a fixed part](search::GAIN) and more than its own standard error.
 //!
 //! The pilot render grows until no other candidate is likely to be better by more than that part and until it
-//! has as many light sub-paths as the full plan, but takes at most [2 %](PILOT_PART) of the work that the
-//! render is going to do, or the time that is left for the preparation.
+//! has as many light sub-paths as the full plan, or as there is room for, but takes at most
+//! [2 %](PILOT_PART) of the work that the render is going to do, or the time that is left for the
+//! preparation.
 //!
 //! None of these samples is part of the picture: whatever is chosen, the picture is unbiased. The choice
 //! counts work and looks at no clock, so that it can be repeated, unless a limit of time holds.

@@ -79,7 +79,7 @@ pub(super) struct PilotRender {
     pub(super) samples: Vec<Sample>,
     /// Ends of samples: `ends[cell * passes + pass]` is behind the last one of each.
     pub(super) ends: Vec<u32>,
-    /// What light sub-paths bring to two pixels of a block, by merges or by splats.
+    /// Contributions of light sub-paths to two pixels of a block, by merges or by splats.
     pub(super) shared: Vec<Shared>,
     /// Splats by cell. Light sub-paths fill the whole picture.
     pub(super) splats: Vec<(u32, Sample)>,
@@ -302,7 +302,7 @@ struct Pass {
     /// Recorders of the partners of cells' pixels, in the same order.
     partners: Vec<Recorder>,
     splats: Vec<(u32, Sample)>,
-    /// What splats have in common with others of their light sub-path, if there are partners.
+    /// Pairs of splats of one light sub-path, if there are partners.
     shared_splats: Vec<Shared>,
     counters: Counters,
 }
@@ -392,8 +392,8 @@ impl Pass {
     }
 }
 
-/// What splats of light sub-paths have in common: every one in `step` with another one of its sub-path, which
-/// is drawn and stands for all others. The first splat is the `first` one of its pass.
+/// Pairs of splats of one light sub-path at pixels of one block: every splat in `step` with another one,
+/// which is drawn and stands for all others. The first splat is the `first` one of its pass.
 fn shared_splats<'a>(
     recorder: &'a Recorder,
     splats: &'a [Splat],
@@ -404,15 +404,18 @@ fn shared_splats<'a>(
     let per_pixel = f64::from(grid.cells()) / grid.pixels();
     let of_path = move |range: Range<usize>| {
         let count = range.len();
-        let asked = (0..count).filter(move |i| count > 1 && (first + range.start + i).is_multiple_of(step));
-        asked.filter_map(move |i| {
-            let [own, other] =
-                [i, blocks::another(first + range.start + i, i, count)].map(|i| range.start + i);
+        let start = range.start;
+        let asked = range.filter(move |own| count > 1 && (first + own).is_multiple_of(step));
+        asked.filter_map(move |own| {
+            let other = start + blocks::another(first + own, own - start, count);
             let [from, to] = [own, other].map(|i| splats[i].pixel.map(u32::cast_signed));
-            let weight = blocks::weight([to[0] - from[0], to[1] - from[1]]);
-            let samples = [own, other].map(|i| vec![recorder.samples[i]]);
-            let weight = weight * ((count - 1) * step) as f64 * per_pixel;
-            (weight > 0.0).then(|| Shared { cell: grid.cell(splats[own].pixel), weight, samples })
+            let others = ((count - 1) * step) as f64;
+            let weight = per_pixel * others * blocks::weight([to[0] - from[0], to[1] - from[1]]);
+            (weight > 0.0).then(|| Shared {
+                cell: grid.cell(splats[own].pixel),
+                weight,
+                samples: [own, other].map(|i| vec![recorder.samples[i]]),
+            })
         })
     };
     recorder.ranges().flat_map(of_path)
