@@ -37,7 +37,7 @@ pub use light_map::LightMap;
 pub use merge_periods::MergePeriods;
 pub use prepared_scene::{PrepareError, PreparedScene};
 pub use radius_field::{FootprintField, RadiusField};
-pub use random::{Decision, Stream, StreamKind, half};
+pub use random::{Decision, Stream, StreamKind, half, pixel_index};
 pub use roulette::{Roulette, Survival};
 pub use technique::{Layer, PerMerge, Technique, TechniqueSet, UnknownTechnique};
 pub use upbp_accel::{Ray, offset_origin};

@@ -6,18 +6,25 @@
 //!
 //! The first decisions of a sub-path are points of Owen-scrambled (0, 2)-sequences, padded: every decision
 //! has an order and a scramble of its own (`docs/theory.md`, section 6.7). The light sub-paths of an
-//! iteration are stratified among each other, the camera sub-paths of a pixel over iterations; each sub-path
-//! for itself is uniform and independent of all others, so nothing is biased. Later decisions, whose strata
-//! no longer mean anything, come from xoshiro256++.
+//! iteration are stratified among each other, the camera sub-paths of a pixel over iterations and with those
+//! of the pixels around it; each sub-path for itself is uniform, so nothing is biased. Later decisions, whose
+//! strata no longer mean anything, come from xoshiro256++.
 //!
-//! Source: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020. Oracle:
-//! `tests::strata_hold_one_point_each`.
+//! Sources: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020; for pixels that share a
+//! sequence, with samples of a known number, A. Ahmed and P. Wonka, "Screen-Space Blue-Noise Diffusion of
+//! Monte Carlo Sampling Error via Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020. Oracles:
+//! `tests::strata_hold_one_point_each`, `tests::strata_of_squares_hold_one_point_each`.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// Draws that are stratified: about four vertices of a path.
 const STRATIFIED_DRAWS: u32 = 24;
+/// Side of the squares of pixels whose camera sub-paths share their sequences: that of the largest blocks
+/// that errors over scales are taken of.
+const SQUARE: u32 = 1 << LEVELS;
+/// Times that a square is divided into four to get to a pixel.
+const LEVELS: u32 = 4;
 /// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the
 /// lens, the first distance in a medium, and the next event there, an emitter and a point on it. Without a
 /// medium, what is drawn next.
@@ -28,8 +35,9 @@ const COMMON_DRAWS: u32 = 5;
 pub enum StreamKind {
     /// Light sub-paths.
     Light,
-    /// Camera sub-paths. Those of even and of odd iterations are stratified apart, so that the two halves of
-    /// a render are independent of each other and their difference tells the error.
+    /// Camera sub-paths, by [`pixel_index`]. Those of even and of odd iterations are stratified apart, so
+    /// that the two halves of a render are independent of each other and their difference tells the error.
+    /// So are those of different squares of 16 × 16 pixels.
     Camera,
     /// Light sub-paths of the pilot, which sets radii and counts before the first iteration.
     PilotLight,
@@ -44,8 +52,11 @@ pub enum StreamKind {
 /// A stream of uniform random numbers.
 #[derive(Clone, Debug)]
 pub struct Stream {
-    /// Number of the point in the sequences that this stream shares with others, the lowest bit first.
+    /// Number of the sub-path among those that share the sequences, of one pixel, the lowest bit first.
     point: u32,
+    /// The pixel among those that share the sequences, if several do: [quarters of the
+    /// square](place_in_square).
+    place: Option<u8>,
     /// Key of all streams that are stratified among each other.
     family: u64,
     draws: u32,
@@ -62,8 +73,9 @@ impl Stream {
             mix(mix(seed ^ 0x9e37_79b9_7f4a_7c15) ^ (kind as u64 + 1).wrapping_mul(0x8cb9_2ba7_2f3d_8dd7));
         let of_iteration = iteration.wrapping_mul(0xd1b5_4a32_d192_ed03);
         let of_index = index.wrapping_mul(0xaef1_7502_108e_f2d9);
-        // Light sub-paths share an iteration, camera sub-paths a pixel. Beyond 2³² the sequences repeat their
-        // points, which costs stratification only.
+        // Light sub-paths share an iteration, camera sub-paths a square of pixels. Beyond 2³² sub-paths, or
+        // 2²⁴ of a pixel, the sequences repeat their points, which costs stratification only.
+        let mut place = None;
         let (point, family, from_sequences) = match kind {
             StreamKind::Light | StreamKind::PilotLight => {
                 (index as u32, mix(common ^ of_iteration), STRATIFIED_DRAWS)
@@ -71,7 +83,10 @@ impl Stream {
             StreamKind::Camera => {
                 let (half, point) = half(iteration);
                 let of_half = (half as u64).wrapping_mul(0x2545_f491_4f6c_dd1d);
-                (point as u32, mix(common ^ of_index) ^ of_half, STRATIFIED_DRAWS)
+                let [square, pixel] = square_and_pixel(index);
+                place = Some(place_in_square(pixel));
+                let of_square = square.wrapping_mul(0xaef1_7502_108e_f2d9);
+                (point as u32, mix(common ^ of_square) ^ of_half, STRATIFIED_DRAWS)
             }
             StreamKind::PilotCamera => (0, mix(common ^ of_index), COMMON_DRAWS),
             StreamKind::MergePeriods => (0, 0, 0),
@@ -79,7 +94,7 @@ impl Stream {
         // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in
         // common.
         let rest = Xoshiro256PlusPlus::seed_from_u64(mix(mix(common ^ of_iteration) ^ of_index));
-        Self { point: point.reverse_bits(), family, draws: 0, from_sequences, rest }
+        Self { point: point.reverse_bits(), place, family, draws: 0, from_sequences, rest }
     }
 
     /// The next decision: numbers that may not be needed.
@@ -88,7 +103,7 @@ impl Stream {
         self.draws += 1;
         if self.draws <= self.from_sequences {
             let key = self.family.wrapping_add(u64::from(self.draws).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-            Decision::InSequences { point: self.point, key }
+            Decision::InSequences { point: self.point, place: self.place, key }
         } else {
             Decision::Alone(self.rest.next_u64())
         }
@@ -128,8 +143,10 @@ impl Stream {
 pub enum Decision {
     /// A point of the sequences.
     InSequences {
-        /// The number of the point, the lowest bit first.
+        /// The number of the sub-path, of its pixel if there are several, the lowest bit first.
         point: u32,
+        /// The pixel among those that share the sequences, if several do.
+        place: Option<u8>,
         /// Key of the order and the scrambles, before it is mixed.
         key: u64,
     },
@@ -143,9 +160,9 @@ impl Decision {
     #[must_use]
     pub fn uniform(self) -> f32 {
         match self {
-            Self::InSequences { point, key } => {
+            Self::InSequences { point, place, key } => {
                 let key = mix(key);
-                to_unit(scramble(order(point, key), (key >> 32) as u32).reverse_bits())
+                to_unit(scramble(number(point, place, key), (key >> 32) as u32).reverse_bits())
             }
             Self::Alone(bits) => to_unit((bits >> 32) as u32),
         }
@@ -155,9 +172,9 @@ impl Decision {
     #[must_use]
     pub fn pair(self) -> [f32; 2] {
         let bits = match self {
-            Self::InSequences { point, key } => {
+            Self::InSequences { point, place, key } => {
                 let key = mix(key);
-                let point = order(point, key);
+                let point = number(point, place, key);
                 let first = scramble(point, (key >> 32) as u32);
                 let other = key.wrapping_mul(0xd1b5_4a32_d192_ed03) >> 32;
                 let second = scramble(sobol(point), other as u32);
@@ -176,6 +193,64 @@ impl Decision {
 pub const fn half(iteration: u64) -> (usize, u64) {
     ((iteration % 2) as usize, iteration / 2)
 }
+
+/// The index of camera sub-paths of a pixel: neighbours are stratified together. A crop of the film has the
+/// samples of the whole one.
+#[must_use]
+pub const fn pixel_index([x, y]: [u32; 2]) -> u64 {
+    (y as u64) << 32 | x as u64
+}
+
+/// The square of pixels that a [`pixel_index`] lies in, and the index within it.
+const fn square_and_pixel(index: u64) -> [u64; 2] {
+    const WITHIN: u64 = pixel_index([SQUARE - 1; 2]);
+    [index & !WITHIN, index & WITHIN]
+}
+
+/// The quarters of ever smaller squares that a pixel lies in, that of the whole square in the lowest two
+/// bits.
+const fn place_in_square(pixel: u64) -> u8 {
+    let (x, y) = (pixel, pixel >> 32);
+    let (mut place, mut level) = (0, 0);
+    while level < LEVELS {
+        let bit = LEVELS - 1 - level;
+        place |= ((x >> bit & 1) | (y >> bit & 1) << 1) << (2 * level);
+        level += 1;
+    }
+    place as u8
+}
+
+/// The number, in the sequences, of a sub-path of a pixel; the lowest bit of `point` comes first.
+///
+/// With bits as coefficients of polynomials over the field of two elements it is
+/// `r₀ + q r₁ + q² r₂ + q³ r₃ + q⁴ i`, `q = x² + x + 1`, where the quarters `r` of the pixel and the number
+/// `i` of the sub-path are in an order of the decision's own. Points of the sequences are a net if the
+/// remainders of their numbers by `xᵃ (x + 1)ᵇ` differ. That has no factor in common with `q`, so those of a
+/// pixel are one, and those of a square of pixels, over any aligned run of sub-paths.
+#[inline]
+fn number(point: u32, place: Option<u8>, key: u64) -> u32 {
+    let point = order(point, key);
+    let Some(place) = place else { return point };
+    let quarters = key.wrapping_mul(0x9e6c_63d0_876a_3f35) >> 32;
+    let place = scramble(u32::from(place), quarters as u32) as u8;
+    point ^ point << 4 ^ point << 8 ^ u32::from(PLACES[usize::from(place)])
+}
+
+/// `r₀ + q r₁ + q² r₂ + q³ r₃` for quarters of two bits each.
+static PLACES: [u8; 1 << (2 * LEVELS)] = {
+    let mut places = [0; 1 << (2 * LEVELS)];
+    let mut place = 0;
+    while place < places.len() {
+        let (mut sum, mut level) = (0, LEVELS);
+        while level > 0 {
+            level -= 1;
+            sum = sum ^ sum << 1 ^ sum << 2 ^ (place >> (2 * level) & 0b11);
+        }
+        places[place] = sum as u8;
+        place += 1;
+    }
+    places
+};
 
 #[inline]
 fn to_unit(bits: u32) -> f32 {
@@ -273,6 +348,38 @@ mod tests {
         }
     }
 
+    #[test]
+    fn strata_of_squares_hold_one_point_each() {
+        // 2ᵏ camera sub-paths of each of 4ᴸ pixels: every elementary interval has one point, at each
+        // decision.
+        for (level, log_paths) in (0..=4_u32).flat_map(|l| (0..=4_u32).map(move |k| (l, k))) {
+            let (side, paths) = (1 << level, 1_u32 << log_paths);
+            let corner = [7 * 16 + (16 - side), 3 * 16 + side % 16];
+            let mut streams: Vec<_> = (0..side * side)
+                .flat_map(|i| {
+                    (0..paths).map(move |path| ([corner[0] + i % side, corner[1] + i / side], path))
+                })
+                .map(|(pixel, path)| {
+                    let iteration = 2 * u64::from(5 * paths + path);
+                    Stream::new(5, iteration, StreamKind::Camera, pixel_index(pixel))
+                })
+                .collect();
+            let count = streams.len();
+            for _ in 0..3 {
+                let pairs: Vec<_> = streams.iter_mut().map(Stream::pair).collect();
+                for width in (0..=count.ilog2()).map(|log| 1 << log) {
+                    let height = count / width;
+                    let cell = |[x, y]: &[f32; 2]| {
+                        (x * width as f32) as usize + width * (y * height as f32) as usize
+                    };
+                    let mut cells: Vec<_> = pairs.iter().map(cell).collect();
+                    cells.sort_unstable();
+                    assert!(cells.into_iter().eq(0..count), "{side} x {side}, {paths}: {width} x {height}");
+                }
+            }
+        }
+    }
+
     /// Correlation of two draws over many streams, in standard deviations.
     fn correlation(draws: impl Fn(u64) -> (f32, f32)) -> f64 {
         let n = 100_000_u64;
@@ -291,11 +398,16 @@ mod tests {
         let light = |seed, iteration, index| Stream::new(seed, iteration, StreamKind::Light, index);
         let camera = |seed, iteration, index| Stream::new(seed, iteration, StreamKind::Camera, index);
         for z in [
-            // Other walk, iteration, seed, pixel.
+            // Other walk, iteration, seed, square of pixels.
             correlation(|i| (first(light(7, 0, i)), first(camera(7, 0, i)))),
             correlation(|i| (first(light(7, 0, i)), first(light(7, 1, i)))),
             correlation(|i| (first(light(7, 0, i)), first(light(8, 0, i)))),
-            correlation(|i| (first(camera(7, 2, i)), first(camera(7, 2, i + 1)))),
+            correlation(|i| (first(camera(7, 2, i)), first(camera(7, 2, i + 16)))),
+            // Pixels of a square, at two decisions.
+            correlation(|i| {
+                let [mut one, mut other] = [camera(7, i, 3), camera(7, i, 4)];
+                (one.uniform(), [other.uniform(), other.uniform()][1])
+            }),
             // Two decisions of a sub-path, in and beyond the stratified ones.
             correlation(|i| {
                 let mut stream = light(7, 0, i);
@@ -361,16 +473,20 @@ mod tests {
         // One point of one family, over seeds: χ² with 15 degrees of freedom is below 45 with probability
         // 0.9999.
         for draw in [0, 1, 5, STRATIFIED_DRAWS + 1] {
-            let mut counts = [0_u32; 16];
+            let mut counts = [[0_u32; 16]; 2];
             for seed in 0..20_000 {
                 let mut stream = Stream::new(seed, 3, StreamKind::Camera, 11);
                 for _ in 0..draw {
                     stream.pair();
                 }
-                counts[(stream.pair()[1] * 16.0) as usize] += 1;
+                for (counts, number) in counts.iter_mut().zip(stream.pair()) {
+                    counts[(number * 16.0) as usize] += 1;
+                }
             }
-            let chi2: f64 = counts.iter().map(|&c| (f64::from(c) - 1250.0).powi(2) / 1250.0).sum();
-            assert!(chi2 < 45.0, "draw {draw}: {counts:?}");
+            for counts in counts {
+                let chi2: f64 = counts.iter().map(|&c| (f64::from(c) - 1250.0).powi(2) / 1250.0).sum();
+                assert!(chi2 < 45.0, "draw {draw}: {counts:?}");
+            }
         }
     }
 

@@ -10,7 +10,7 @@ use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
-use upbp_estimators::{Counters, Features, Layer, LightMap, StreamKind};
+use upbp_estimators::{Counters, Features, Layer, LightMap, StreamKind, pixel_index};
 use upbp_media::Lanes;
 
 use crate::auto::memory_limit::LightCounts;
@@ -132,9 +132,7 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
                 return None;
             }
             let place = [rect.x + column as u32, rect.y + row as u32];
-            // Addressed by the place on the whole film: a crop shows the same samples as the whole picture.
-            let index = u64::from(place[1]) << 32 | u64::from(place[0]);
-            let (kind, counters) = (StreamKind::Camera, &mut counters);
+            let (kind, index, counters) = (StreamKind::Camera, pixel_index(place), &mut counters);
             let walk =
                 trace_camera_path(context, map, kind, place, index, scratch, counters, &mut NoObserver);
             for (sum, value) in pixel.layers.iter_mut().zip(walk.layers) {
