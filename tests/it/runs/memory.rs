@@ -1,4 +1,5 @@
-//! The memory of a render is what was expected, and what was allowed, within a tenth.
+//! The memory of a render is what was expected, and what was allowed, within a tenth; its preparation takes
+//! no more than is allowed.
 //!
 //! Each case is a process of its own, so that nothing of another is counted. `UPBP_VERTICES=1e7` measures
 //! another number of light vertices than the usual ones, and only that.
@@ -14,6 +15,11 @@ use upbp_scene::description::Count;
 use super::own_process;
 
 const MIB: f64 = 1_048_576.0;
+
+/// What is measured is what the render holds: by itself the GNU allocator keeps some MiB of what was freed,
+/// now more, now less.
+const GIVE_BACK: [(&str, &str); 2] =
+    [("MALLOC_MMAP_THRESHOLD_", "131072"), ("MALLOC_TRIM_THRESHOLD_", "131072")];
 
 /// A number of bytes out of `/proc/self/status`.
 fn status(name: &str) -> f64 {
@@ -33,16 +39,16 @@ fn settings(light_paths: u32, beams: f64, memory: u32) -> Settings {
     }
 }
 
-/// Calls a function with the shipped scene, on one thread: how many have buffers of their own at the same
-/// time is up to the system's scheduler.
-fn with_scene<R: Send>(function: impl FnOnce(&ReadyScene) -> R + Send) -> R {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cornell_media.ron");
-    let side = Count::new(64).expect("a positive count");
+/// Calls a function with a shipped scene of `side` x `side` pixels, on one thread: how many have buffers of
+/// their own at the same time is up to the system's scheduler.
+fn with_scene<R: Send>(name: &str, side: u32, function: impl FnOnce(&ReadyScene) -> R + Send) -> R {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes").join(name);
+    let side = Count::new(side).expect("a positive count");
     let scene = ReadyScene::load_with(path, |description| {
         description.film.width = side;
         description.film.height = side;
     })
-    .expect("the shipped scene");
+    .expect("a shipped scene");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
     pool.install(|| function(&scene))
 }
@@ -54,7 +60,7 @@ fn plan_path() -> PathBuf {
 
 /// Writes the plan for about as many light vertices as wanted.
 fn make_plan(memory: u32, vertices: f64, beams: f64) {
-    with_scene(|scene| {
+    with_scene("cornell_media.ron", 64, |scene| {
         let prepare = |paths, memory| {
             let checked = settings(paths, beams, memory).validate().expect("valid settings");
             scene.renderer(checked).expect("a renderer").state().identity().clone()
@@ -70,7 +76,7 @@ fn make_plan(memory: u32, vertices: f64, beams: f64) {
 fn measure(memory: u32, beams: f64) {
     let text = fs::read_to_string(plan_path()).expect("the plan that was made");
     let plan = FrozenPlan::from_ron(&text).expect("a plan");
-    with_scene(|scene| {
+    with_scene("cornell_media.ron", 64, |scene| {
         let render = |plan: FrozenPlan| {
             let checked = settings(plan.plan.light_paths, beams, memory).validate().expect("valid settings");
             let start = Start { plan: Some(plan), ..Start::default() };
@@ -102,12 +108,9 @@ fn measure(memory: u32, beams: f64) {
 /// The plan is made before: a preparation leaves some MiB with the allocator, which the render then takes
 /// again or not.
 fn run(memory: u32, vertices: f64, beams: f64) -> [f64; 2] {
-    // What is measured is what the render holds: by itself the GNU allocator keeps some MiB of what was
-    // freed, now more, now less.
-    let allocator = [("MALLOC_MMAP_THRESHOLD_", "131072"), ("MALLOC_TRIM_THRESHOLD_", "131072")];
     make_plan(memory, vertices, beams);
     let case = format!("{memory} {beams}");
-    let text = own_process::run("runs::memory::memory_is_what_was_expected", &case, &allocator);
+    let text = own_process::run("runs::memory::memory_is_what_was_expected", &case, &GIVE_BACK);
     let line = text.lines().find_map(|line| line.split_once("case ").map(|(_, rest)| rest));
     let Some(line) = line else { panic!("{text}") };
     let numbers: Vec<f64> = line.split(' ').map(|word| word.parse().expect("a number")).collect();
@@ -145,4 +148,22 @@ fn memory_is_what_was_expected() {
     let [expected, measured] = run(150, 1e7, 0.0);
     close([expected, measured]);
     close([150.0 * MIB, measured]);
+}
+
+#[test]
+fn preparations_take_what_is_allowed() {
+    // Thick clusters of photons: without a limit the preparation takes 105 MiB.
+    const MEMORY: u32 = 60;
+    if own_process::case().is_some() {
+        return with_scene("suite/dense_marble.ron", 200, |scene| {
+            let before = status("VmRSS");
+            let settings = Settings { memory: Some(MEMORY), ..Settings::default() };
+            let renderer = scene.renderer(settings.validate().expect("valid settings")).expect("a renderer");
+            let taken = (status("VmHWM") - before) / MIB;
+            println!("{taken:.1} MiB");
+            assert!(taken < f64::from(MEMORY), "{taken} MiB of {MEMORY}");
+            assert!(renderer.report().plan.light_paths > 0, "techniques are chosen all the same");
+        });
+    }
+    own_process::run("runs::memory::preparations_take_what_is_allowed", "prepare", &GIVE_BACK);
 }

@@ -12,7 +12,7 @@ use glam::Vec3;
 use upbp_estimators::observer::{
     Completion, DynObserver, LightEnd, ObservedSample, ObservedVertex, Observer,
 };
-use upbp_estimators::path::{Context, LightChunk};
+use upbp_estimators::path::{Context, LightChunk, LightVertex};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
@@ -38,8 +38,10 @@ const LIGHT_PATHS: u32 = 4096;
 const GUIDED_LIGHT_PATHS: u32 = 16384;
 /// Emitters from which on the number of sub-paths does not grow any more.
 const MANY: usize = 8;
-/// Contributions that are enough, and the part of the sub-paths that tells how many there are going to be.
-const CONTRIBUTIONS: (f64, f64) = (1e6, 1.0 / 16.0);
+/// Contributions that are enough.
+const CONTRIBUTIONS: f64 = 1e6;
+/// The part of the sub-paths that tells how many contributions there are going to be.
+const FEW: f64 = 1.0 / 16.0;
 /// Light vertices that are enough.
 const LIGHT_VERTICES: f64 = 2e5;
 /// Camera sub-paths per one of these, if many emitters are to be chosen by receiver: there is more to learn.
@@ -81,9 +83,13 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let quick = budget.part(QUICK_LOOK * PART);
     let statistics =
         statistics::measure::<S, L>(scene, settings, techniques, lanes, statistics::FEW_LIGHT_PATHS, &quick)?;
-    let vertices = statistics.vertices_per_path.max(1.0);
+    let rounds: &[_] = if is_guided { &GUIDED_ROUNDS } else { &[(1.0, 1)] };
+    let most_times = f64::from(rounds.iter().map(|(_, times)| *times).max().unwrap_or(1));
+    let room_for_vertices = room.items::<LightVertex<S::Bsdf, f64, L>>() as f64 / most_times;
+    let vertices = LIGHT_VERTICES.min(room_for_vertices) / statistics.vertices_per_path.max(1.0);
     let most = if is_guided { GUIDED_LIGHT_PATHS } else { LIGHT_PATHS };
-    let light_paths = (LIGHT_VERTICES / vertices).clamp(64.0, f64::from(most));
+    let light_paths = vertices.clamp(64.0, f64::from(most));
+    let enough = CONTRIBUTIONS.min(room.items::<NextEvent>() as f64);
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
     let camera_paths = CAMERA_PATHS * if is_much { MORE_CAMERA_PATHS } else { 1 };
     // What tells enough of so many emitters, or of starts.
@@ -95,13 +101,12 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let [few, full] = [few, full].map(|plan| iteration_plan(scene, settings, &plan, 0));
     let plan = IterationPlan { mis: few.mis, ..full };
     let most = (plan.light_paths / paths[0].max(1)).max(1);
-    let rounds: &[_] = if is_guided { &GUIDED_ROUNDS } else { &[(1.0, 1)] };
     let mut first = Vec::new();
     for (round, &(part, times)) in rounds.iter().enumerate() {
         // Each round has random numbers of its own.
         let plan = IterationPlan { iteration: plan.iteration + round as u64, ..plan.clone() };
         let paths = paths.map(|count| times.min(most) * count);
-        let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, halt);
+        let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, enough, halt);
         let allowance = budget.part((1.0 - QUICK_LOOK) * PART * part);
         let seen = allowance.largest(run).ok_or(RenderError::Cancelled)?;
         if emitters > 1 {
@@ -185,10 +190,10 @@ fn measure_enough<S: Scene, L: Lanes>(
     plan: &IterationPlan,
     paths: [u32; 2],
     part: f64,
+    enough: f64,
     halt: &Halt<'_>,
 ) -> Option<Measured> {
-    let (enough, few) = CONTRIBUTIONS;
-    let mut next = part.min(few);
+    let mut next = part.min(FEW);
     loop {
         let seen = measure::<S, L>(scene, plan, paths, next, halt)?;
         let most = next * enough / (seen.contributions as f64).max(1.0);

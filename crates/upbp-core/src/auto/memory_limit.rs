@@ -81,6 +81,13 @@ impl Room {
         need <= self.light_bytes as f64
     }
 
+    /// Items that a small run of the preparation may have, with as many bytes of others beside them.
+    pub(crate) const fn items<T>(&self) -> u64 {
+        /// As they are traced, put together in lists that double, and made ready for queries or predictions.
+        const COPIES: u64 = 4;
+        self.light_bytes / 2 / (COPIES * size_of::<T>() as u64)
+    }
+
     /// Bytes that a render by a plan is expected to take.
     pub(crate) fn expected_bytes<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> u64 {
         self.film + self.output.max(LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>() as u64)

@@ -50,7 +50,7 @@ use crate::settings::{CheckedSettings, Techniques};
 use candidate::Candidates;
 use cost::Cost;
 use memory_limit::Room;
-use pilot_render::{PilotRender, Size};
+use pilot_render::{Limits, PilotRender, Size};
 use statistics::Statistics;
 use technique_support::TechniqueSupport;
 use variance::Variance;
@@ -137,7 +137,8 @@ fn choose_in<S: Scene, L: Lanes>(
             let most = full_plan::most_light_paths(scene, settings, &statistics, &full, &room, budget);
             let is_room = |counts| room.holds::<S>(counts, &statistics);
             let candidates = Candidates::new(scene, settings, &support, &statistics, full, most, is_room);
-            let plan = best_plan::<S, L>(scene, settings, &candidates, budget);
+            let limits = Limits::of::<S, L>(&room);
+            let plan = best_plan::<S, L>(scene, settings, &candidates, limits, budget);
             if !plan.uses_light_paths() {
                 // Next events have to find what light sub-paths would have found.
                 scene.choose_emitters_by_power();
@@ -162,6 +163,7 @@ fn best_plan<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
     settings: &CheckedSettings,
     candidates: &Candidates,
+    limits: Limits,
     budget: &Budget<'_>,
 ) -> Plan {
     let allowance = budget.rest(TIME_AFTER_PILOT, TIME_FOR_PILOT);
@@ -175,7 +177,7 @@ fn best_plan<S: Scene, L: Lanes>(
     loop {
         let mut clock = Clock::start();
         let Some(pilot) =
-            PilotRender::run::<S, L>(scene, settings, &candidates.full, size, &allowance.halt())
+            PilotRender::run::<S, L>(scene, settings, &candidates.full, size, limits, &allowance.halt())
         else {
             // No time, or more samples than there is room for.
             if plan.is_some() || allowance.halt().now() || size.pixels <= Size::LEAST.pixels {

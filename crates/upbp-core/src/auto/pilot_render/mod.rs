@@ -10,7 +10,8 @@ pub(super) mod recorder;
 
 use std::ops::Range;
 
-use upbp_estimators::path::{Context, LightChunk, Splat};
+use upbp_estimators::mis;
+use upbp_estimators::path::{Context, LightChunk, LightVertex, Splat};
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
@@ -19,6 +20,7 @@ use upbp_estimators::{
 use upbp_media::Lanes;
 
 use super::full_plan::iteration_plan;
+use super::memory_limit;
 use super::parallel_walks::{PIECE, in_pieces};
 use super::roulette;
 use crate::deadline::Halt;
@@ -33,6 +35,25 @@ pub(super) const PASSES: u32 = 2;
 const ASKED_SPLATS: usize = 1 << 16;
 /// Light vertices of a pass, at most.
 const LIGHT_VERTICES: f64 = 5e5;
+
+/// Samples and light vertices that a pilot render may have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Samples of all passes.
+    samples: usize,
+    /// Light vertices of a pass.
+    vertices: f64,
+}
+
+impl Limits {
+    /// No more than useful, and than there is room for.
+    pub(super) fn of<S: Scene, L: Lanes>(room: &memory_limit::Room) -> Self {
+        Self {
+            samples: room.items::<Sample>().min(MOST_SAMPLES as u64) as usize,
+            vertices: (room.items::<LightVertex<S::Bsdf, mis::ByTechnique, L>>() as f64).min(LIGHT_VERTICES),
+        }
+    }
+}
 
 /// The size of a pilot render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,17 +140,18 @@ pub(super) struct Work {
 }
 
 impl PilotRender {
-    /// Runs `plan` with fewer light sub-paths. `None` if there were [too many samples](MOST_SAMPLES), or if
+    /// Runs `plan` with fewer light sub-paths. `None` if there were more samples than the limits allow, or if
     /// it was halted.
     pub(super) fn run<S: Scene, L: Lanes>(
         scene: &PreparedScene<'_, S>,
         settings: &CheckedSettings,
         plan: &Plan,
         size: Size,
+        limits: Limits,
         halt: &Halt<'_>,
     ) -> Option<Self> {
         let grid = Grid::new(scene.scene.camera().crop(), size.pixels);
-        let most_paths = (LIGHT_VERTICES / plan.vertices_per_light_path.max(1.0)).max(64.0) as u32;
+        let most_paths = (limits.vertices / plan.vertices_per_light_path.max(1.0)).max(64.0) as u32;
         let most_paths = most_paths.min(plan.light_paths);
         let paths = size.light_paths.saturating_mul(grid.cells()).min(most_paths);
         let beam_paths = plan.beam_paths.min(paths);
@@ -150,7 +172,7 @@ impl PilotRender {
             more_light_paths: f64::from(most_paths) / f64::from(paths.max(1)),
         };
         let mut thinned = iteration_plan(scene, settings, plan, 0).thinned(paths, beam_paths);
-        let room = Room::new(MOST_SAMPLES);
+        let room = Room::new(limits.samples);
         let mut passes = (0..PASSES)
             .map(|pass| {
                 // Not the iterations of other runs before the first iteration.
