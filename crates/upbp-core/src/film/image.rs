@@ -24,7 +24,8 @@ impl Image {
 
     /// relMSE of the means of square blocks of pixels times their pixels, mean over blocks of 1, 4, 8 and 16
     /// pixels a side: the relMSE where errors of pixels are independent, more where neighbours share them,
-    /// as blotches and streaks do. Blocks that the picture cuts count by their pixels.
+    /// as blotches and streaks do, less where they even out. Blocks that the picture cuts count by their
+    /// pixels.
     #[must_use]
     pub fn relative_mse_over_scales(&self, reference: &Self) -> f64 {
         self.difference_over(&BLOCK_SIDES, reference, reference)

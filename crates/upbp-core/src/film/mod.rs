@@ -410,8 +410,8 @@ impl Film {
     }
 
     /// Ratio of the [error over scales](Image::relative_mse_over_scales) to that of pixels, by the difference
-    /// of the two halves: 1 where errors of neighbours are independent. `None` without two halves that
-    /// differ.
+    /// of the two halves: 1 where errors of neighbours are independent, less where they even out. `None`
+    /// without two halves that differ.
     #[must_use]
     pub fn shared_error(&self) -> Option<f64> {
         let [even, odd] = self.halves()?;
