@@ -72,9 +72,10 @@ impl Stream {
         let common =
             mix(mix(seed ^ 0x9e37_79b9_7f4a_7c15) ^ (kind as u64 + 1).wrapping_mul(0x8cb9_2ba7_2f3d_8dd7));
         let of_iteration = iteration.wrapping_mul(0xd1b5_4a32_d192_ed03);
-        let of_index = index.wrapping_mul(0xaef1_7502_108e_f2d9);
-        // Light sub-paths share an iteration, camera sub-paths a square of pixels. Beyond 2³² sub-paths, or
-        // 2²⁴ of a pixel, the sequences repeat their points, which costs stratification only.
+        let of = |index: u64| index.wrapping_mul(0xaef1_7502_108e_f2d9);
+        // Light sub-paths share an iteration, camera sub-paths a square of pixels. Beyond 2³² sub-paths the
+        // sequences repeat their points, and 2²⁴ of a pixel are for themselves: that costs stratification
+        // only.
         let mut place = None;
         let (point, family, from_sequences) = match kind {
             StreamKind::Light | StreamKind::PilotLight => {
@@ -85,15 +86,14 @@ impl Stream {
                 let of_half = (half as u64).wrapping_mul(0x2545_f491_4f6c_dd1d);
                 let [square, pixel] = square_and_pixel(index);
                 place = Some(place_in_square(pixel));
-                let of_square = square.wrapping_mul(0xaef1_7502_108e_f2d9);
-                (point as u32, mix(common ^ of_square) ^ of_half, STRATIFIED_DRAWS)
+                (point as u32, mix(common ^ of(square)) ^ of_half, STRATIFIED_DRAWS)
             }
-            StreamKind::PilotCamera => (0, mix(common ^ of_index), COMMON_DRAWS),
+            StreamKind::PilotCamera => (0, mix(common ^ of(index)), COMMON_DRAWS),
             StreamKind::MergePeriods => (0, 0, 0),
         };
         // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in
         // common.
-        let rest = Xoshiro256PlusPlus::seed_from_u64(mix(mix(common ^ of_iteration) ^ of_index));
+        let rest = Xoshiro256PlusPlus::seed_from_u64(mix(mix(common ^ of_iteration) ^ of(index)));
         Self { point: point.reverse_bits(), place, family, draws: 0, from_sequences, rest }
     }
 

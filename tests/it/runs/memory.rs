@@ -16,8 +16,8 @@ use super::own_process;
 
 const MIB: f64 = 1_048_576.0;
 
-/// What is measured is what the render holds: by itself the GNU allocator keeps some MiB of what was freed,
-/// now more, now less.
+/// Variables by which the GNU allocator gives back what was freed, so that what is measured is what a render
+/// holds: by itself it keeps some MiB, now more, now less.
 const GIVE_BACK: [(&str, &str); 2] =
     [("MALLOC_MMAP_THRESHOLD_", "131072"), ("MALLOC_TRIM_THRESHOLD_", "131072")];
 
@@ -152,7 +152,7 @@ fn memory_is_what_was_expected() {
 
 #[test]
 fn preparations_take_what_is_allowed() {
-    // Thick clusters of photons: without a limit the preparation takes 105 MiB.
+    // Thick clusters of photons: without a limit the preparation takes 108 MiB.
     const MEMORY: u32 = 60;
     if own_process::case().is_some() {
         return with_scene("suite/dense_marble.ron", 200, |scene| {

@@ -85,10 +85,9 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         statistics::measure::<S, L>(scene, settings, techniques, lanes, statistics::FEW_LIGHT_PATHS, &quick)?;
     let rounds: &[_] = if is_guided { &GUIDED_ROUNDS } else { &[(1.0, 1)] };
     let most_times = f64::from(rounds.iter().map(|(_, times)| *times).max().unwrap_or(1));
-    let room_for_vertices = room.items::<LightVertex<S::Bsdf, f64, L>>() as f64 / most_times;
-    let vertices = LIGHT_VERTICES.min(room_for_vertices) / statistics.vertices_per_path.max(1.0);
+    let vertices = LIGHT_VERTICES.min(room.items::<LightVertex<S::Bsdf, f64, L>>() as f64 / most_times);
     let most = if is_guided { GUIDED_LIGHT_PATHS } else { LIGHT_PATHS };
-    let light_paths = vertices.clamp(64.0, f64::from(most));
+    let light_paths = (vertices / statistics.vertices_per_path.max(1.0)).clamp(64.0, f64::from(most));
     let enough = CONTRIBUTIONS.min(room.items::<NextEvent>() as f64);
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
     let camera_paths = CAMERA_PATHS * if is_much { MORE_CAMERA_PATHS } else { 1 };

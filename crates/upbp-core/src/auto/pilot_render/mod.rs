@@ -27,12 +27,14 @@ use crate::deadline::Halt;
 use crate::plan::Plan;
 use crate::settings::CheckedSettings;
 use grid::Grid;
-use recorder::{ByRoulette, ByTechnique, MOST_SAMPLES, Recorder, Room, Sample, TECHNIQUES, add, passed};
+use recorder::{ByRoulette, ByTechnique, Recorder, Room, Sample, TECHNIQUES, add, passed};
 
 /// Looks at each pixel: enough to tell what they have in common.
 pub(super) const PASSES: u32 = 2;
 /// Splats that are asked what they have in common with others of their light sub-path, about.
 const ASKED_SPLATS: usize = 1 << 16;
+/// Samples, at most, of 64 bytes each.
+const SAMPLES: u64 = 1 << 20;
 /// Light vertices of a pass, at most.
 const LIGHT_VERTICES: f64 = 5e5;
 
@@ -49,7 +51,7 @@ impl Limits {
     /// No more than useful, and than there is room for.
     pub(super) fn of<S: Scene, L: Lanes>(room: &memory_limit::Room) -> Self {
         Self {
-            samples: room.items::<Sample>().min(MOST_SAMPLES as u64) as usize,
+            samples: room.items::<Sample>().min(SAMPLES) as usize,
             vertices: (room.items::<LightVertex<S::Bsdf, mis::ByTechnique, L>>() as f64).min(LIGHT_VERTICES),
         }
     }

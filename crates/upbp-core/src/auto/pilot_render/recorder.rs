@@ -18,9 +18,6 @@ pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
 /// A value for each technique.
 pub(crate) type ByTechnique<T> = [T; TECHNIQUES];
 
-/// Samples that a pilot render may have, of 64 bytes each.
-pub(super) const MOST_SAMPLES: usize = 1 << 20;
-
 /// A sample, weighted as when everything runs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
@@ -43,8 +40,10 @@ pub(crate) struct Recorder {
     pub(crate) samples: Vec<Sample>,
     /// Ends of samples: `ends[i]` is behind the last one of the i-th sub-path.
     ends: Vec<u32>,
-    /// Samples, those included that would have been [too many](MOST_SAMPLES).
+    /// Samples, those included that would have been too many.
     seen: usize,
+    /// Samples that there is room for.
+    most: usize,
     /// Edges of camera sub-paths.
     pub(crate) edges: ByRoulette,
     /// Calls of each technique.
@@ -81,7 +80,7 @@ impl<B> Observer<B> for Recorder {
     fn sample(&mut self, sample: &ObservedSample<B, mis::ByTechnique>) {
         let ObservedSample { technique, ref completion, value, weight, .. } = *sample;
         self.seen += 1;
-        if self.seen > MOST_SAMPLES {
+        if self.seen > self.most {
             return;
         }
         let total = weight.all.total();
@@ -100,6 +99,7 @@ impl Recorder {
     /// Traces a sub-path under the eyes of this recorder; whether there is room for its samples.
     pub(super) fn record(&mut self, room: &Room, trace: impl FnOnce(&mut Self)) -> bool {
         let before = self.seen;
+        self.most = room.most;
         trace(self);
         self.ends.push(self.samples.len() as u32);
         room.take(self.seen - before)
