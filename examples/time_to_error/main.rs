@@ -1,6 +1,6 @@
 //! Error over time, of any scenes with a reference and any sets of techniques.
 //!
-//! `cargo run --release --example time_to_error -- --scenes fog_cornell,glass_env --sets "pt;bpt;default"
+//! `cargo run --release --example time_to_error -- --scenes fog_cornell,glass_env --sets "pt;bpt;auto"
 //! --time 30 --out target/errors` writes `errors.csv` with all that was measured, and a plot per scene as SVG
 //! and as PNG, and prints tables, which are in `summary.md` too. In tables and plots the noise of the
 //! reference is taken away. Errors over scales are means of those of blocks of 1, 4, 8 and 16 pixels a side,

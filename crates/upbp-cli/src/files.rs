@@ -42,21 +42,23 @@ impl Images {
         exr.into_iter().chain([Output { role, path: &self.png, content: Content::Png }])
     }
 
-    /// Writes a render with all its layers; returns a hint if the PNG shows little of it.
+    /// Writes a render with all its layers, each file whatever became of the other; returns a hint if the PNG
+    /// shows little of it.
     pub(crate) fn write_render(
         &self,
         state: &State,
         report: &Report,
         tones: ToneMapping,
-    ) -> Result<Option<String>, OutputError> {
+        mut attempt: impl FnMut(Result<(), OutputError>),
+    ) -> Option<String> {
         if let Some(path) = &self.exr {
             let identity = state.identity();
             let metadata = Metadata { scene: &identity.scene, settings: &identity.settings, report };
-            write_exr(path, state.film(), &metadata)?;
+            attempt(write_exr(path, state.film(), &metadata));
         }
         let image = state.film().image();
-        write_png(&self.png, &image, tones)?;
-        Ok(self.too_bright(&image, tones))
+        attempt(write_png(&self.png, &image, tones));
+        self.too_bright(&image, tones)
     }
 
     /// Writes an image, and another one to look at.

@@ -46,7 +46,7 @@ enum Command {
     ///
     /// Reads any OpenEXR images with the channels R, G, B, and prints the means of both and how far they are
     /// apart: pixel by pixel, and in blocks of 8 x 8 pixels, where noise is averaged out and what is too
-    /// bright or too dark everywhere remains. Pixels that are not finite in both are left out and counted.
+    /// bright or too dark everywhere remains. Pixels that are not finite in either are left out and counted.
     Compare(compare::Options),
     /// Print the completions of a shell
     ///

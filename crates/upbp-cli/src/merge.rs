@@ -58,7 +58,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     for output in outputs {
         check_writable(output.path).map_err(Failure::input)?;
     }
-    let merged = merge(&options.states, options.quiet)?;
+    let (merged, parts) = merge(&options.states)?;
     let report = merged.report();
     let mut failures = Vec::new();
     let mut attempt = |written: Result<(), OutputError>| failures.extend(written.err());
@@ -67,15 +67,15 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     }
     let mut hint = None;
     if let Some(images) = &options.image.output {
-        let written = images.write_render(&merged, &report, options.image.look.tones());
-        attempt(written.map(|found| hint = found));
+        hint = images.write_render(&merged, &report, options.image.look.tones(), &mut attempt);
     }
     if let Some(path) = &options.report {
         attempt(files::write_report(&report, path));
     }
     Failure::all(&failures)?;
+    // Last, since nobody may be reading.
     if !options.quiet {
-        say(report.to_string().trim_end())?;
+        say(&format!("{parts}{}", report.to_string().trim_end()))?;
         if let Some(hint) = hint {
             say(&hint)?;
         }
@@ -83,14 +83,12 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Reads and merges one after the other: two films are in memory at most.
-fn merge(paths: &[PathBuf], quiet: bool) -> Result<State, Failure> {
-    let mut merged: Option<State> = None;
+/// Reads and merges one after the other: two films are in memory at most. Comes with a line about each.
+fn merge(paths: &[PathBuf]) -> Result<(State, String), Failure> {
+    let (mut merged, mut parts) = (None::<State>, String::new());
     for path in paths {
         let state = State::load(path).map_err(Failure::input)?;
-        if !quiet {
-            describe(path, &state)?;
-        }
+        parts += &describe(path, &state);
         match &mut merged {
             None => merged = Some(state),
             Some(merged) => merged
@@ -99,16 +97,16 @@ fn merge(paths: &[PathBuf], quiet: bool) -> Result<State, Failure> {
                 .map_err(Failure::input)?,
         }
     }
-    merged.ok_or_else(|| Failure::Input("no state".to_owned()))
+    merged.map(|merged| (merged, parts)).ok_or_else(|| Failure::Input("no state".to_owned()))
 }
 
-fn describe(path: &Path, state: &State) -> Result<(), Failure> {
+fn describe(path: &Path, state: &State) -> String {
     let film = state.film();
-    say(&format!(
-        "{}: {}, iterations {}, film {}",
+    format!(
+        "{}: {}, iterations {}, film {}\n",
         path.display(),
         state.identity().scene,
         film.iteration_set(),
         film.fingerprint()
-    ))
+    )
 }

@@ -77,7 +77,7 @@ impl ReadyScene {
         self.hash
     }
 
-    /// The mesh and image files that were read, in the order of reading, without the scene file itself.
+    /// The files of meshes, images and tables that were read, in the order of reading, without the scene file itself.
     /// A program that writes files must not overwrite them.
     #[must_use]
     pub fn files(&self) -> &[PathBuf] {
@@ -231,7 +231,7 @@ impl Scene for ReadyScene {
         self.body_boxes.for_each_around(point, |index| {
             let body = &self.bodies[index];
             if self.geometry.contains(body.shape, point) == Some(true) {
-                // More bodies than a stack holds: the walks count the contradictions that follow.
+                // A body that is entered twice is a contradiction, which the walks count.
                 let _ = stack.enter(body.interior);
             }
         });

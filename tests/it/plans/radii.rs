@@ -90,12 +90,18 @@ fn a_field_is_part_of_plans_and_states() {
     let state = State::read(bytes.as_slice()).expect("what was written");
     assert_eq!(state.identity().plan, frozen.plan);
 
-    let mut other = state.identity().clone();
-    other.plan.radii.field = RadiusField::Uniform;
-    let different = other.check_same(state.identity());
-    assert!(
-        matches!(&different, Err(StateError::Different { differences }) if differences[0].contains("radii.field"))
-    );
+    let changes: [(&str, fn(&mut Plan)); 2] = [
+        ("radii.field", |plan| plan.radii.field = RadiusField::Uniform),
+        ("lanes", |plan| plan.lanes = Some([0.5, 0.25, 0.25])),
+    ];
+    for (name, change) in changes {
+        let mut other = state.identity().clone();
+        change(&mut other.plan);
+        let different = other.check_same(state.identity());
+        assert!(
+            matches!(&different, Err(StateError::Different { differences }) if differences[0].contains(name))
+        );
+    }
 
     let mut steep = frozen;
     steep.plan.radii.surf = 1.001 * steep.plan.radii.field.largest_radius();

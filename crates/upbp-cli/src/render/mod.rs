@@ -25,9 +25,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     in_pool(options, || {
         let canceller = interrupt::install().map_err(Failure::input)?;
         let job = Job::read(options)?;
-        // Before the work, not after it.
         for output in options.outputs(&options.images()) {
-            check_writable(output.path).map_err(Failure::input)?;
             remove_leftovers(output.path);
         }
         let bar = Bar::on_stderr(options.messages.quiet);
@@ -51,6 +49,9 @@ pub(crate) fn check(options: &Options) -> Result<(), Failure> {
         let canceller = interrupt::install().map_err(Failure::input)?;
         let job = Job::read(options)?;
         let renderer = job.start(options, canceller, &Bar::on_stderr(true))?;
+        if options.messages.quiet {
+            return Ok(());
+        }
         say(&format!("{}: no problems; {}", options.scene.display(), renderer.support()))
     })
 }
@@ -70,14 +71,19 @@ struct Job {
 }
 
 impl Job {
-    /// Reads all files, and checks that no output would destroy one.
+    /// Reads all files, and checks that outputs can be written and none would destroy a file: before the work,
+    /// not after it.
     fn read(options: &Options) -> Result<Self, Failure> {
         let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
         let scene = load(options).map_err(Failure::input)?;
         let images = options.images();
-        let files = scene.files().iter().map(|file| ("a mesh or an image of the scene", file.as_path()));
+        let files = scene.files().iter().map(|file| ("a mesh or an image or a table of the scene", file.as_path()));
         let inputs: Vec<_> = options.inputs().chain(files).collect();
-        check_outputs(&options.outputs(&images), &inputs).map_err(Failure::input)?;
+        let outputs = options.outputs(&images);
+        check_outputs(&outputs, &inputs).map_err(Failure::input)?;
+        for output in outputs {
+            check_writable(output.path).map_err(Failure::input)?;
+        }
         let reference =
             options.messages.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
         let plan = options.method.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
@@ -167,8 +173,7 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
     let rendered = !state.film().is_empty();
     let mut hint = None;
     if rendered {
-        let written = images.write_render(state, &report, options.image.look.tones());
-        attempt(written.map(|found| hint = found));
+        hint = images.write_render(state, &report, options.image.look.tones(), &mut attempt);
     }
     if let Some(path) = &options.messages.report {
         attempt(files::write_report(&report, path));

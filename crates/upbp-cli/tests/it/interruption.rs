@@ -252,6 +252,7 @@ fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
         assert!(folder.join("b.exr").exists());
         std::os::unix::fs::symlink("/dev/full", folder.join("full.exr")).expect("a link");
         failing(&["--state", "a.state", "-o", "full.exr"], "full.exr");
+        assert!(folder.join("full.png").exists());
     }
     // A folder that vanishes while it renders.
     let gone = folder.join("gone");
@@ -273,16 +274,19 @@ fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
     assert!(text.contains("warning") && text.contains("gone/a.state"), "{text}");
 
     // Nobody reads what it says: the files are there all the same.
-    let mut child = command("render", &folder, &["scene.ron", "--iterations", "2", "-o", "e.exr"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program runs");
-    drop(child.stdout.take());
-    let (code, text) = end(&child.wait_with_output().expect("it ends"));
-    assert_eq!(code, Some(74), "{text}");
-    assert!(text.contains("standard output") && !text.contains("panicked"), "{text}");
-    assert!(folder.join("e.exr").exists());
+    let unread = |program, arguments: &[&str]| {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let (code, text) =
+            end(&command(program, &folder, arguments).stdout(writer).output().expect("the program runs"));
+        assert_eq!(code, Some(74), "{text}");
+        assert!(text.contains("standard output") && !text.contains("panicked"), "{text}");
+    };
+    unread("render", &["scene.ron", "--iterations", "2", "-o", "e.exr"]);
+    unread("merge", &["a.state", "--state", "m.state", "-o", "m.exr"]);
+    for name in ["e.exr", "m.state", "m.exr"] {
+        assert!(folder.join(name).exists(), "{name}");
+    }
     let mut child = command("render", &folder, &["scene.ron", "--iterations", "2", "-o", "f.exr"])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())

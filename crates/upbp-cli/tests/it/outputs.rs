@@ -166,11 +166,12 @@ fn an_output_that_would_destroy_a_file_is_refused() {
         refused("render", &folder, &whole(arguments), words, &before);
         refused("check", &folder, &whole(arguments), words, &before);
     }
-    // What cannot be written is seen by whoever tries.
+    // What cannot be written is seen before the work.
     let cases: &[(&[&str], &[&str])] =
         &[(&["-o", "kept.exr"], &["kept.exr", "read-only"]), (&["--report", "sub"], &["sub", "directory"])];
     for (arguments, words) in cases {
         refused("render", &folder, &whole(arguments), words, &before);
+        refused("check", &folder, &whole(arguments), words, &before);
     }
     let (to, from) = ("the state, ", "a state to merge, ");
     let cases: &[(&[&str], &[&str])] = &[

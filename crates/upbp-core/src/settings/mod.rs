@@ -34,10 +34,11 @@ pub struct Settings {
     pub deterministic: bool,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Light sub-paths per iteration. A count is kept as it is, whatever techniques are chosen.
+    /// Light sub-paths per iteration. A count is kept within the memory budget, whatever
+    /// techniques are chosen.
     pub light_paths: LightPaths,
-    /// Light sub-paths that leave photon beams; `None` for as many as small runs find useful, or a quarter of
-    /// that if techniques are chosen.
+    /// Light sub-paths that leave photon beams; `None` for as many as small runs find useful, or, if
+    /// techniques are chosen, a quarter of that or four times as many where it pays.
     pub beams: Option<u32>,
     /// Light vertices that every camera vertex is connected to, on average, in `[0.001, 1000]`; `None` for
     /// one.

@@ -32,8 +32,8 @@ const MAGIC: [u8; 8] = *b"UPBPSTAT";
 /// Version of the format.
 const VERSION: u32 = 7;
 
-/// The longest header, bytes: room for a million ranges of iterations.
-const MAX_HEADER: u64 = 1 << 24;
+/// The longest header, bytes: room for millions of emitters to choose from, and of ranges of iterations.
+const MAX_HEADER: u64 = 1 << 28;
 
 /// All but the film's sums.
 #[derive(Serialize, Deserialize)]
@@ -86,7 +86,7 @@ impl State {
     /// Writes the state, in blocks of one row of the film.
     ///
     /// # Errors
-    /// Those of `to`; a set of iterations with millions of gaps.
+    /// Those of `to`; tens of millions of emitters, or of gaps in the set of iterations.
     pub fn write(&self, mut to: impl Write) -> io::Result<()> {
         let header = Header {
             identity: self.identity.clone(),
@@ -96,7 +96,8 @@ impl State {
         };
         let text = ron::to_string(&header).map_err(io::Error::other)?;
         if text.len() as u64 > MAX_HEADER {
-            return Err(io::Error::other("too many gaps in the set of iterations"));
+            let message = format!("its header has {} bytes, at most {MAX_HEADER} can be read", text.len());
+            return Err(io::Error::other(message));
         }
         to.write_all(&MAGIC)?;
         to.write_all(&VERSION.to_le_bytes())?;

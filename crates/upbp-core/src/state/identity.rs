@@ -9,6 +9,7 @@ use upbp_estimators::scene::PixelRect;
 use crate::auto::technique_support::TechniqueSupport;
 use crate::error::StateError;
 use crate::plan::{FrozenPlan, Plan};
+use crate::radius_schedule::RadiusSchedule;
 use crate::settings::Settings;
 use crate::state::fingerprint;
 
@@ -89,25 +90,39 @@ impl Identity {
     }
 }
 
-fn plan_fields(plan: &Plan) -> [(&'static str, String); 17] {
-    let r = &plan.radii;
+/// The same of the plan, all of it.
+fn plan_fields(plan: &Plan) -> [(&'static str, String); 18] {
+    let Plan {
+        techniques,
+        light_paths,
+        beam_paths,
+        connections,
+        next_events,
+        camera_factor,
+        roulette,
+        periods,
+        vertices_per_light_path,
+        radii: RadiusSchedule { surf, pp3d, pb2d, bp2d, bb1d, field, progressive, floor },
+        lanes,
+    } = plan;
     [
-        ("techniques", plan.techniques.to_string()),
-        ("light_paths", plan.light_paths.to_string()),
-        ("beams", plan.beam_paths.to_string()),
-        ("connections", plan.connections.to_string()),
-        ("next_events", plan.next_events.to_string()),
-        ("camera_factor", plan.camera_factor.to_string()),
-        ("roulette", format!("{:?}", plan.roulette)),
-        ("periods", format!("{:?}", plan.periods)),
-        ("vertices per light sub-path", plan.vertices_per_light_path.to_string()),
-        ("radii.surf", r.surf.to_string()),
-        ("radii.pp3d", r.pp3d.to_string()),
-        ("radii.pb2d", r.pb2d.to_string()),
-        ("radii.bp2d", r.bp2d.to_string()),
-        ("radii.bb1d", r.bb1d.to_string()),
-        ("radii.field", format!("{:?}", r.field)),
-        ("least radius", r.floor.to_string()),
-        ("progressive", r.progressive.to_string()),
+        ("techniques", techniques.to_string()),
+        ("light_paths", light_paths.to_string()),
+        ("beams", beam_paths.to_string()),
+        ("connections", connections.to_string()),
+        ("next_events", next_events.to_string()),
+        ("camera_factor", camera_factor.to_string()),
+        ("roulette", format!("{roulette:?}")),
+        ("periods", format!("{periods:?}")),
+        ("vertices per light sub-path", vertices_per_light_path.to_string()),
+        ("radii.surf", surf.to_string()),
+        ("radii.pp3d", pp3d.to_string()),
+        ("radii.pb2d", pb2d.to_string()),
+        ("radii.bp2d", bp2d.to_string()),
+        ("radii.bb1d", bb1d.to_string()),
+        ("radii.field", format!("{field:?}")),
+        ("least radius", floor.to_string()),
+        ("progressive", progressive.to_string()),
+        ("lanes", format!("{lanes:?}")),
     ]
 }

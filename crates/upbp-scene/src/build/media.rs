@@ -7,15 +7,14 @@ use crate::description::{Medium, Phase, tabulated};
 use crate::phase_table;
 
 impl Builder<'_> {
-    pub(super) fn media(&mut self) -> Vec<Homogeneous> {
+    /// All media, by number; `None` if there are problems with any.
+    pub(super) fn media(&mut self) -> Option<Vec<Homogeneous>> {
         let mut media = Vec::new();
         for (name, medium) in self.description.media.iter() {
-            match self.homogeneous(medium) {
-                Ok(medium) => media.push(medium),
-                Err(error) => self.problem(format!("medium `{name}`"), error),
-            }
+            let made = self.homogeneous(medium);
+            media.push(made.map_err(|error| self.problem(format!("medium `{name}`"), error)).ok());
         }
-        media
+        media.into_iter().collect()
     }
 
     fn homogeneous(&mut self, medium: &Medium) -> Result<Homogeneous, String> {

@@ -1,7 +1,8 @@
 //! The build of a scene from its description: names are looked up, geometry is checked, bodies are put in
 //! order.
 //!
-//! Every step goes on after a problem, so that all problems are reported together.
+//! Every step goes on after a problem, so that all problems are reported together; what is asked of the scene as
+//! a whole waits until all its parts are good.
 
 mod bodies;
 mod builder;
@@ -104,15 +105,17 @@ impl Builder<'_> {
         let camera = self.camera();
         let drafts = self.surfaces(&medium_ids);
         let mut lights = self.lights();
-        self.check_shines(&media, &medium_ids);
+        if let Some(media) = &media {
+            self.check_shines(media, &medium_ids);
+        }
 
         if let Some(camera) = &camera {
             self.check_camera_is_free(camera.origin(), &drafts);
         }
-        if !self.problems.is_empty() || media.len() != description.media.len() {
+        if !self.problems.is_empty() {
             return None;
         }
-        let mut camera = camera?;
+        let (media, mut camera) = (media?, camera?);
         let mut drafts: Vec<_> = drafts.into_iter().collect::<Option<_>>()?;
         self.check_bodies_count(&drafts);
         let origin = extent::move_near_origin(&mut drafts, &mut lights, &mut camera);

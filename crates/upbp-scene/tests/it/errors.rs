@@ -310,6 +310,12 @@ fn problems_of_lights_materials_and_film_name_them() {
         problem(&format!("{LIGHT} outside: \"fog\"")),
         "scene, outside: unknown medium `fog`; there are none"
     );
+    // No complaint of darkness where the medium that shines is among others.
+    let media = r#"media: {"a": Homogeneous(phase: TableFile(file: "none.txt")), "b": Homogeneous(sigma_a: 1, emission: 1)},
+        materials: {"null": Null},
+        shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: "null", interior: "b")],"#;
+    let found = problem(media);
+    assert!(found.starts_with("medium `a`: table `no_such_folder/none.txt`: "), "{found}");
 }
 
 #[test]
