@@ -8,7 +8,7 @@
 
 use std::num::NonZeroU32;
 
-use crate::random::{Stream, StreamKind, half};
+use crate::random::{Stream, StreamKind, half, mix};
 use crate::technique::{PerMerge, Technique};
 
 /// Periods of the photon queries of each merge: a pixel makes them in one iteration of each period.
@@ -43,16 +43,49 @@ impl MergePeriods {
     }
 }
 
-/// The rank of a pixel, below `period`. Pixels of each rank are spread evenly over the picture and over every
-/// coarser grid of pixels, which is all that there is of an iteration that had to stop early; for a period of
-/// 8 they are more than 2 pixels apart.
+/// The rank of a pixel, below `period`.
+///
+/// Along a Z-shaped curve each run of as many pixels has every rank once, in an order of its own. So any part of
+/// the picture has its share of each, and pixels of a rank, which query the same photons, are no grid that one sees.
 pub(crate) fn rank([x, y]: [u32; 2], period: u32) -> u32 {
-    /// 1/ρ and 1/ρ² in units of 2⁻³², with `ρ³ = ρ + 1`: a lattice that no grid is in step with.
-    ///
-    /// Source: M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018.
-    const STEPS: [u32; 2] = [3_242_174_889, 2_447_445_414];
-    let place = x.wrapping_mul(STEPS[0]).wrapping_add(y.wrapping_mul(STEPS[1]));
-    ((u64::from(place) * u64::from(period)) >> 32) as u32
+    let along = spread(x) | spread(y) << 1;
+    let (run, place) = (along / u64::from(period), along % u64::from(period));
+    permuted(place as u32, period, mix(run))
+}
+
+/// The bits of a number at every other place, from the lowest.
+const fn spread(number: u32) -> u64 {
+    let mut bits = number as u64;
+    bits = (bits | bits << 16) & 0x0000_ffff_0000_ffff;
+    bits = (bits | bits << 8) & 0x00ff_00ff_00ff_00ff;
+    bits = (bits | bits << 4) & 0x0f0f_0f0f_0f0f_0f0f;
+    bits = (bits | bits << 2) & 0x3333_3333_3333_3333;
+    (bits | bits << 1) & 0x5555_5555_5555_5555
+}
+
+/// The place of `place`, both below `count`, in an order by `key`.
+///
+/// All steps of a round can be undone among the numbers below a power of two. One that leads beyond `count` is
+/// followed by others until one leads back: a cycle of the permutation without the numbers that are too large.
+const fn permuted(mut place: u32, count: u32, key: u64) -> u32 {
+    const ROUNDS: u32 = 4;
+    if count < 2 {
+        return 0;
+    }
+    let bits = u32::BITS - (count - 1).leading_zeros();
+    loop {
+        let mut round = 0;
+        while round < ROUNDS {
+            let own = (key >> (16 * round)) as u16 as u32;
+            place =
+                place.wrapping_mul(own << 1 | 1).wrapping_add(own >> 8) & (u32::MAX >> (u32::BITS - bits));
+            place ^= place >> bits.div_ceil(2);
+            round += 1;
+        }
+        if place < count {
+            return place;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -90,30 +123,68 @@ mod tests {
     }
 
     #[test]
-    fn ranks_are_spread_over_the_picture_and_over_coarser_grids() {
-        for (period, spacing) in
-            [1_u32, 2, 3, 8, 13, 16].into_iter().flat_map(|p| [1, 2, 4, 8, 16].map(|s| (p, s)))
+    fn each_run_has_every_rank_once_in_any_order() {
+        for period in [1_u32, 2, 3, 5, 8, 13, 16] {
+            let runs = 4000;
+            let mut counts = vec![vec![0_u32; period as usize]; period as usize];
+            for run in 0..runs {
+                let mut ranks: Vec<_> = (0..period).map(|place| permuted(place, period, mix(run))).collect();
+                for (place, rank) in ranks.iter().enumerate() {
+                    counts[place][*rank as usize] += 1;
+                }
+                ranks.sort_unstable();
+                assert!(ranks.into_iter().eq(0..period));
+            }
+            let mean = runs as f64 / f64::from(period);
+            for count in counts.into_iter().flatten() {
+                let deviation = (f64::from(count) - mean).abs() / mean.sqrt();
+                assert!(deviation < 4.5, "{period}: {count}, {mean}");
+            }
+        }
+    }
+
+    /// The first of a pair in a run says nothing of the second but that it is another.
+    #[test]
+    fn orders_are_of_many_kinds() {
+        let mut pairs = [[0_u32; 8]; 8];
+        let runs = 20_000;
+        for run in 0..runs {
+            let [a, b] = [0, 1].map(|place| permuted(place, 8, mix(run)));
+            pairs[a as usize][b as usize] += 1;
+        }
+        let mean = f64::from(runs as u32) / 56.0;
+        for (a, b) in (0..8).flat_map(|a| (0..8).map(move |b| (a, b))).filter(|(a, b)| a != b) {
+            let deviation = (f64::from(pairs[a][b]) - mean).abs() / mean.sqrt();
+            assert!(deviation < 5.0, "{a}, {b}: {} of {mean}", pairs[a][b]);
+        }
+    }
+
+    #[test]
+    fn blocks_have_as_many_pixels_of_each_rank() {
+        for period in [1, 2, 3, 8, 13, 16] {
+            for side in [4, 8, 16] {
+                let mut counts = vec![0_u32; period as usize];
+                for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
+                    counts[rank([7 * side + x, 63 * side + y], period) as usize] += 1;
+                }
+                let mean = side * side / period;
+                assert!(counts.iter().all(|count| count.abs_diff(mean) <= 2), "{period}: {counts:?}");
+            }
+        }
+    }
+
+    /// What there is of an iteration that had to stop early.
+    #[test]
+    fn coarse_grids_have_pixels_of_each_rank() {
+        for (period, spacing) in [2_u32, 3, 8, 13, 16].into_iter().flat_map(|p| [2, 4, 8, 16].map(|s| (p, s)))
         {
             let mut counts = vec![0_u32; period as usize];
             for (y, x) in (0..40).flat_map(|y| (0..60).map(move |x| (y, x))) {
                 counts[rank([7 + spacing * x, 1000 + spacing * y], period) as usize] += 1;
             }
-            let mean = 2400 / period;
-            assert!(
-                counts.iter().all(|&count| count.abs_diff(mean) <= mean / 20 + 2),
-                "{period}, {spacing}: {counts:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn pixels_of_one_rank_are_apart() {
-        let pixels: Vec<[u32; 2]> =
-            (0..64).flat_map(|y| (0..64).map(move |x| [x, y])).filter(|&pixel| rank(pixel, 8) == 0).collect();
-        for (i, a) in pixels.iter().enumerate() {
-            let distance =
-                |b: &[u32; 2]| f64::from(a[0].abs_diff(b[0])).hypot(f64::from(a[1].abs_diff(b[1])));
-            assert!(pixels[..i].iter().map(distance).all(|distance| distance > 2.0));
+            let mean = 2400.0 / f64::from(period);
+            let deviation = |count: &u32| (f64::from(*count) - mean).abs() / mean.sqrt();
+            assert!(counts.iter().all(|count| deviation(count) < 4.0), "{period}, {spacing}: {counts:?}");
         }
     }
 }

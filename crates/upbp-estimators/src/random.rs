@@ -290,8 +290,9 @@ fn sobol(point: u32) -> u32 {
     x ^ ((x >> 1) & 0x5555_5555)
 }
 
+/// The finaliser of SplitMix64: numbers that are next to each other have nothing in common behind it.
 #[inline]
-fn mix(mut z: u64) -> u64 {
+pub(crate) fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
