@@ -73,31 +73,52 @@ pub struct RadiusSchedule {
 }
 
 impl RadiusSchedule {
-    /// A radius in some iteration, for a kernel of `dimension` dimensions.
-    fn at(&self, first: f32, dimension: i32, iteration: u64) -> f32 {
+    /// The first radius of a technique, 0 if it does not merge, and the dimensions of its kernel.
+    const fn first(&self, technique: Technique) -> (f32, i32) {
+        match technique {
+            Technique::Surf => (self.surf, 2),
+            Technique::Pp3d => (self.pp3d, 3),
+            Technique::Pb2d => (self.pb2d, 2),
+            Technique::Bp2d => (self.bp2d, 2),
+            Technique::Bb1d => (self.bb1d, 1),
+            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => (0.0, 0),
+        }
+    }
+
+    /// The radius of a technique in some iteration, or between two.
+    fn at(&self, technique: Technique, iteration: f64) -> f32 {
+        let (first, dimension) = self.first(technique);
         if first <= 0.0 {
             return 0.0;
         }
-        let shrink = if self.progressive {
-            (1.0 + iteration as f64).powf(-1.0 / (f64::from(dimension) + 4.0))
-        } else {
-            1.0
-        };
+        let shrink =
+            if self.progressive { (1.0 + iteration).powf(-1.0 / (f64::from(dimension) + 4.0)) } else { 1.0 };
         ((f64::from(first) * shrink) as f32).max(self.floor / self.field.least())
     }
 
     /// The kernels of an iteration where `φ` is one.
     pub(crate) fn kernels(&self, iteration: u64) -> Kernels {
-        let kernel = |first: f32, dimension: i32, make: fn(f32) -> Kernel| {
-            let radius = self.at(first, dimension, iteration);
+        let kernel = |technique, make: fn(f32) -> Kernel| {
+            let radius = self.at(technique, iteration as f64);
             if radius > 0.0 { make(radius) } else { Kernel::NONE }
         };
         Kernels {
-            surf: kernel(self.surf, 2, Kernel::disc),
-            pp3d: kernel(self.pp3d, 3, Kernel::ball),
-            pb2d: kernel(self.pb2d, 2, Kernel::parabolic_disc),
-            bp2d: kernel(self.bp2d, 2, Kernel::parabolic_disc),
-            bb1d: kernel(self.bb1d, 1, Kernel::parabolic_line),
+            surf: kernel(Technique::Surf, Kernel::disc),
+            pp3d: kernel(Technique::Pp3d, Kernel::ball),
+            pb2d: kernel(Technique::Pb2d, Kernel::parabolic_disc),
+            bp2d: kernel(Technique::Bp2d, Kernel::parabolic_disc),
+            bb1d: kernel(Technique::Bb1d, Kernel::parabolic_line),
+        }
+    }
+
+    /// Photons within a kernel over those of the first iteration, mean over a number of iterations, which is
+    /// about that of the one at a third of them; 1 for techniques that do not merge.
+    pub(crate) fn mean_photons(&self, technique: Technique, iterations: f64) -> f64 {
+        let (first, dimension) = self.first(technique);
+        if first > 0.0 {
+            (f64::from(self.at(technique, (iterations - 1.0) / 3.0)) / f64::from(first)).powi(dimension)
+        } else {
+            1.0
         }
     }
 }
@@ -127,5 +148,16 @@ mod tests {
         assert_eq!(last.bp2d, Kernel::NONE);
         let fixed = RadiusSchedule { progressive: false, ..schedule };
         assert_eq!(fixed.kernels(999), fixed.kernels(0));
+        assert_eq!(fixed.mean_photons(Technique::Pp3d, 999.0), 1.0);
+        assert_eq!(schedule.mean_photons(Technique::Connect, 999.0), 1.0);
+        for technique in [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bb1d] {
+            for iterations in [1, 2, 5, 10, 100, 3000] {
+                let (_, dimension) = schedule.first(technique);
+                let photons = |i| f64::from(schedule.at(technique, f64::from(i))).powi(dimension);
+                let mean = (0..iterations).map(photons).sum::<f64>() / f64::from(iterations);
+                let found = schedule.mean_photons(technique, f64::from(iterations));
+                assert!((found / mean - 1.0).abs() < 0.1, "{technique:?}, {iterations}: {found}, {mean}");
+            }
+        }
     }
 }

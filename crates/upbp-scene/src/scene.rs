@@ -77,8 +77,8 @@ impl ReadyScene {
         self.hash
     }
 
-    /// The files of meshes, images and tables that were read, in the order of reading, without the scene file itself.
-    /// A program that writes files must not overwrite them.
+    /// The files of meshes, images and tables that were read, in the order of reading, without the scene file
+    /// itself. A program that writes files must not overwrite them.
     #[must_use]
     pub fn files(&self) -> &[PathBuf] {
         &self.files

@@ -71,13 +71,13 @@ struct Job {
 }
 
 impl Job {
-    /// Reads all files, and checks that outputs can be written and none would destroy a file: before the work,
-    /// not after it.
+    /// Reads all files, and checks before the work that outputs can be written and none would destroy a file.
     fn read(options: &Options) -> Result<Self, Failure> {
         let settings = options.settings().map_err(Failure::input)?.validate().map_err(Failure::input)?;
         let scene = load(options).map_err(Failure::input)?;
         let images = options.images();
-        let files = scene.files().iter().map(|file| ("a mesh or an image or a table of the scene", file.as_path()));
+        let files =
+            scene.files().iter().map(|file| ("a mesh or an image or a table of the scene", file.as_path()));
         let inputs: Vec<_> = options.inputs().chain(files).collect();
         let outputs = options.outputs(&images);
         check_outputs(&outputs, &inputs).map_err(Failure::input)?;

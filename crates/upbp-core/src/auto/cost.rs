@@ -9,6 +9,7 @@ use upbp_estimators::{Technique, TechniqueSet};
 use super::full_plan::BEAMS;
 use super::pilot_render::PilotRender;
 use super::pilot_render::recorder::ByTechnique;
+use crate::deadline::Stop;
 use crate::plan::Plan;
 
 /// Nanoseconds of an edge of a camera sub-path or a light sub-path.
@@ -57,6 +58,16 @@ impl<'a> Cost<'a> {
         let camera = (pilot.cells * (pilot.passes + 1)) as f64 * self.camera_path(&pilot.plan);
         let light = pilot.passes as f64 * pilot.thinning[0] * self.light_paths(&pilot.plan);
         RECORDING * (camera + light)
+    }
+
+    /// Iterations of a render by a plan that ends by `stop`, as far as that can be told.
+    pub(super) fn iterations(self, plan: &Plan, stop: &Stop) -> f64 {
+        /// Of a render without such limits.
+        const UNKNOWN: f64 = 64.0;
+        let by_number = stop.iterations.map(|iterations| iterations as f64);
+        let nanoseconds = |seconds: f64| 1e9 * seconds * rayon::current_num_threads() as f64;
+        let by_time = stop.seconds.map(|seconds| nanoseconds(seconds) / self.iteration(plan));
+        by_number.into_iter().chain(by_time).reduce(f64::min).unwrap_or(UNKNOWN).max(1.0)
     }
 
     /// Processor nanoseconds of an iteration.

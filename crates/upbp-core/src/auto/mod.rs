@@ -176,7 +176,7 @@ fn best_plan<S: Scene, L: Lanes>(
     let (mut plan, mut spent) = (None, 0.0);
     loop {
         let mut clock = Clock::start();
-        let Some(pilot) =
+        let Some(mut pilot) =
             PilotRender::run::<S, L>(scene, settings, &candidates.full, size, limits, &allowance.halt())
         else {
             // No time, or more samples than there is room for.
@@ -186,6 +186,8 @@ fn best_plan<S: Scene, L: Lanes>(
             size.pixels /= 4;
             continue;
         };
+        let cost = Cost::of(&pilot).of_pilot();
+        pilot.iterations = Cost::of(&pilot).iterations(&plan.unwrap_or(candidates.usual()), &budget.stop);
         let variance = Variance::of(pilot);
         let found = search::best(&variance, candidates);
         plan = Some(found.plan);
@@ -206,7 +208,6 @@ fn best_plan<S: Scene, L: Lanes>(
         } else {
             (&mut size.light_paths, at_most(GROWTH_OF_LIGHT).min(pilot.more_light_paths as u32))
         };
-        let cost = Cost::of(pilot).of_pilot();
         spent += cost;
         if growth < 2 || spent + f64::from(growth) * cost > PILOT_PART * found.work(&budget.stop) {
             return found.plan;

@@ -51,8 +51,8 @@ impl<'a> Renderer<'a> {
     /// The walks are compiled for the type of scene, where this is called.
     ///
     /// # Errors
-    /// A scene whose bounds, powers or crop make no sense, or that nothing lights; a film that exceeds the memory
-    /// budget.
+    /// A scene whose bounds, powers or crop make no sense, or that nothing lights; a film that exceeds the
+    /// memory budget.
     pub fn new<S: Scene>(scene: &'a S, settings: CheckedSettings) -> Result<Self, RenderError> {
         Self::start(scene, settings, Start::default())
     }

@@ -1,8 +1,8 @@
 //! The build of a scene from its description: names are looked up, geometry is checked, bodies are put in
 //! order.
 //!
-//! Every step goes on after a problem, so that all problems are reported together; what is asked of the scene as
-//! a whole waits until all its parts are good.
+//! Every step goes on after a problem, so that all problems are reported together; what is asked of the scene
+//! as a whole waits until all its parts are good.
 
 mod bodies;
 mod builder;

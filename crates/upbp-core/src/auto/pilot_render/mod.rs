@@ -113,6 +113,8 @@ pub(super) struct PilotRender {
     pub(super) room_taken: f64,
     /// Light sub-paths that there might be over those that there are.
     pub(super) more_light_paths: f64,
+    /// Iterations that plans are judged for; the pilot render has the radii of the first one.
+    pub(super) iterations: f64,
 }
 
 /// Merges with one light sub-path, or splats of one, at a pixel of a cell and at another one near it.
@@ -172,6 +174,7 @@ impl PilotRender {
             work: Work::default(),
             room_taken: 0.0,
             more_light_paths: f64::from(most_paths) / f64::from(paths.max(1)),
+            iterations: 1.0,
         };
         let mut thinned = iteration_plan(scene, settings, plan, 0).thinned(paths, beam_paths);
         let room = Room::new(limits.samples);
@@ -221,14 +224,20 @@ impl PilotRender {
         f64::from(plan.paths_of(technique)) / f64::from(self.plan.paths_of(technique).max(1))
     }
 
-    /// Photons or beams within a query's kernel under another plan, relative to the plan of this render.
+    /// Photons or beams within a query's kernel under another plan, mean over its iterations, relative to the
+    /// first one of the plan of this render.
     pub(super) fn relative_photons(&self, technique: Technique, plan: &Plan) -> f64 {
         let kernel = if technique == Technique::Surf && self.plan.radii.surf > 0.0 {
             f64::from(plan.radii.surf / self.plan.radii.surf).powi(2)
         } else {
             1.0
         };
-        kernel * self.relative_paths(technique, plan)
+        kernel * self.relative_paths(technique, plan) * self.mean_photons(technique)
+    }
+
+    /// Photons or beams within a query's kernel, mean over iterations, relative to the first one.
+    pub(super) fn mean_photons(&self, technique: Technique) -> f64 {
+        self.plan.radii.mean_photons(technique, self.iterations)
     }
 
     /// The work of all passes per sub-path.

@@ -38,8 +38,15 @@ pub(super) fn reductions(parts: &[f64]) -> Vec<f32> {
 
 /// The limit of parts such that none is more than [`LARGEST_PART`] of the sum of all that are so limited.
 pub(super) fn largest(mut parts: Vec<f64>) -> f64 {
-    parts.sort_unstable_by(|a, b| b.total_cmp(a));
+    /// No more parts are above the limit.
+    const ABOVE: usize = (1.0 / LARGEST_PART) as usize + 1;
     let mut rest: f64 = parts.iter().sum();
+    let descending = |a: &f64, b: &f64| b.total_cmp(a);
+    if parts.len() > ABOVE {
+        parts.select_nth_unstable_by(ABOVE, descending);
+        parts.truncate(ABOVE);
+    }
+    parts.sort_unstable_by(descending);
     for (above, part) in parts.iter().enumerate() {
         // With `above` parts limited to `most`: most = LARGEST_PART (above most + rest).
         let most = LARGEST_PART * rest / (1.0 - LARGEST_PART * above as f64);

@@ -18,10 +18,10 @@ use upbp_estimators::{Technique, TechniqueSet};
 
 use super::full_plan::BEAMS;
 use super::pilot_render::recorder::{ByTechnique, Sample, TECHNIQUES};
-use super::pilot_render::{PilotRender, Shared};
+use super::pilot_render::{PASSES, PilotRender, Shared};
 use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
-use sample_pairs::{Excess, Looks, View};
+use sample_pairs::{Excess, Look, Looks, View};
 
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
@@ -47,8 +47,6 @@ struct Counts {
     camera_factor: f64,
     /// The number of the roulette.
     roulette: usize,
-    /// Times as rarely that a path may be found and be charged for just that.
-    trusted: f32,
     /// The fewest light sub-paths that merges come from: those with beams, if there are any.
     light_paths: f64,
 }
@@ -63,7 +61,6 @@ impl Counts {
             active: [1.0; TECHNIQUES],
             camera_factor: f64::from(plan.camera_factor),
             roulette: pilot.roulette(plan),
-            trusted: TRUSTED,
             light_paths: f64::from(if plan.techniques.intersects(BEAMS) {
                 plan.beam_paths
             } else {
@@ -150,27 +147,33 @@ impl Variance {
     /// light sub-paths are no such techniques.
     pub(super) fn over_scales(&self, plan: &Plan) -> [f64; GROUPS] {
         let usual = self.pilot.plan.light_paths;
-        if plan.light_paths <= usual {
-            return self.over_scales_with(&Counts::of(plan, &self.pilot));
-        }
-        let fewer = Plan { light_paths: usual, ..*plan };
-        let [more, at_usual] = [plan, &fewer].map(|plan| {
-            let counts = Counts { trusted: f32::INFINITY, ..Counts::of(plan, &self.pilot) };
-            self.over_scales_with(&counts).iter().sum::<f64>()
-        });
-        self.over_scales(&fewer).map(|variance| finite_or_infinite(variance * more / at_usual))
+        let with = |light_paths: u32| {
+            self.over_scales_with(&Counts::of(&Plan { light_paths, ..*plan }, &self.pilot))
+        };
+        let [variance, charges] = with(plan.light_paths.min(usual));
+        let sum = |parts: &[f64; GROUPS]| parts.iter().sum::<f64>();
+        let more =
+            if plan.light_paths > usual { sum(&with(plan.light_paths)[0]) / sum(&variance) } else { 1.0 };
+        std::array::from_fn(|group| finite_or_infinite((variance[group] + charges[group]) * more))
     }
 
-    fn over_scales_with(&self, counts: &Counts) -> [f64; GROUPS] {
-        let mut variance = self.with(counts);
+    /// Variances of blocks without what rare paths are charged for, and those charges.
+    fn over_scales_with(&self, counts: &Counts) -> [[f64; GROUPS]; 2] {
+        let [mut variance, charges] = self.parts(counts);
         let view = View::new(&self.pilot, &self.looks, counts);
         for shared in &self.pilot.shared {
             variance[group(shared.cell as usize)] += view.in_common(shared) / self.pilot.cells as f64;
         }
-        variance.map(finite_or_infinite)
+        [variance, charges]
     }
 
     fn with(&self, counts: &Counts) -> [f64; GROUPS] {
+        let [variance, charges] = self.parts(counts);
+        std::array::from_fn(|group| finite_or_infinite(variance[group] + charges[group]))
+    }
+
+    /// Variances of pixels without what rare paths are charged for, and those charges.
+    fn parts(&self, counts: &Counts) -> [[f64; GROUPS]; 2] {
         let pilot = &self.pilot;
         let mut view = View::new(pilot, &self.looks, counts);
         let mut groups = [Moments::default(); GROUPS];
@@ -186,26 +189,25 @@ impl Variance {
             variance[group] += pilot.per_splat() * f64::from(share.single(square));
             doubt.add(group, pilot.per_splat(), &share.excess(square));
         }
-        let charges = doubt.charges();
-        std::array::from_fn(|group| finite_or_infinite(variance[group] + charges[group]))
+        [variance, doubt.charges()]
     }
 
     /// Moments of the samples of a cell.
     fn of_cell(&self, cell: usize, view: &mut View<'_>, doubt: &mut Doubt) -> Moments {
-        let passes = self.pilot.passes as f64;
+        let looks: [Look; PASSES as usize] =
+            std::array::from_fn(|pass| view.look(cell * self.pilot.passes + pass));
+        let part = 1.0 / f64::from(PASSES);
         let mut moments = Moments::default();
-        let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
-        for pass in 0..self.pilot.passes {
-            let look = view.look(cell * self.pilot.passes + pass);
-            moments.single += look.single / passes;
-            moments.light += look.light / passes;
-            moments.pairs += look.products / passes;
-            doubt.add(group(cell), 1.0 / (passes * self.pilot.cells as f64), &look.excess);
-            sum += look.sum;
-            squares += look.sum.length_squared();
+        for look in &looks {
+            moments.single += part * look.single;
+            moments.light += part * look.light;
+            moments.pairs += part * look.products;
+            doubt.add(group(cell), part / self.pilot.cells as f64, &look.excess);
         }
         // Products of different passes have no part of their own variance.
-        moments.mean_square = (sum.length_squared() - squares) / (passes * (passes - 1.0));
+        let [one, other] = &looks;
+        moments.mean_square = one.sum.dot(other.sum);
+        moments.in_turn = view.taken_by_turns([one, other]);
         moments
     }
 }
@@ -225,6 +227,8 @@ struct Moments {
     /// Products of pairs of samples.
     pairs: f64,
     mean_square: f64,
+    /// The part of `pairs` that is not there where pixels take turns.
+    in_turn: f64,
 }
 
 impl Moments {
@@ -233,6 +237,7 @@ impl Moments {
         self.light += more.light;
         self.pairs += more.pairs;
         self.mean_square += more.mean_square;
+        self.in_turn += more.in_turn;
     }
 
     /// The variance. As the difference of noisy numbers it may be anything, but not less than if nothing was
@@ -241,7 +246,7 @@ impl Moments {
     fn variance(&self, light_paths: f64) -> f64 {
         let of_light = self.light - self.mean_square / light_paths;
         let least = LEAST_PART * (self.single - self.light) + of_light;
-        (self.single + self.pairs - self.mean_square).max(least).max(LEAST_PART * self.single)
+        (self.single + self.pairs - self.in_turn - self.mean_square).max(least).max(LEAST_PART * self.single)
     }
 }
 
@@ -274,7 +279,7 @@ impl Doubt {
 
 /// Groups are spread over the picture.
 const fn group(cell: usize) -> usize {
-    ((cell as u32).wrapping_mul(2_654_435_761) >> 29) as usize % GROUPS
+    ((cell as u32).wrapping_mul(2_654_435_761) >> 29) as usize
 }
 
 impl PilotRender {

@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use glam::{DVec3, Vec3};
 use upbp_estimators::Technique;
 
-use super::{Counts, has_camera_factor};
+use super::{Counts, TRUSTED, has_camera_factor};
 use crate::auto::pilot_render::PilotRender;
 use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
 use crate::auto::roulette::{COUNT, relative_pass_probability};
@@ -82,6 +82,8 @@ pub(super) struct Look {
     pub(super) products: f64,
     /// All samples.
     pub(super) sum: DVec3,
+    /// Those of each technique, if any makes queries in some pixels only.
+    pub(super) by_technique: [Vec3; TECHNIQUES],
 }
 
 /// Looks with the eyes of a plan.
@@ -94,10 +96,14 @@ pub(super) struct View<'a> {
     weighted: [f32; TECHNIQUES],
     /// The factor of emission hits, next events and connections.
     camera_factor: f32,
-    trusted: f32,
+    /// Samples of each technique that the pilot render's plan has, mean over iterations, over those of the
+    /// first.
+    usual: [f32; TECHNIQUES],
     /// Pairs of samples of one camera sub-path that count beside those of independent samples: it makes the
     /// queries for both or for none.
     common: [f32; TECHNIQUES],
+    /// The part of those that is not there, since pixels take turns in order.
+    in_turn: [f32; TECHNIQUES],
     /// Pairs of photons of one light sub-path that the plan has, less those of the pilot render: by points
     /// and by beams.
     more: [f32; 2],
@@ -119,13 +125,21 @@ impl<'a> View<'a> {
                 (factor * counts.relative[technique as usize]) as f32
             }),
             camera_factor: counts.camera_factor as f32,
-            trusted: counts.trusted,
+            usual: Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32),
             common: counts.active.map(|p| (1.0 / p - 1.0) as f32),
+            in_turn: counts.active.map(|p| in_turn(p, pilot.iterations) as f32),
             more: [0, 1].map(|i| (pilot.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
             periodic: counts.active.iter().any(|p| *p < 1.0),
             by_class: Vec::new(),
             by_technique: Vec::new(),
         }
+    }
+
+    /// The part of the variance by queries in some pixels that turns take away, from two looks that are
+    /// independent.
+    pub(super) fn taken_by_turns(&self, [one, other]: [&Look; 2]) -> f64 {
+        let of = |i: usize| self.common[i] * self.in_turn[i] * one.by_technique[i].dot(other.by_technique[i]);
+        (0..TECHNIQUES).map(|i| f64::from(of(i))).sum()
     }
 
     /// A look at what one camera sub-path found.
@@ -180,6 +194,7 @@ impl<'a> View<'a> {
             result.products += f64::from(2.0 * rarity * y.dot(others));
         }
         result.sum = (all[0] + all[1]).as_dvec3();
+        result.by_technique = all_by_technique;
         result
     }
 
@@ -188,9 +203,10 @@ impl<'a> View<'a> {
         self.weighted[technique as usize] * self.share(shares).inverse
     }
 
-    /// Pairs of merges with one light sub-path, by two camera sub-paths, over those of the pilot render.
-    pub(super) fn pairs_relative(&self, first: Technique, second: Technique) -> f32 {
-        1.0 + self.more[class(first).min(class(second))]
+    /// Pairs of merges with one light sub-path, by two camera sub-paths, over those of the pilot render: those
+    /// with a photon point, then those with beams alone.
+    pub(super) fn pairs_relative(&self) -> [f32; 2] {
+        self.more.map(|more| 1.0 + more)
     }
 
     /// The densities of the plan at a sample's path.
@@ -201,12 +217,12 @@ impl<'a> View<'a> {
         // Not one after the other, and one division: the search has nothing else to wait for.
         let (camera, light) = ((a + b) + c, (((e + f) + (g + h)) + i) + d);
         let weighted = self.camera_factor * camera;
+        let usual: f32 = (0..TECHNIQUES).map(|i| shares[i] * self.usual[i]).sum();
         Share {
             light,
             all: self.camera_factor * weighted + light,
-            rarity: 1.0 / (camera + light),
+            rarity: usual / (camera + light),
             inverse: 1.0 / (weighted + light),
-            trusted: self.trusted,
         }
     }
 }
@@ -217,11 +233,10 @@ pub(super) struct Share {
     light: f32,
     /// Of all, each with the square of its factor in the weights.
     all: f32,
-    /// One over the sum of all.
+    /// How much more rarely than with the pilot render's plan the path is found.
     rarity: f32,
     /// One over the sum of all with their factors.
     inverse: f32,
-    trusted: f32,
 }
 
 impl Share {
@@ -240,7 +255,7 @@ impl Share {
     /// The charge for such a sample beyond its part.
     #[inline]
     pub(super) fn excess(&self, square: f32) -> Excess {
-        let charge = f64::from(self.single(square) * ((self.rarity / self.trusted).max(1.0).sqrt() - 1.0));
+        let charge = f64::from(self.single(square) * ((self.rarity / TRUSTED).max(1.0).sqrt() - 1.0));
         Excess { charge, by_rarity: charge * f64::from(self.rarity) }
     }
 }
@@ -261,6 +276,14 @@ impl Excess {
 }
 
 /// Class of the light sub-paths that a technique uses: 1 for those with beams.
-const fn class(technique: Technique) -> usize {
+pub(super) const fn class(technique: Technique) -> usize {
     matches!(technique, Technique::Bp2d | Technique::Bb1d) as usize
+}
+
+/// The part that pixels which take turns, in both halves of a render, take away of the variance of how often
+/// each makes queries with this probability: a sixth is left, the variance of the part of a turn that does not
+/// come out even, mean over numbers of iterations.
+fn in_turn(probability: f64, iterations: f64) -> f64 {
+    let independent = 0.5 * iterations * probability * (1.0 - probability);
+    if independent > 0.0 { (1.0 - 1.0 / (6.0 * independent)).max(0.0) } else { 0.0 }
 }

@@ -1,11 +1,10 @@
 //! Covariances of neighbouring pixels, which merge photons and beams of the same light sub-paths.
 
 use glam::Vec3;
-use upbp_estimators::Technique;
 
-use super::sample_pairs::View;
+use super::sample_pairs::{View, class};
 use crate::auto::pilot_render::Shared;
-use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
+use crate::auto::pilot_render::recorder::Sample;
 
 impl View<'_> {
     /// Product of two pixels' merges with one light sub-path under the plan, times its weight in the errors
@@ -14,27 +13,20 @@ impl View<'_> {
     /// A covariance is less by the product of the means over the number of light sub-paths: little where
     /// each of them meets a small part of the picture.
     pub(super) fn in_common(&self, shared: &Shared) -> f64 {
-        let [own, other] = &shared.samples;
-        let [own, other] = [self.by_technique(own), self.by_technique(other)];
-        let mut product = 0.0;
-        for first in Technique::ALL {
-            for second in Technique::ALL {
-                let both = own[first as usize].dot(other[second as usize]);
-                if both != 0.0 {
-                    product += f64::from(both * self.pairs_relative(first, second));
-                }
-            }
-        }
-        shared.weight * product
+        let [own, other] = shared.samples.each_ref().map(|samples| self.by_class(samples));
+        let with_points = own[0].dot(other[0] + other[1]) + own[1].dot(other[0]);
+        let [points, beams] = self.pairs_relative();
+        shared.weight * f64::from(points * with_points + beams * own[1].dot(other[1]))
     }
 
-    fn by_technique(&self, samples: &[Sample]) -> [Vec3; TECHNIQUES] {
-        let mut sums = [Vec3::ZERO; TECHNIQUES];
+    /// Sums of samples by points and by beams.
+    fn by_class(&self, samples: &[Sample]) -> [Vec3; 2] {
+        let mut sums = [Vec3::ZERO; 2];
         for sample in samples {
             let weight = self.weight(sample.technique, &sample.shares);
             // Neither without samples nor without a number.
             if weight > 0.0 {
-                sums[sample.technique as usize] += sample.value * weight;
+                sums[class(sample.technique)] += sample.value * weight;
             }
         }
         sums
