@@ -45,8 +45,9 @@ impl MergePeriods {
 
 /// The rank of a pixel, below `period`.
 ///
-/// Along a Z-shaped curve each run of as many pixels has every rank once, in an order of its own. So any part of
-/// the picture has its share of each, and pixels of a rank, which query the same photons, are no grid that one sees.
+/// Along a Z-shaped curve each run of as many pixels has every rank once, in an order of its own. So any part
+/// of the picture has its share of each, and pixels of a rank, which query the same photons, are no grid that
+/// one sees.
 pub(crate) fn rank([x, y]: [u32; 2], period: u32) -> u32 {
     let along = spread(x) | spread(y) << 1;
     let (run, place) = (along / u64::from(period), along % u64::from(period));
@@ -65,8 +66,9 @@ const fn spread(number: u32) -> u64 {
 
 /// The place of `place`, both below `count`, in an order by `key`.
 ///
-/// All steps of a round can be undone among the numbers below a power of two. One that leads beyond `count` is
-/// followed by others until one leads back: a cycle of the permutation without the numbers that are too large.
+/// All steps of a round can be undone among the numbers below a power of two. Where all rounds lead beyond
+/// `count`, others follow until they lead back: a cycle of the permutation without the numbers that are too
+/// large.
 const fn permuted(mut place: u32, count: u32, key: u64) -> u32 {
     const ROUNDS: u32 = 4;
     if count < 2 {

@@ -203,8 +203,8 @@ impl<'a> View<'a> {
         self.weighted[technique as usize] * self.share(shares).inverse
     }
 
-    /// Pairs of merges with one light sub-path, by two camera sub-paths, over those of the pilot render: those
-    /// with a photon point, then those with beams alone.
+    /// Pairs of merges with one light sub-path, by two camera sub-paths, over those of the pilot render: the
+    /// ones with a photon point, then the ones with beams alone.
     pub(super) fn pairs_relative(&self) -> [f32; 2] {
         self.more.map(|more| 1.0 + more)
     }
@@ -280,9 +280,9 @@ pub(super) const fn class(technique: Technique) -> usize {
     matches!(technique, Technique::Bp2d | Technique::Bb1d) as usize
 }
 
-/// The part that pixels which take turns, in both halves of a render, take away of the variance of how often
-/// each makes queries with this probability: a sixth is left, the variance of the part of a turn that does not
-/// come out even, mean over numbers of iterations.
+/// The part of the variance of how often a pixel makes queries, with this probability, that turns in both
+/// halves of a render take away: a sixth is left, the variance of the part of a turn that does not come out
+/// even, mean over numbers of iterations.
 fn in_turn(probability: f64, iterations: f64) -> f64 {
     let independent = 0.5 * iterations * probability * (1.0 - probability);
     if independent > 0.0 { (1.0 - 1.0 / (6.0 * independent)).max(0.0) } else { 0.0 }
