@@ -4,7 +4,8 @@
 //! counts `m` times, and in the weights of all camera sub-paths their number of samples is `n/m`. So the
 //! weights of a path sum to one for any `m`, and a technique that hardly pays but may be the only one for
 //! some paths stays, at a part of the cost of its queries. Turns are spread evenly over the picture: any part
-//! of it has its share of the queries in every iteration, and neighbours do not query the same photons.
+//! of it has its share of the queries in every iteration, and pixels of a run of m query different
+//! photons.
 
 use std::num::NonZeroU32;
 

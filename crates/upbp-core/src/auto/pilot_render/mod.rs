@@ -10,7 +10,7 @@ pub(super) mod recorder;
 
 use std::ops::Range;
 
-use upbp_estimators::mis;
+use upbp_estimators::mis::{self, Heuristic};
 use upbp_estimators::path::{Context, LightChunk, LightVertex, Splat};
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
@@ -25,7 +25,7 @@ use super::parallel_walks::{PIECE, in_pieces};
 use super::roulette;
 use crate::deadline::Halt;
 use crate::plan::Plan;
-use crate::settings::CheckedSettings;
+use crate::settings::{CheckedSettings, Settings};
 use grid::Grid;
 use recorder::{ByRoulette, ByTechnique, Recorder, Room, Sample, TECHNIQUES, add, passed};
 
@@ -176,7 +176,9 @@ impl PilotRender {
             more_light_paths: f64::from(most_paths) / f64::from(paths.max(1)),
             iterations: 1.0,
         };
-        let mut thinned = iteration_plan(scene, settings, plan, 0).thinned(paths, beam_paths);
+        // Parts in weights tell densities with this heuristic alone, whichever the render has.
+        let settings = Settings { heuristic: Heuristic::Balance, ..Settings::clone(settings) };
+        let mut thinned = iteration_plan(scene, &settings, plan, 0).thinned(paths, beam_paths);
         let room = Room::new(limits.samples);
         let mut passes = (0..PASSES)
             .map(|pass| {

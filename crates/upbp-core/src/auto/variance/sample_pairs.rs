@@ -214,7 +214,7 @@ impl<'a> View<'a> {
     pub(super) fn share(&self, shares: &[f32; TECHNIQUES]) -> Share {
         let [a, b, c, d, e, f, g, h, i]: [f32; TECHNIQUES] =
             std::array::from_fn(|i| shares[i] * self.relative[i]);
-        // Not one after the other, and one division: the search has nothing else to wait for.
+        // Not one after the other: the search has nothing else to wait for.
         let (camera, light) = ((a + b) + c, (((e + f) + (g + h)) + i) + d);
         let weighted = self.camera_factor * camera;
         let usual: f32 = (0..TECHNIQUES).map(|i| shares[i] * self.usual[i]).sum();
