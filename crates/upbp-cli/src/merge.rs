@@ -58,7 +58,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     for output in outputs {
         check_writable(output.path).map_err(Failure::input)?;
     }
-    let (merged, parts) = merge(&options.states)?;
+    let (merged, parts) = merge(&options.states, options.quiet)?;
     let report = merged.report();
     let mut failures = Vec::new();
     let mut attempt = |written: Result<(), OutputError>| failures.extend(written.err());
@@ -83,12 +83,15 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Reads and merges one after the other: two films are in memory at most. Comes with a line about each.
-fn merge(paths: &[PathBuf]) -> Result<(State, String), Failure> {
+/// Reads and merges one after the other: two films are in memory at most. Comes with a line about each,
+/// unless it is to be quiet.
+fn merge(paths: &[PathBuf], quiet: bool) -> Result<(State, String), Failure> {
     let (mut merged, mut parts) = (None::<State>, String::new());
     for path in paths {
         let state = State::load(path).map_err(Failure::input)?;
-        parts += &describe(path, &state);
+        if !quiet {
+            parts += &describe(path, &state);
+        }
         match &mut merged {
             None => merged = Some(state),
             Some(merged) => merged

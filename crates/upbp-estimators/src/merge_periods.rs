@@ -70,20 +70,17 @@ const fn spread(number: u32) -> u64 {
 /// All steps of a round can be undone among the numbers below a power of two. Where all rounds lead beyond
 /// `count`, others follow until they lead back: a cycle of the permutation without the numbers that are too
 /// large.
-const fn permuted(mut place: u32, count: u32, key: u64) -> u32 {
-    const ROUNDS: u32 = 4;
+fn permuted(mut place: u32, count: u32, key: u64) -> u32 {
     if count < 2 {
         return 0;
     }
     let bits = u32::BITS - (count - 1).leading_zeros();
+    let mask = u32::MAX >> (u32::BITS - bits);
     loop {
-        let mut round = 0;
-        while round < ROUNDS {
-            let own = (key >> (16 * round)) as u16 as u32;
-            place =
-                place.wrapping_mul(own << 1 | 1).wrapping_add(own >> 8) & (u32::MAX >> (u32::BITS - bits));
+        for round in key.to_le_bytes().as_chunks::<2>().0 {
+            let [factor, more] = round.map(u32::from);
+            place = place.wrapping_mul(factor << 1 | 1).wrapping_add(more) & mask;
             place ^= place >> bits.div_ceil(2);
-            round += 1;
         }
         if place < count {
             return place;

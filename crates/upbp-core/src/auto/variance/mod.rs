@@ -207,7 +207,6 @@ impl Variance {
         // Products of different passes have no part of their own variance.
         let [one, other] = &looks;
         moments.mean_square = one.sum.dot(other.sum);
-        moments.in_turn = view.taken_by_turns([one, other]);
         moments
     }
 }
@@ -227,8 +226,6 @@ struct Moments {
     /// Products of pairs of samples.
     pairs: f64,
     mean_square: f64,
-    /// The part of `pairs` that is not there where pixels take turns.
-    in_turn: f64,
 }
 
 impl Moments {
@@ -237,7 +234,6 @@ impl Moments {
         self.light += more.light;
         self.pairs += more.pairs;
         self.mean_square += more.mean_square;
-        self.in_turn += more.in_turn;
     }
 
     /// The variance. As the difference of noisy numbers it may be anything, but not less than if nothing was
@@ -246,7 +242,7 @@ impl Moments {
     fn variance(&self, light_paths: f64) -> f64 {
         let of_light = self.light - self.mean_square / light_paths;
         let least = LEAST_PART * (self.single - self.light) + of_light;
-        (self.single + self.pairs - self.in_turn - self.mean_square).max(least).max(LEAST_PART * self.single)
+        (self.single + self.pairs - self.mean_square).max(least).max(LEAST_PART * self.single)
     }
 }
 

@@ -82,8 +82,6 @@ pub(super) struct Look {
     pub(super) products: f64,
     /// All samples.
     pub(super) sum: DVec3,
-    /// Those of each technique, if any makes queries in some pixels only.
-    pub(super) by_technique: [Vec3; TECHNIQUES],
 }
 
 /// Looks with the eyes of a plan.
@@ -102,8 +100,6 @@ pub(super) struct View<'a> {
     /// Pairs of samples of one camera sub-path that count beside those of independent samples: it makes the
     /// queries for both or for none.
     common: [f32; TECHNIQUES],
-    /// The part of those that is not there, since pixels take turns in order.
-    in_turn: [f32; TECHNIQUES],
     /// Pairs of photons of one light sub-path that the plan has, less those of the pilot render: by points
     /// and by beams.
     more: [f32; 2],
@@ -127,19 +123,11 @@ impl<'a> View<'a> {
             camera_factor: counts.camera_factor as f32,
             usual: Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32),
             common: counts.active.map(|p| (1.0 / p - 1.0) as f32),
-            in_turn: counts.active.map(|p| in_turn(p, pilot.iterations) as f32),
             more: [0, 1].map(|i| (pilot.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
             periodic: counts.active.iter().any(|p| *p < 1.0),
             by_class: Vec::new(),
             by_technique: Vec::new(),
         }
-    }
-
-    /// The part of the variance by queries in some pixels that turns take away, from two looks that are
-    /// independent.
-    pub(super) fn taken_by_turns(&self, [one, other]: [&Look; 2]) -> f64 {
-        let of = |i: usize| self.common[i] * self.in_turn[i] * one.by_technique[i].dot(other.by_technique[i]);
-        (0..TECHNIQUES).map(|i| f64::from(of(i))).sum()
     }
 
     /// A look at what one camera sub-path found.
@@ -194,7 +182,6 @@ impl<'a> View<'a> {
             result.products += f64::from(2.0 * rarity * y.dot(others));
         }
         result.sum = (all[0] + all[1]).as_dvec3();
-        result.by_technique = all_by_technique;
         result
     }
 
@@ -278,12 +265,4 @@ impl Excess {
 /// Class of the light sub-paths that a technique uses: 1 for those with beams.
 pub(super) const fn class(technique: Technique) -> usize {
     matches!(technique, Technique::Bp2d | Technique::Bb1d) as usize
-}
-
-/// The part of the variance of how often a pixel makes queries, with this probability, that turns in both
-/// halves of a render take away: a sixth is left, the variance of the part of a turn that does not come out
-/// even, mean over numbers of iterations.
-fn in_turn(probability: f64, iterations: f64) -> f64 {
-    let independent = 0.5 * iterations * probability * (1.0 - probability);
-    if independent > 0.0 { (1.0 - 1.0 / (6.0 * independent)).max(0.0) } else { 0.0 }
 }

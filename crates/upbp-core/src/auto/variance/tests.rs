@@ -224,38 +224,6 @@ fn photons_vary_at_least_as_independent_ones_do() {
     }
 }
 
-/// Photons that all queries find alike, in one pixel of eight: what varies is how often it is a pixel's turn,
-/// and less so than if each turn was drawn.
-#[test]
-fn turns_even_out_over_iterations() {
-    const PHOTONS: u32 = 100;
-    const PLANNED: f64 = 1000.0;
-    const PERIOD: f64 = 8.0;
-    let looks = SIDE * SIDE * PASSES;
-    let mut shares = [0.0; TECHNIQUES];
-    shares[Technique::Surf as usize] = 1.0;
-    let value = Vec3::splat(1.0 / PHOTONS as f32);
-    let photon = |i| Sample { technique: Technique::Surf, merged: Some(i), albedos: 1.0, value, shares };
-    for iterations in [1.0, 32.0, 1e6] {
-        let pilot = PilotRender {
-            samples: (0..looks).flat_map(|_| (0..PHOTONS).map(photon)).collect(),
-            ends: (1..=looks).map(|look| look * PHOTONS).collect(),
-            iterations,
-            ..pilot()
-        };
-        let mut counts = counts([(Technique::Surf, 1.0 / PERIOD)], 1.0);
-        counts.active[Technique::Surf as usize] = 1.0 / PERIOD;
-        let found: f64 = Variance::of(pilot).with(&Counts { light_paths: PLANNED, ..counts }).iter().sum();
-        // Of n iterations of a half a pixel has ⌊n/8⌋ or ⌈n/8⌉ turns, on average over n.
-        let turns = iterations / 2.0 / PERIOD;
-        let uneven = (0..8).map(|part| f64::from(part) / 8.0).map(|r| r * (1.0 - r)).sum::<f64>() / 8.0;
-        let of_turns = (uneven / (turns * turns) * iterations / 2.0).min(PERIOD - 1.0);
-        let of_photons = PERIOD / f64::from(PHOTONS) - 1.0 / PLANNED;
-        let expected = of_turns.max(of_photons) / (1.0 + DARKNESS);
-        assert!((found / expected - 1.0).abs() < 0.02, "{iterations}: {found}, expected {expected}");
-    }
-}
-
 /// A vertex that always finds 1, and past an albedo of 0.3 another that finds as much.
 #[test]
 fn variances_know_where_walks_end() {
