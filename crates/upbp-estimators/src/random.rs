@@ -290,7 +290,7 @@ fn sobol(point: u32) -> u32 {
     x ^ ((x >> 1) & 0x5555_5555)
 }
 
-/// The finaliser of SplitMix64: numbers that are next to each other have nothing in common behind it.
+/// The finaliser of `SplitMix64`: numbers that are next to each other have nothing in common behind it.
 #[inline]
 pub(crate) fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,7 +1,7 @@
 //! Kernel radii that are a function of place: what the plan gives to a picture of near and far things.
 
 use upbp_core::glam::Vec3;
-use upbp_core::{FrozenPlan, Plan, Radii, Radius, RadiusField, Settings, State, StateError};
+use upbp_core::{FrozenPlan, Identity, Plan, Radii, Radius, RadiusField, Settings, State, StateError};
 use upbp_scene::ReadyScene;
 use upbp_testing::renderer;
 
@@ -90,13 +90,12 @@ fn a_field_is_part_of_plans_and_states() {
     let state = State::read(bytes.as_slice()).expect("what was written");
     assert_eq!(state.identity().plan, frozen.plan);
 
-    let changes: [(&str, fn(&mut Plan)); 2] = [
-        ("radii.field", |plan| plan.radii.field = RadiusField::Uniform),
-        ("lanes", |plan| plan.lanes = Some([0.5, 0.25, 0.25])),
-    ];
-    for (name, change) in changes {
-        let mut other = state.identity().clone();
-        change(&mut other.plan);
+    let plan = state.identity().plan;
+    let mut uniform = plan;
+    uniform.radii.field = RadiusField::Uniform;
+    let in_lanes = Plan { lanes: Some([0.5, 0.25, 0.25]), ..plan };
+    for (name, plan) in [("radii.field", uniform), ("lanes", in_lanes)] {
+        let other = Identity { plan, ..state.identity().clone() };
         let different = other.check_same(state.identity());
         assert!(
             matches!(&different, Err(StateError::Different { differences }) if differences[0].contains(name))
