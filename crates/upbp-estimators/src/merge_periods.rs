@@ -46,7 +46,7 @@ impl MergePeriods {
 
 /// The rank of a pixel, below `period`.
 ///
-/// Along a Z-shaped curve each run of as many pixels has every rank once, in an order of its own. So any part
+/// Along a Z-order curve each run of as many pixels has every rank once, in an order of its own. So any part
 /// of the picture has its share of each, and pixels of a rank, which query the same photons, are no grid that
 /// one sees.
 pub(crate) fn rank([x, y]: [u32; 2], period: u32) -> u32 {
@@ -173,7 +173,7 @@ mod tests {
         }
     }
 
-    /// What there is of an iteration that had to stop early.
+    /// An iteration that had to stop early has a coarse grid of pixels.
     #[test]
     fn coarse_grids_have_pixels_of_each_rank() {
         for (period, spacing) in [2_u32, 3, 8, 13, 16].into_iter().flat_map(|p| [2, 4, 8, 16].map(|s| (p, s)))

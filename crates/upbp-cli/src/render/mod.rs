@@ -77,7 +77,7 @@ impl Job {
         let scene = load(options).map_err(Failure::input)?;
         let images = options.images();
         let files =
-            scene.files().iter().map(|file| ("a mesh or an image or a table of the scene", file.as_path()));
+            scene.files().iter().map(|file| ("a mesh, an image or a table of the scene", file.as_path()));
         let inputs: Vec<_> = options.inputs().chain(files).collect();
         let outputs = options.outputs(&images);
         check_outputs(&outputs, &inputs).map_err(Failure::input)?;

@@ -136,10 +136,10 @@ fn an_output_that_would_destroy_a_file_is_refused() {
         (&["--save-plan", "scene.ron"], &["the plan to save", "the scene", "scene.ron"]),
         (&["--report", "hard"], &["the report", "the scene", "hard", "scene.ron"]),
         (&["--state", "hard"], &["the state", "the scene", "hard", "scene.ron"]),
-        (&["--report", "mesh"], &["the report", "a mesh or an image", "mesh", "floor.obj"]),
+        (&["--report", "mesh"], &["the report", "a mesh, an image", "mesh", "floor.obj"]),
         (&["--state", "sub/../mesh"], &["the state", "sub/../mesh", "floor.obj"]),
-        (&["-o", "sky.exr"], &["the image", "a mesh or an image", "sky.exr", "sky.png"]),
-        (&["-o", "sky.png"], &["the image", "a mesh or an image", "sky.png"]),
+        (&["-o", "sky.exr"], &["the image", "a mesh, an image", "sky.exr", "sky.png"]),
+        (&["-o", "sky.png"], &["the image", "a mesh, an image", "sky.png"]),
         (&["-o", "./ref.exr", "--reference", "ref.exr"], &["the image", "the reference", "./ref.exr"]),
         (
             &["--save-plan", "settings.ron", "--settings", "settings.ron"],

@@ -34,8 +34,7 @@ pub struct Settings {
     pub deterministic: bool,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Light sub-paths per iteration. A count is kept within the memory budget, whatever
-    /// techniques are chosen.
+    /// Light sub-paths per iteration. A count is kept, within the memory budget, whatever is chosen.
     pub light_paths: LightPaths,
     /// Light sub-paths that leave photon beams; `None` for as many as small runs find useful, or, if
     /// techniques are chosen, a quarter of that or four times as many where it pays.

@@ -18,10 +18,10 @@ use upbp_estimators::{Technique, TechniqueSet};
 
 use super::full_plan::BEAMS;
 use super::pilot_render::recorder::{ByTechnique, Sample, TECHNIQUES};
-use super::pilot_render::{PASSES, PilotRender, Shared};
+use super::pilot_render::{PilotRender, Shared};
 use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
-use sample_pairs::{Excess, Look, Looks, View};
+use sample_pairs::{Excess, Looks, View};
 
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
@@ -194,19 +194,20 @@ impl Variance {
 
     /// Moments of the samples of a cell.
     fn of_cell(&self, cell: usize, view: &mut View<'_>, doubt: &mut Doubt) -> Moments {
-        let looks: [Look; PASSES as usize] =
-            std::array::from_fn(|pass| view.look(cell * self.pilot.passes + pass));
-        let part = 1.0 / f64::from(PASSES);
+        let passes = self.pilot.passes as f64;
         let mut moments = Moments::default();
-        for look in &looks {
-            moments.single += part * look.single;
-            moments.light += part * look.light;
-            moments.pairs += part * look.products;
-            doubt.add(group(cell), part / self.pilot.cells as f64, &look.excess);
+        let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
+        for pass in 0..self.pilot.passes {
+            let look = view.look(cell * self.pilot.passes + pass);
+            moments.single += look.single / passes;
+            moments.light += look.light / passes;
+            moments.pairs += look.products / passes;
+            doubt.add(group(cell), 1.0 / (passes * self.pilot.cells as f64), &look.excess);
+            sum += look.sum;
+            squares += look.sum.length_squared();
         }
         // Products of different passes have no part of their own variance.
-        let [one, other] = &looks;
-        moments.mean_square = one.sum.dot(other.sum);
+        moments.mean_square = (sum.length_squared() - squares) / (passes * (passes - 1.0));
         moments
     }
 }

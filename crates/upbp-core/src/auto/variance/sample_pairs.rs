@@ -94,9 +94,9 @@ pub(super) struct View<'a> {
     weighted: [f32; TECHNIQUES],
     /// The factor of emission hits, next events and connections.
     camera_factor: f32,
-    /// Samples of each technique that the pilot render's plan has, mean over iterations, over those of the
-    /// first.
-    usual: [f32; TECHNIQUES],
+    /// Photons of each technique in a query of the pilot render's plan, mean over iterations, relative to the
+    /// first one.
+    mean_photons: [f32; TECHNIQUES],
     /// Pairs of samples of one camera sub-path that count beside those of independent samples: it makes the
     /// queries for both or for none.
     common: [f32; TECHNIQUES],
@@ -121,7 +121,7 @@ impl<'a> View<'a> {
                 (factor * counts.relative[technique as usize]) as f32
             }),
             camera_factor: counts.camera_factor as f32,
-            usual: Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32),
+            mean_photons: Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32),
             common: counts.active.map(|p| (1.0 / p - 1.0) as f32),
             more: [0, 1].map(|i| (pilot.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
             periodic: counts.active.iter().any(|p| *p < 1.0),
@@ -204,11 +204,11 @@ impl<'a> View<'a> {
         // Not one after the other: the search has nothing else to wait for.
         let (camera, light) = ((a + b) + c, (((e + f) + (g + h)) + i) + d);
         let weighted = self.camera_factor * camera;
-        let usual: f32 = (0..TECHNIQUES).map(|i| shares[i] * self.usual[i]).sum();
+        let of_pilot: f32 = (0..TECHNIQUES).map(|i| shares[i] * self.mean_photons[i]).sum();
         Share {
             light,
             all: self.camera_factor * weighted + light,
-            rarity: usual / (camera + light),
+            rarity: of_pilot / (camera + light),
             inverse: 1.0 / (weighted + light),
         }
     }
@@ -220,7 +220,7 @@ pub(super) struct Share {
     light: f32,
     /// Of all, each with the square of its factor in the weights.
     all: f32,
-    /// How much more rarely than with the pilot render's plan the path is found.
+    /// Times as rarely that the path is found as with the pilot render's plan.
     rarity: f32,
     /// One over the sum of all with their factors.
     inverse: f32,
