@@ -69,6 +69,12 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
         black_box((is_surface, vertex.mis.distance_factor, vertex.path));
     }
 
+    /// Numbers of photons on surfaces and in media that queries find.
+    #[must_use]
+    pub fn photons(&self) -> [usize; 2] {
+        [self.surface.len(), self.medium.len()]
+    }
+
     /// Bytes that the map occupies.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {

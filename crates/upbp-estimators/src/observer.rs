@@ -1,4 +1,4 @@
-//! A view into the walks: every vertex, every accepted sample with its weight, and what the time goes to.
+//! A view into the walks: every vertex, every accepted sample with its weight, and the calls of techniques.
 
 use glam::Vec3;
 use upbp_media::Spectrum;
@@ -120,10 +120,10 @@ pub trait Observer<B> {
         let _ = vertex;
     }
 
-    /// The walk turns to a technique: to one next event, connection or photon query. `None`:
-    /// it goes on.
-    fn enter_technique(&mut self, technique: Option<Technique>) {
-        let _ = technique;
+    /// The walk has called a technique: tried one next event, connection or splat, or made one photon query.
+    /// `tests` is the number of nodes, leaves and blocks of a tree over photons that a query looked at.
+    fn call(&mut self, technique: Technique, tests: u32) {
+        let _ = (technique, tests);
     }
 
     /// A sample was accepted. Samples of light tracing come with the light sub-paths.

@@ -66,8 +66,10 @@ impl<P: Copy + Send + Sync> PointTree<P> {
 
     /// Visits every point nearer than `radius` to `centre`, in scene units; `visit` gets the payload and the
     /// squared distance.
-    pub fn in_ball(&self, centre: Vec3, radius: f32, visit: impl FnMut(P, f32)) {
-        self.in_ball_ahead(centre, radius, |_| {}, visit);
+    ///
+    /// Returns the number of nodes, leaves and blocks of the tree that it looked at, as all queries do.
+    pub fn in_ball(&self, centre: Vec3, radius: f32, visit: impl FnMut(P, f32)) -> u32 {
+        self.in_ball_ahead(centre, radius, |_| {}, visit)
     }
 
     /// [`in_ball`](Self::in_ball) that says ahead what it will visit: `ahead` gets the payloads of a batch of
@@ -75,19 +77,31 @@ impl<P: Copy + Send + Sync> PointTree<P> {
     ///
     /// Where payloads are indices, `ahead` may [read](std::hint::black_box) what they refer to: reads that
     /// miss the cache then wait together.
-    pub fn in_ball_ahead(&self, centre: Vec3, radius: f32, ahead: impl Fn(P), visit: impl FnMut(P, f32)) {
-        if radius > 0.0 {
-            let ball = Ball::exact(centre, radius);
-            self.tree.search(ball, InBall { centre, radius2: radius * radius, ahead, visit });
+    pub fn in_ball_ahead(
+        &self,
+        centre: Vec3,
+        radius: f32,
+        ahead: impl Fn(P),
+        visit: impl FnMut(P, f32),
+    ) -> u32 {
+        if !(radius > 0.0) {
+            return 0;
         }
+        let ball = Ball::exact(centre, radius);
+        self.tree.search(ball, InBall { centre, radius2: radius * radius, ahead, visit })
     }
 
     /// Visits every point nearer to the ray than `radius`, at the foot of the perpendicular.
     ///
     /// `visit` gets the payload, the distance along the ray to the foot of the perpendicular, in `[t_min,
     /// t_max)`, and the squared distance between foot and point, in scene units.
-    pub fn around_ray(&self, ray: &Ray, radius: impl Into<SearchRadius>, visit: impl FnMut(P, f32, f32)) {
-        self.around_ray_ahead(ray, radius, |_| {}, visit);
+    pub fn around_ray(
+        &self,
+        ray: &Ray,
+        radius: impl Into<SearchRadius>,
+        visit: impl FnMut(P, f32, f32),
+    ) -> u32 {
+        self.around_ray_ahead(ray, radius, |_| {}, visit)
     }
 
     /// [`around_ray`](Self::around_ray) that says ahead what it will visit, as
@@ -98,18 +112,25 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         radius: impl Into<SearchRadius>,
         ahead: impl Fn(P),
         visit: impl FnMut(P, f32, f32),
-    ) {
+    ) -> u32 {
         match radius.into() {
             SearchRadius::Constant(radius) => self.within(ray, radius, ahead, visit),
             SearchRadius::Growing(radius) => self.within(ray, GrowingAlong::new(&radius, ray), ahead, visit),
         }
     }
 
-    fn within(&self, ray: &Ray, radius: impl RadiusAlong, ahead: impl Fn(P), visit: impl FnMut(P, f32, f32)) {
-        if radius.largest() > 0.0 {
-            let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin));
-            self.tree.search(region, AroundRay { ray: *ray, radius, ahead, visit });
+    fn within(
+        &self,
+        ray: &Ray,
+        radius: impl RadiusAlong,
+        ahead: impl Fn(P),
+        visit: impl FnMut(P, f32, f32),
+    ) -> u32 {
+        if !(radius.largest() > 0.0) {
+            return 0;
         }
+        let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin));
+        self.tree.search(region, AroundRay { ray: *ray, radius, ahead, visit })
     }
 }
 

@@ -35,11 +35,14 @@ pub(super) trait Query<B> {
 
 impl<L: Boxes, B> PackedTree<L, B> {
     /// Reports the wanted items of all blocks whose boxes overlap `region`, in the order of the blocks.
+    /// Returns the number of nodes, leaves and blocks that it looked at.
     #[inline]
-    pub(super) fn search(&self, region: impl Region, query: impl Query<B>) {
+    pub(super) fn search(&self, region: impl Region, query: impl Query<B>) -> u32 {
+        let mut tests = 0;
         if !self.nodes.is_empty() {
-            run(Traversal { tree: self, region, query });
+            run(Traversal { tree: self, region, query, tests: &mut tests });
         }
+        tests
     }
 }
 
@@ -47,6 +50,7 @@ struct Traversal<'a, L, B, R, Q> {
     tree: &'a PackedTree<L, B>,
     region: R,
     query: Q,
+    tests: &'a mut u32,
 }
 
 impl<L: Boxes, B, R: Region, Q: Query<B>> Task for Traversal<'_, L, B, R, Q> {
@@ -58,6 +62,7 @@ impl<L: Boxes, B, R: Region, Q: Query<B>> Task for Traversal<'_, L, B, R, Q> {
         let mut leaves = List::default();
         loop {
             let node = &self.tree.nodes[index];
+            *self.tests += 1;
             let met = self.region.overlaps(wide, &node.boxes) & u32::from(node.existing);
             if node.over_leaves {
                 leaves.extend(node.first, met);
@@ -85,7 +90,9 @@ impl<L: Boxes, B, R: Region, Q: Query<B>> Traversal<'_, L, B, R, Q> {
     #[inline(always)]
     fn leaves(&mut self, wide: impl Wide, leaves: &mut List) {
         let mut blocks = List::default();
-        for &leaf in leaves.take() {
+        let leaves = leaves.take();
+        *self.tests += leaves.len() as u32;
+        for &leaf in leaves {
             let met = self.region.overlaps(wide, &self.tree.leaves[leaf as usize]);
             blocks.extend(leaf * WIDTH as u32, met);
             if blocks.is_full() {
@@ -100,6 +107,7 @@ impl<L: Boxes, B, R: Region, Q: Query<B>> Traversal<'_, L, B, R, Q> {
     fn blocks(&mut self, wide: impl Wide, blocks: &mut List) {
         let (mut wanted, mut found) = ([0; WAITING], [Q::Found::default(); WAITING]);
         let (tree, blocks) = (self.tree, blocks.take());
+        *self.tests += blocks.len() as u32;
         for ((wanted, found), &block) in wanted.iter_mut().zip(&mut found).zip(blocks) {
             (*wanted, *found) = self.query.test(wide, &tree.blocks[block as usize]);
         }

@@ -111,35 +111,39 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
     ///
     /// If the ray and a segment are parallel within rounding, a hit at the very end of the ray's range may be
     /// missed.
+    ///
+    /// Returns the number of nodes, leaves and blocks of the tree that it looked at, as all queries do.
     pub fn around_ray(
         &self,
         ray: &Ray,
         radius: impl Into<SearchRadius>,
         visit: impl FnMut(P, ClosestApproach),
-    ) {
+    ) -> u32 {
         match radius.into() {
             SearchRadius::Constant(radius) => self.within(ray, radius, visit),
             SearchRadius::Growing(radius) => self.within(ray, GrowingAlong::new(&radius, ray), visit),
         }
     }
 
-    fn within(&self, ray: &Ray, radius: impl RadiusAlong, visit: impl FnMut(P, ClosestApproach)) {
-        if radius.largest() > 0.0 {
-            let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin) + self.max_distance);
-            self.tree.search(region, AroundRay { payloads: &self.payloads, ray: *ray, radius, visit });
+    fn within(&self, ray: &Ray, radius: impl RadiusAlong, visit: impl FnMut(P, ClosestApproach)) -> u32 {
+        if !(radius.largest() > 0.0) {
+            return 0;
         }
+        let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin) + self.max_distance);
+        self.tree.search(region, AroundRay { payloads: &self.payloads, ray: *ray, radius, visit })
     }
 
     /// Visits every segment nearer than `radius` to `point`.
     ///
     /// `visit` gets the payload, the distance along the segment from its origin to the foot of the
     /// perpendicular, in `[start, end)`, and the squared distance between foot and point, in scene units.
-    pub fn around_point(&self, point: Vec3, radius: f32, visit: impl FnMut(P, f32, f32)) {
-        if radius > 0.0 {
-            let ball = Ball::widened(point, radius, self.tree.extent_from(point) + self.max_distance);
-            let radius2 = radius * radius;
-            self.tree.search(ball, AroundPoint { payloads: &self.payloads, point, radius2, visit });
+    pub fn around_point(&self, point: Vec3, radius: f32, visit: impl FnMut(P, f32, f32)) -> u32 {
+        if !(radius > 0.0) {
+            return 0;
         }
+        let ball = Ball::widened(point, radius, self.tree.extent_from(point) + self.max_distance);
+        let radius2 = radius * radius;
+        self.tree.search(ball, AroundPoint { payloads: &self.payloads, point, radius2, visit })
     }
 }
 

@@ -159,6 +159,25 @@ fn points_that_are_not_finite_are_dropped_and_counted() {
     assert_eq!(ball(&tree, Vec3::ZERO, f32::INFINITY).len(), 97);
 }
 
+/// A node, a leaf for each 64 points, eight blocks for each leaf.
+#[test]
+fn queries_tell_what_they_look_at() {
+    for (count, all) in [(0, 0), (8, 1 + 1 + 8), (64, 1 + 1 + 8), (100, 1 + 2 + 16)] {
+        let points = positions(
+            crate::support::Spread::Uniform,
+            count,
+            1.0,
+            Vec3::ZERO,
+            &mut Random::new(count as u64),
+        );
+        let tree = tree(&points);
+        assert_eq!(tree.in_ball(Vec3::ZERO, 1e6, |_, _| {}), all, "{count}");
+        // The boxes of the root are looked at to find that it is not there.
+        assert_eq!(tree.in_ball(Vec3::splat(1e6), 1.0, |_, _| {}), all.min(1), "{count}");
+        assert_eq!(tree.in_ball(Vec3::ZERO, 0.0, |_, _| {}), 0, "{count}");
+    }
+}
+
 #[test]
 fn the_number_of_threads_does_not_show() {
     let points = positions(crate::support::Spread::Clustered, 100_000, 1.0, Vec3::ZERO, &mut Random::new(4));

@@ -12,33 +12,30 @@ use super::pilot_render::recorder::ByTechnique;
 use crate::deadline::Stop;
 use crate::plan::Plan;
 
+/// Nanoseconds of a camera sub-path, besides its edges and with the film, and of a light sub-path.
+const NS_PER_CAMERA_PATH: f64 = 345.0;
+const NS_PER_LIGHT_PATH: f64 = 30.0;
 /// Nanoseconds of an edge of a camera sub-path or a light sub-path.
-const NS_PER_EDGE: f64 = 300.0;
+const NS_PER_EDGE: f64 = 245.0;
 /// Part of a camera edge's time if no query beam has to know what is beyond the end of the edge.
-const SHORT: f64 = 0.85;
-/// Nanoseconds of a call of each technique; of a query, among as many photons or beams as
-/// [`USUAL_PHOTONS`] and [`USUAL_BEAMS`] say.
-const NS_PER_CALL: ByTechnique<f64> = [0.0, 220.0, 330.0, 150.0, 110.0, 110.0, 260.0, 200.0, 450.0];
-/// Light vertices among which a query takes the time of the table.
-const USUAL_PHOTONS: f64 = 65_536.0;
-/// The same of beams.
-const USUAL_BEAMS: f64 = 4096.0;
-/// Nanoseconds of a sample that a call of each technique finds.
-const NS_PER_SAMPLE: ByTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 70.0, 90.0, 150.0, 200.0, 215.0];
+const SHORT: f64 = 0.92;
+/// Nanoseconds of a call of each technique; of a query, without what it looks at.
+const NS_PER_CALL: ByTechnique<f64> = [0.0, 370.0, 270.0, 270.0, 45.0, 105.0, 150.0, 110.0, 185.0];
+/// Nanoseconds of a node, a leaf or a block that a query of each technique looks at.
+const NS_PER_TEST: ByTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 9.0, 9.0, 12.0, 9.0, 13.0];
+/// Nanoseconds of a sample that a query of each technique finds.
+const NS_PER_SAMPLE: ByTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 110.0, 125.0, 130.0, 130.0, 140.0];
 /// Nanoseconds of storing a light vertex.
-const NS_PER_VERTEX: f64 = 25.0;
-/// Nanoseconds of building a light vertex into a tree.
-const NS_PER_TREE_POINT: f64 = 90.0;
+const NS_PER_VERTEX: f64 = 20.0;
+/// Nanoseconds of building a photon point into a tree.
+const NS_PER_TREE_POINT: f64 = 65.0;
 /// Nanoseconds of storing a photon beam and building it into a tree.
-const NS_PER_TREE_BEAM: f64 = 600.0;
-/// Nanoseconds of adding a pixel to the film.
-const NS_PER_PIXEL: f64 = 40.0;
+const NS_PER_TREE_BEAM: f64 = 380.0;
 /// Time of a pilot render and of the search in its samples, over that of as much of an iteration.
 const RECORDING: f64 = 4.0;
 
-/// Techniques that query photon points.
-const PHOTON_POINTS: TechniqueSet =
-    TechniqueSet::EMPTY.with(Technique::Surf).with(Technique::Pp3d).with(Technique::Pb2d);
+/// Techniques that query photon points in media.
+const MEDIUM_POINTS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Pp3d).with(Technique::Pb2d);
 /// Techniques whose query is a camera edge, to its very end.
 const ALONG_QUERY_BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Pb2d).with(Technique::Bb1d);
 
@@ -55,8 +52,9 @@ impl<'a> Cost<'a> {
     pub(super) fn of_pilot(self) -> f64 {
         let pilot = self.0;
         // All passes of each cell's pixel, and its partner.
-        let camera = (pilot.cells * (pilot.passes + 1)) as f64 * self.camera_path(&pilot.plan);
-        let light = pilot.passes as f64 * pilot.thinning[0] * self.light_paths(&pilot.plan);
+        let plan = pilot.plan_as_run();
+        let camera = (pilot.cells * (pilot.passes + 1)) as f64 * self.camera_path(&plan);
+        let light = pilot.passes as f64 * self.light_paths(&plan);
         RECORDING * (camera + light)
     }
 
@@ -86,12 +84,15 @@ impl<'a> Cost<'a> {
         let light_tracing = TechniqueSet::EMPTY.with(Technique::LightTracing);
         let roulette = self.0.roulette(plan);
         let beyond = SHORT + (1.0 - SHORT) * any(ALONG_QUERY_BEAMS);
-        let mut camera = NS_PER_PIXEL + work.camera_edges[roulette] * NS_PER_EDGE * beyond;
+        let mut camera = NS_PER_CAMERA_PATH + work.camera_edges[roulette] * NS_PER_EDGE * beyond;
         for technique in plan.techniques.without(light_tracing).iter() {
             let i = technique as usize;
-            let calls = work.calls[i][roulette] * NS_PER_CALL[i] * self.growth(technique, plan);
+            let tests = self.growth(technique, plan) * work.tests[i][roulette];
             let samples = self.0.relative_photons(technique, plan) * work.samples[i][roulette];
-            camera += plan.active_part(technique) * (calls + samples * NS_PER_SAMPLE[i]);
+            camera += plan.active_part(technique)
+                * (work.calls[i][roulette] * NS_PER_CALL[i]
+                    + tests * NS_PER_TEST[i]
+                    + samples * NS_PER_SAMPLE[i]);
         }
         camera
     }
@@ -99,34 +100,40 @@ impl<'a> Cost<'a> {
     /// Processor nanoseconds of all light sub-paths of an iteration, and of what is built of them.
     fn light_paths(self, plan: &Plan) -> f64 {
         let work = &self.0.work;
-        let mut light = work.light_edges * NS_PER_EDGE;
+        let mut light = NS_PER_LIGHT_PATH + work.light_edges * NS_PER_EDGE;
         if plan.techniques.has(Technique::LightTracing) {
             let i = Technique::LightTracing as usize;
             light += work.calls[i][self.0.roulette(plan)] * NS_PER_CALL[i];
         }
-        if plan.techniques.intersects(PHOTON_POINTS.with(Technique::Connect)) {
+        let trees = [TechniqueSet::EMPTY.with(Technique::Surf), MEDIUM_POINTS];
+        let queried = trees.map(|queries| plan.techniques.intersects(queries));
+        if plan.techniques.has(Technique::Connect) || queried.contains(&true) {
             light += work.vertices * NS_PER_VERTEX;
         }
-        if plan.techniques.intersects(PHOTON_POINTS) {
-            light += work.vertices * NS_PER_TREE_POINT;
+        for (points, queried) in work.points.into_iter().zip(queried) {
+            light += if queried { points * NS_PER_TREE_POINT } else { 0.0 };
         }
         let light_paths = if plan.uses_light_paths() { f64::from(plan.light_paths) } else { 0.0 };
         let beam_paths = if plan.techniques.intersects(BEAMS) { f64::from(plan.beam_paths) } else { 0.0 };
         light_paths * light + beam_paths * work.beams * NS_PER_TREE_BEAM
     }
 
-    /// Time of a call among the photons or beams of a plan over that of the table: by the depth of their
-    /// tree, and for points around a query beam by the number of boxes that a line through the tree meets,
-    /// most of which hold nothing that is near; in small trees these are about the same.
+    /// What a query looks at among the photons or beams of a plan, over that among those of the pilot render.
+    ///
+    /// Around a point it grows as the depth of the tree, around a query beam as the number of boxes that a
+    /// line meets: boxes around points get smaller the more there are, those around beams do not.
     fn growth(self, technique: Technique, plan: &Plan) -> f64 {
-        let paths = f64::from(plan.paths_of(technique));
-        let (photons, beams) = (paths * self.0.work.vertices, paths * self.0.work.beams);
-        let levels = |count: f64, usual: f64| (2.0 + count).ln() / (2.0 + usual).ln();
+        let pilot = self.0;
+        let paths = [&pilot.plan_as_run(), plan].map(|plan| f64::from(plan.paths_of(technique)));
+        let [own, other] = paths.map(|paths| paths.max(1.0));
+        let levels = |per_path: f64| (2.0 + other * per_path).ln() / (2.0 + own * per_path).ln();
         match technique {
             Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 1.0,
-            Technique::Surf | Technique::Pp3d => levels(photons, USUAL_PHOTONS),
-            Technique::Pb2d => (photons / USUAL_PHOTONS).cbrt().max(1.0),
-            Technique::Bp2d | Technique::Bb1d => levels(beams, USUAL_BEAMS),
+            Technique::Surf => levels(pilot.work.points[0]),
+            Technique::Pp3d => levels(pilot.work.points[1]),
+            Technique::Bp2d => levels(pilot.work.beams),
+            Technique::Pb2d => (other / own).cbrt(),
+            Technique::Bb1d => other / own,
         }
     }
 }

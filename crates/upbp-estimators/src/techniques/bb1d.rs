@@ -21,9 +21,8 @@ pub(crate) fn bb1d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let plan = context.plan;
     let kernel = &plan.kernels.bb1d;
     for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Bb1d) {
-        out.observer.enter_technique(Some(Technique::Bb1d));
         let radius = plan.radius_field.search_radius(kernel.radius());
-        map.beam_tree.around_ray(&beam, radius, |index, approach| {
+        let tests = map.beam_tree.around_ray(&beam, radius, |index, approach| {
             let t = approach.t_ray;
             let scale = plan.radius_field.at(beam.at(t));
             let kernel = kernel.scaled(scale).value(approach.distance * approach.distance);
@@ -38,6 +37,6 @@ pub(crate) fn bb1d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
                 merge(context, Technique::Bb1d, &light, &vertex, kernel, out);
             }
         });
-        out.observer.enter_technique(None);
+        out.observer.call(Technique::Bb1d, tests);
     }
 }

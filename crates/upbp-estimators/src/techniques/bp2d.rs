@@ -23,8 +23,7 @@ pub(crate) fn bp2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let kernel = plan.kernels.bp2d.scaled(vertex.scale);
-    out.observer.enter_technique(Some(Technique::Bp2d));
-    map.beam_tree.around_point(vertex.position, kernel.radius(), |index, t, distance2| {
+    let tests = map.beam_tree.around_point(vertex.position, kernel.radius(), |index, t, distance2| {
         let beam = &map.beams[index as usize];
         if beam.medium == medium
             && plan.lengths.contain(vertex.depth + beam.depth)
@@ -33,5 +32,5 @@ pub(crate) fn bp2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             merge(context, Technique::Bp2d, &light, vertex, kernel.value(distance2), out);
         }
     });
-    out.observer.enter_technique(None);
+    out.observer.call(Technique::Bp2d, tests);
 }

@@ -33,11 +33,10 @@ pub(crate) fn connections<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     for _ in 0..stream.round(plan.connections) {
         let light = &map.vertices[stream.index(map.vertices.len())];
         if plan.lengths.contain(vertex.depth + light.depth + 1) {
-            out.observer.enter_technique(Some(Technique::Connect));
             connect(context, vertex, sides, light, factor, crossings, out);
+            out.observer.call(Technique::Connect, 0);
         }
     }
-    out.observer.enter_technique(None);
 }
 
 fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(

@@ -25,10 +25,9 @@ pub(crate) fn next_events<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     for _ in 0..stream.round(plan.next_events) {
-        out.observer.enter_technique(Some(Technique::Nee));
         next_event(context, vertex, sides, stream, crossings, out);
+        out.observer.call(Technique::Nee, 0);
     }
-    out.observer.enter_technique(None);
 }
 
 fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(

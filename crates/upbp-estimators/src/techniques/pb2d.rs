@@ -21,10 +21,9 @@ pub(crate) fn pb2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let plan = context.plan;
     let kernel = &plan.kernels.pb2d;
     for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Pb2d) {
-        out.observer.enter_technique(Some(Technique::Pb2d));
         let radius = plan.radius_field.search_radius(kernel.radius());
         let ahead = |index| map.read_ahead(index);
-        map.medium.around_ray_ahead(&beam, radius, ahead, |index, t, distance2| {
+        let tests = map.medium.around_ray_ahead(&beam, radius, ahead, |index, t, distance2| {
             let scale = plan.radius_field.at(beam.at(t));
             let kernel = kernel.scaled(scale).value(distance2);
             let photon = &map.vertices[index as usize];
@@ -36,6 +35,6 @@ pub(crate) fn pb2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
                 merge(context, Technique::Pb2d, photon, &vertex, kernel, out);
             }
         });
-        out.observer.enter_technique(None);
+        out.observer.call(Technique::Pb2d, tests);
     }
 }

@@ -23,9 +23,8 @@ pub(crate) fn pp3d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let kernel = plan.kernels.pp3d.scaled(vertex.scale);
-    out.observer.enter_technique(Some(Technique::Pp3d));
     let ahead = |index| map.read_ahead(index);
-    map.medium.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
+    let tests = map.medium.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
         let photon = &map.vertices[index as usize];
         if matches!(photon.interaction, Interaction::Medium(other) if other == medium)
             && plan.lengths.contain(vertex.depth + photon.depth)
@@ -33,5 +32,5 @@ pub(crate) fn pp3d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             merge(context, Technique::Pp3d, photon, vertex, kernel.value(distance2), out);
         }
     });
-    out.observer.enter_technique(None);
+    out.observer.call(Technique::Pp3d, tests);
 }

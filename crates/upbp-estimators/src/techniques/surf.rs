@@ -28,9 +28,8 @@ pub(crate) fn surf<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let plan = context.plan;
     let kernel = plan.kernels.surf.scaled(vertex.scale);
-    out.observer.enter_technique(Some(Technique::Surf));
     let ahead = |index| map.read_ahead(index);
-    map.surface.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
+    let tests = map.surface.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
         let photon = &map.vertices[index as usize];
         if plan.lengths.contain(vertex.depth + photon.depth)
             && lies_on(surface, vertex, photon, kernel.radius())
@@ -38,7 +37,7 @@ pub(crate) fn surf<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             merge(context, Technique::Surf, photon, vertex, kernel.value(distance2), out);
         }
     });
-    out.observer.enter_technique(None);
+    out.observer.call(Technique::Surf, tests);
 }
 
 /// Keeps light from leaking around edges and through thin walls. What it cuts off the kernel vanishes with

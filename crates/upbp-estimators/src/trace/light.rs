@@ -112,9 +112,8 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         };
         if connectible {
             if plan.mis.light_tracing > 0.0 && plan.lengths.contain(depth + 1) {
-                observer.enter_technique(Some(Technique::LightTracing));
                 light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
-                observer.enter_technique(None);
+                observer.call(Technique::LightTracing, 0);
             }
             if plan.stores_vertices() {
                 out.vertices.push(vertex);

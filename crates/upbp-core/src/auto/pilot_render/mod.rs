@@ -133,12 +133,17 @@ pub(super) struct Work {
     pub(super) camera_edges: ByRoulette,
     /// Calls of each technique per camera sub-path; of light tracing per light sub-path.
     pub(super) calls: ByTechnique<ByRoulette>,
+    /// Nodes, leaves and blocks of trees that the queries of each technique looked at, per camera sub-path,
+    /// among the photons of the pilot render.
+    pub(super) tests: ByTechnique<ByRoulette>,
     /// Samples of each technique per camera sub-path; of merges for as many photons as the plan has.
     pub(super) samples: ByTechnique<ByRoulette>,
     /// Edges per light sub-path.
     pub(super) light_edges: f64,
     /// Light vertices per light sub-path.
     pub(super) vertices: f64,
+    /// Photon points on surfaces and in media per light sub-path, where they are queried.
+    pub(super) points: [f64; 2],
     /// Beams per light sub-path that leaves beams.
     pub(super) beams: f64,
 }
@@ -206,6 +211,16 @@ impl PilotRender {
         Some(pilot)
     }
 
+    /// The plan with as many light sub-paths as there were.
+    pub(super) fn plan_as_run(&self) -> Plan {
+        let traced = |planned: u32, part: f64| (part * f64::from(planned)).round() as u32;
+        Plan {
+            light_paths: traced(self.plan.light_paths, self.thinning[0]),
+            beam_paths: traced(self.plan.beam_paths, self.thinning[1]),
+            ..self.plan
+        }
+    }
+
     /// The number of the roulette of another plan.
     pub(super) fn roulette(&self, plan: &Plan) -> usize {
         roulette::number(plan.roulette, self.plan.roulette)
@@ -246,12 +261,19 @@ impl PilotRender {
     fn work(&self, passes: &[Pass], camera_paths: f64, [light_paths, beam_paths]: [f64; 2]) -> Work {
         let mut counters = Counters::default();
         let mut edges = ByRoulette::default();
-        let (mut calls, mut samples) = ([edges; TECHNIQUES], [edges; TECHNIQUES]);
+        let [mut calls, mut tests, mut samples] = [[edges; TECHNIQUES]; 3];
+        let mut points = [0.0; 2];
         for pass in passes {
             counters.add(&pass.counters);
+            for (sum, own) in points.iter_mut().zip(pass.points) {
+                *sum += own as f64;
+            }
             for recorder in pass.light.iter().chain(&pass.camera) {
                 add(&mut edges, &recorder.edges);
                 for (sum, own) in calls.iter_mut().zip(&recorder.calls) {
+                    add(sum, own);
+                }
+                for (sum, own) in tests.iter_mut().zip(&recorder.tests) {
                     add(sum, own);
                 }
                 for sample in &recorder.samples {
@@ -264,15 +286,18 @@ impl PilotRender {
             let i = technique as usize;
             let paths = if technique == Technique::LightTracing { light_paths } else { camera_paths };
             calls[i] = calls[i].map(|count| per(count, paths));
+            tests[i] = tests[i].map(|count| per(count, paths));
             let thinning = if technique.merges() { self.thinning(technique) } else { 1.0 };
             samples[i] = samples[i].map(|count| per(count, paths) / thinning);
         }
         Work {
             camera_edges: edges.map(|count| per(count, camera_paths)),
             calls,
+            tests,
             samples,
             light_edges: per(counters.light_edges as f64, light_paths),
             vertices: per(counters.light_vertices as f64, light_paths),
+            points: points.map(|count| per(count, light_paths)),
             beams: per(counters.photon_beams as f64, beam_paths),
         }
     }
@@ -340,6 +365,8 @@ struct Pass {
     /// Pairs of splats of one light sub-path, if there are partners.
     shared_splats: Vec<Shared>,
     counters: Counters,
+    /// Photon points on surfaces and in media, where they are queried.
+    points: [usize; 2],
 }
 
 impl Pass {
@@ -368,6 +395,7 @@ impl Pass {
             splats: Vec::new(),
             shared_splats: Vec::new(),
             counters: Counters::default(),
+            points: [0; 2],
         };
         let splats: usize = pieces.iter().map(|(recorder, _)| recorder.samples.len()).sum();
         let step = splats.div_ceil(ASKED_SPLATS).max(1);
@@ -390,6 +418,7 @@ impl Pass {
         } else {
             LightMap::empty()
         };
+        pass.points = map.photons();
         let kind = StreamKind::PilotCamera;
         let pieces = in_pieces(grid.cells(), halt, |cell, scratch, piece: &mut (Recorder, Counters)| {
             let (recorder, counters) = piece;

@@ -48,6 +48,8 @@ pub(crate) struct Recorder {
     pub(crate) edges: ByRoulette,
     /// Calls of each technique.
     pub(crate) calls: ByTechnique<ByRoulette>,
+    /// Nodes, leaves and blocks of trees over photons that the queries of each technique looked at.
+    pub(crate) tests: ByTechnique<ByRoulette>,
     /// Product of the albedos of the camera sub-path at hand.
     albedos: f32,
     /// Camera sub-paths that would be here, by the number of a roulette.
@@ -71,10 +73,10 @@ impl<B> Observer<B> for Recorder {
         self.edge();
     }
 
-    fn enter_technique(&mut self, technique: Option<Technique>) {
-        if let Some(technique) = technique {
-            add(&mut self.calls[technique as usize], &self.passed);
-        }
+    fn call(&mut self, technique: Technique, tests: u32) {
+        let i = technique as usize;
+        add(&mut self.calls[i], &self.passed);
+        add(&mut self.tests[i], &self.passed.map(|passed| passed * f64::from(tests)));
     }
 
     fn sample(&mut self, sample: &ObservedSample<B, mis::ByTechnique>) {

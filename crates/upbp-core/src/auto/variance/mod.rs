@@ -21,7 +21,7 @@ use super::pilot_render::recorder::{ByTechnique, Sample, TECHNIQUES};
 use super::pilot_render::{PilotRender, Shared};
 use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
-use sample_pairs::{Excess, Looks, View};
+use sample_pairs::{Excess, Looks, View, density_of_pilot, mean_photons};
 
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
@@ -182,12 +182,15 @@ impl Variance {
             groups[group(cell)].add(&self.of_cell(cell, &mut view, &mut doubt));
         }
         let mut variance = groups.map(|moments| moments.variance(counts.light_paths) / pilot.cells as f64);
+        let mean_photons = mean_photons(pilot);
         for (cell, splat) in &pilot.splats {
             let group = group(*cell as usize);
             let share = view.share(&splat.shares);
             let square = pilot.second_moment(splat) as f32;
             variance[group] += pilot.per_splat() * f64::from(share.single(square));
-            doubt.add(group, pilot.per_splat(), &share.excess(square));
+            if let Some(excess) = share.excess(square, density_of_pilot(&splat.shares, &mean_photons)) {
+                doubt.add(group, pilot.per_splat(), &excess);
+            }
         }
         [variance, doubt.charges()]
     }

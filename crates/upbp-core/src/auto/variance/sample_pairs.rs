@@ -29,6 +29,8 @@ struct Seen {
     value: Vec3,
     /// Square of the value, of as many samples as the plan has.
     square: f32,
+    /// Density of the path with the pilot render's plan, mean over iterations, relative to that of the first.
+    of_pilot: f32,
     shares: [f32; TECHNIQUES],
 }
 
@@ -36,6 +38,7 @@ impl Looks {
     /// Takes the samples of a pilot.
     pub(super) fn new(pilot: &PilotRender) -> Self {
         let mut looks = Self { seen: Vec::with_capacity(pilot.samples.len()), ends: Vec::new() };
+        let mean_photons = mean_photons(pilot);
         let of_one_path = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
         for look in 0..pilot.cells * pilot.passes {
             let start = looks.seen.len();
@@ -52,6 +55,7 @@ impl Looks {
                     }),
                     value: sample.value,
                     square: pilot.second_moment(sample) as f32,
+                    of_pilot: density_of_pilot(&sample.shares, &mean_photons),
                     shares: sample.shares,
                 }));
             }
@@ -94,9 +98,6 @@ pub(super) struct View<'a> {
     weighted: [f32; TECHNIQUES],
     /// The factor of emission hits, next events and connections.
     camera_factor: f32,
-    /// Photons of each technique in a query of the pilot render's plan, mean over iterations, relative to the
-    /// first one.
-    mean_photons: [f32; TECHNIQUES],
     /// Pairs of samples of one camera sub-path that count beside those of independent samples: it makes the
     /// queries for both or for none.
     common: [f32; TECHNIQUES],
@@ -121,7 +122,6 @@ impl<'a> View<'a> {
                 (factor * counts.relative[technique as usize]) as f32
             }),
             camera_factor: counts.camera_factor as f32,
-            mean_photons: Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32),
             common: counts.active.map(|p| (1.0 / p - 1.0) as f32),
             more: [0, 1].map(|i| (pilot.thinning[i] / counts.paths[i] - 1.0).min(1e6) as f32),
             periodic: counts.active.iter().any(|p| *p < 1.0),
@@ -152,7 +152,9 @@ impl<'a> View<'a> {
             let rarity = seen.rarity[self.roulette];
             result.single += f64::from(rarity * share.single(seen.square));
             result.light += f64::from(rarity * share.light(seen.square));
-            result.excess.add(&share.excess(rarity * seen.square));
+            if let Some(excess) = share.excess(rarity * seen.square, seen.of_pilot) {
+                result.excess.add(&excess);
+            }
             let weight = self.weighted[i] * share.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
@@ -204,11 +206,10 @@ impl<'a> View<'a> {
         // Not one after the other: the search has nothing else to wait for.
         let (camera, light) = ((a + b) + c, (((e + f) + (g + h)) + i) + d);
         let weighted = self.camera_factor * camera;
-        let of_pilot: f32 = (0..TECHNIQUES).map(|i| shares[i] * self.mean_photons[i]).sum();
         Share {
             light,
             all: self.camera_factor * weighted + light,
-            rarity: of_pilot / (camera + light),
+            density: camera + light,
             inverse: 1.0 / (weighted + light),
         }
     }
@@ -220,8 +221,8 @@ pub(super) struct Share {
     light: f32,
     /// Of all, each with the square of its factor in the weights.
     all: f32,
-    /// Times as rarely that the path is found as with the pilot render's plan.
-    rarity: f32,
+    /// Of all together.
+    density: f32,
     /// One over the sum of all with their factors.
     inverse: f32,
 }
@@ -239,11 +240,17 @@ impl Share {
         square * self.inverse * (self.light * self.inverse)
     }
 
-    /// The charge for such a sample beyond its part.
+    /// The charge for such a sample beyond its part, if there is one; `of_pilot` is the density of its path
+    /// with the pilot render's plan.
     #[inline]
-    pub(super) fn excess(&self, square: f32) -> Excess {
-        let charge = f64::from(self.single(square) * ((self.rarity / TRUSTED).max(1.0).sqrt() - 1.0));
-        Excess { charge, by_rarity: charge * f64::from(self.rarity) }
+    pub(super) fn excess(&self, square: f32, of_pilot: f32) -> Option<Excess> {
+        // Most samples are found often enough: no division for these.
+        if of_pilot <= TRUSTED * self.density {
+            return None;
+        }
+        let rarity = of_pilot / self.density;
+        let charge = f64::from(self.single(square) * ((rarity / TRUSTED).sqrt() - 1.0));
+        Some(Excess { charge, by_rarity: charge * f64::from(rarity) })
     }
 }
 
@@ -260,6 +267,17 @@ impl Excess {
         self.charge += more.charge;
         self.by_rarity += more.by_rarity;
     }
+}
+
+/// Photons of each technique in a query of the pilot render's plan, mean over iterations, relative to those
+/// of the first one.
+pub(super) fn mean_photons(pilot: &PilotRender) -> [f32; TECHNIQUES] {
+    Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32)
+}
+
+/// Density of a path with the pilot render's plan, mean over iterations, relative to that of the first one.
+pub(super) fn density_of_pilot(shares: &[f32; TECHNIQUES], mean_photons: &[f32; TECHNIQUES]) -> f32 {
+    shares.iter().zip(mean_photons).map(|(share, photons)| share * photons).sum()
 }
 
 /// Class of the light sub-paths that a technique uses: 1 for those with beams.
