@@ -69,9 +69,9 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
         black_box((is_surface, vertex.mis.distance_factor, vertex.path));
     }
 
-    /// Numbers of photons on surfaces and in media that queries find.
+    /// Numbers of photon points on surfaces and in media, each 0 where the plan does not query them.
     #[must_use]
-    pub fn photons(&self) -> [usize; 2] {
+    pub fn photon_points(&self) -> [usize; 2] {
         [self.surface.len(), self.medium.len()]
     }
 

@@ -35,6 +35,9 @@ impl<P: Copy> Block<P> {
 /// Points with a payload each, searched with any radius.
 ///
 /// The same points give the same tree and the same order of visits, whatever the number of threads.
+///
+/// A query returns the number of nodes, leaves and blocks of the tree that it looked at, which its time goes
+/// with: groups of eight boxes or points. It is 0 if the radius is not positive.
 #[derive(Clone, Debug)]
 pub struct PointTree<P> {
     tree: PackedTree<Rounded, Block<P>>,
@@ -66,8 +69,6 @@ impl<P: Copy + Send + Sync> PointTree<P> {
 
     /// Visits every point nearer than `radius` to `centre`, in scene units; `visit` gets the payload and the
     /// squared distance.
-    ///
-    /// Returns the number of nodes, leaves and blocks of the tree that it looked at, as all queries do.
     pub fn in_ball(&self, centre: Vec3, radius: f32, visit: impl FnMut(P, f32)) -> u32 {
         self.in_ball_ahead(centre, radius, |_| {}, visit)
     }

@@ -59,6 +59,9 @@ impl Block {
 ///
 /// Long segments are split into pieces inside; each hit is still reported once. The same segments give the
 /// same tree and the same order of visits, whatever the number of threads.
+///
+/// A query returns the number of nodes, leaves and blocks of the tree that it looked at, which its time goes
+/// with: groups of eight boxes or pieces of segments. It is 0 if the radius is not positive.
 #[derive(Clone, Debug)]
 pub struct SegmentTree<P> {
     pub(super) tree: PackedTree<Exact, Block>,
@@ -111,8 +114,6 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
     ///
     /// If the ray and a segment are parallel within rounding, a hit at the very end of the ray's range may be
     /// missed.
-    ///
-    /// Returns the number of nodes, leaves and blocks of the tree that it looked at, as all queries do.
     pub fn around_ray(
         &self,
         ray: &Ray,

@@ -2,10 +2,9 @@
 
 use std::cell::Cell;
 
-use super::boxes::Boxes;
 use super::closest_approach::Segment;
 use super::query::Query;
-use super::region::{Region, ThickRay};
+use super::region::ThickRay;
 use super::segment_tree::{Block, SegmentTree};
 use super::split::SplitParams;
 use crate::ray::Ray;
@@ -58,31 +57,15 @@ impl SplitParams {
     }
 }
 
-/// A ray without width that counts the boxes it is tested against.
-struct CountingRay<'a> {
-    ray: ThickRay<f32>,
-    effort: &'a Cell<u64>,
-}
-
-impl Region for CountingRay<'_> {
-    #[inline(always)]
-    fn overlaps<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32 {
-        self.effort.set(self.effort.get() + 1);
-        self.ray.overlaps(wide, boxes)
-    }
-}
-
 /// A query that finds nothing, but counts blocks.
-struct CountBlocks<'a> {
-    effort: &'a Cell<u64>,
-}
+struct CountBlocks<'a>(&'a Cell<u64>);
 
 impl Query<Block> for CountBlocks<'_> {
     type Found = ();
 
     #[inline(always)]
     fn test<W: Wide>(&self, _: W, _: &Block) -> (u32, ()) {
-        self.effort.set(self.effort.get() + 2);
+        self.0.set(self.0.get() + 1);
         (0, ())
     }
 
@@ -93,11 +76,8 @@ impl Query<Block> for CountBlocks<'_> {
 impl<P> SegmentTree<P> {
     /// The number of nodes and leaves that rays without width have to look at, and twice that of blocks.
     fn effort(&self, rays: &[Ray]) -> u64 {
-        let effort = Cell::new(0);
-        for ray in rays {
-            let region = CountingRay { ray: ThickRay::new(ray, 0.0_f32, 0.0), effort: &effort };
-            self.tree.search(region, CountBlocks { effort: &effort });
-        }
-        effort.get()
+        let blocks = Cell::new(0);
+        let search = |ray| self.tree.search(ThickRay::new(ray, 0.0_f32, 0.0), CountBlocks(&blocks));
+        rays.iter().map(|ray| u64::from(search(ray))).sum::<u64>() + blocks.get()
     }
 }

@@ -159,7 +159,8 @@ fn points_that_are_not_finite_are_dropped_and_counted() {
     assert_eq!(ball(&tree, Vec3::ZERO, f32::INFINITY).len(), 97);
 }
 
-/// A node, a leaf for each 64 points, eight blocks for each leaf.
+/// A node, a leaf for each 64 points, eight blocks for each leaf: so large a ball meets the boxes of blocks
+/// without points, too.
 #[test]
 fn queries_tell_what_they_look_at() {
     for (count, all) in [(0, 0), (8, 1 + 1 + 8), (64, 1 + 1 + 8), (100, 1 + 2 + 16)] {
@@ -172,9 +173,14 @@ fn queries_tell_what_they_look_at() {
         );
         let tree = tree(&points);
         assert_eq!(tree.in_ball(Vec3::ZERO, 1e6, |_, _| {}), all, "{count}");
-        // The boxes of the root are looked at to find that it is not there.
+        // The boxes of the root are looked at to find that the ball, or the ray, meets none.
+        let ray = Ray::new(Vec3::splat(1e3), Vec3::X);
         assert_eq!(tree.in_ball(Vec3::splat(1e6), 1.0, |_, _| {}), all.min(1), "{count}");
-        assert_eq!(tree.in_ball(Vec3::ZERO, 0.0, |_, _| {}), 0, "{count}");
+        assert_eq!(tree.around_ray(&ray, 1.0, |_, _, _| {}), all.min(1), "{count}");
+        for radius in [0.0, -1.0, f32::NAN] {
+            assert_eq!(tree.in_ball(Vec3::ZERO, radius, |_, _| {}), 0, "{count}");
+            assert_eq!(tree.around_ray(&ray, radius, |_, _, _| {}), 0, "{count}");
+        }
     }
 }
 

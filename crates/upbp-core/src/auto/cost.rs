@@ -7,13 +7,14 @@
 use upbp_estimators::{Technique, TechniqueSet};
 
 use super::full_plan::BEAMS;
-use super::pilot_render::PilotRender;
 use super::pilot_render::recorder::ByTechnique;
+use super::pilot_render::{PilotRender, Work};
 use crate::deadline::Stop;
 use crate::plan::Plan;
 
-/// Nanoseconds of a camera sub-path, besides its edges and with the film, and of a light sub-path.
+/// Nanoseconds of a camera sub-path without its edges: the lens, the points of its sequences, the film.
 const NS_PER_CAMERA_PATH: f64 = 345.0;
+/// Nanoseconds of a light sub-path without its edges.
 const NS_PER_LIGHT_PATH: f64 = 30.0;
 /// Nanoseconds of an edge of a camera sub-path or a light sub-path.
 const NS_PER_EDGE: f64 = 245.0;
@@ -87,11 +88,10 @@ impl<'a> Cost<'a> {
         let mut camera = NS_PER_CAMERA_PATH + work.camera_edges[roulette] * NS_PER_EDGE * beyond;
         for technique in plan.techniques.without(light_tracing).iter() {
             let i = technique as usize;
-            let tests = self.growth(technique, plan) * work.tests[i][roulette];
             let samples = self.0.relative_photons(technique, plan) * work.samples[i][roulette];
             camera += plan.active_part(technique)
                 * (work.calls[i][roulette] * NS_PER_CALL[i]
-                    + tests * NS_PER_TEST[i]
+                    + self.tests(technique, plan) * NS_PER_TEST[i]
                     + samples * NS_PER_SAMPLE[i]);
         }
         camera
@@ -118,22 +118,89 @@ impl<'a> Cost<'a> {
         light_paths * light + beam_paths * work.beams * NS_PER_TREE_BEAM
     }
 
-    /// What a query looks at among the photons or beams of a plan, over that among those of the pilot render.
+    /// Nodes, leaves and blocks that the queries of a camera sub-path by a technique look at among a plan's
+    /// photons, with the radii of the pilot render.
     ///
-    /// Around a point it grows as the depth of the tree, around a query beam as the number of boxes that a
-    /// line meets: boxes around points get smaller the more there are, those around beams do not.
-    fn growth(self, technique: Technique, plan: &Plan) -> f64 {
-        let pilot = self.0;
-        let paths = [&pilot.plan_as_run(), plan].map(|plan| f64::from(plan.paths_of(technique)));
+    /// Among photon points they grow as the depth of the tree for queries around a point, and as the number
+    /// of boxes that a line meets for those around a query beam. Pieces of beams get no smaller the more
+    /// there are.
+    fn tests(self, technique: Technique, plan: &Plan) -> f64 {
+        /// Of a query that finds nothing near, whatever there is: the root and a leaf.
+        const LEAST: f64 = 2.0;
+        let Work { calls, tests, points, .. } = &self.0.work;
+        let (i, roulette) = (technique as usize, self.0.roulette(plan));
+        let paths = [&self.0.plan_as_run(), plan].map(|plan| f64::from(plan.paths_of(technique)));
         let [own, other] = paths.map(|paths| paths.max(1.0));
         let levels = |per_path: f64| (2.0 + other * per_path).ln() / (2.0 + own * per_path).ln();
-        match technique {
+        let growth = match technique {
             Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 1.0,
-            Technique::Surf => levels(pilot.work.points[0]),
-            Technique::Pp3d => levels(pilot.work.points[1]),
-            Technique::Bp2d => levels(pilot.work.beams),
+            Technique::Surf => levels(points[0]),
+            Technique::Pp3d => levels(points[1]),
             Technique::Pb2d => (other / own).cbrt(),
-            Technique::Bb1d => other / own,
+            Technique::Bp2d | Technique::Bb1d => other / own,
+        };
+        let least = tests[i][roulette].min(LEAST * calls[i][roulette]);
+        least + growth * (tests[i][roulette] - least)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pilot_render::recorder::TECHNIQUES;
+    use super::super::roulette::{COUNT, OF_PILOT};
+    use super::super::variance::tests::{pilot, planned};
+    use super::*;
+
+    /// The cost of camera sub-paths and of light sub-paths by a plan after a pilot render that saw `work`.
+    fn costs(work: &Work, thinning: [f64; 2], plan: Plan) -> [f64; 2] {
+        let pilot = PilotRender { work: *work, thinning, plan: planned(1600), ..pilot() };
+        [Cost(&pilot).camera_path(&plan), Cost(&pilot).light_paths(&plan)]
+    }
+
+    fn only(technique: Technique, paths: u32) -> Plan {
+        Plan { techniques: TechniqueSet::EMPTY.with(technique), roulette: OF_PILOT, ..planned(paths) }
+    }
+
+    #[test]
+    fn queries_cost_what_they_look_at() {
+        let everywhere = |count: f64| [[count; COUNT]; TECHNIQUES];
+        let work =
+            Work { calls: everywhere(1.0), tests: everywhere(10.0), points: [4.0, 16.0], ..Work::default() };
+        // A quarter of the light sub-paths were traced.
+        let cost = |technique, paths| costs(&work, [0.25; 2], only(technique, paths))[0];
+        for technique in [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bp2d, Technique::Bb1d]
+        {
+            let call = NS_PER_CAMERA_PATH + NS_PER_CALL[technique as usize];
+            let test = NS_PER_TEST[technique as usize];
+            let [as_run, more] = [400, 3200].map(|paths| (cost(technique, paths) - call) / test);
+            assert!((as_run - 10.0).abs() < 1e-9, "{technique:?}: {as_run}");
+            let expected = 2.0
+                + 8.0
+                    * match technique {
+                        Technique::Surf => (2.0 + 12_800.0_f64).ln() / (2.0 + 1600.0_f64).ln(),
+                        Technique::Pp3d => (2.0 + 51_200.0_f64).ln() / (2.0 + 6400.0_f64).ln(),
+                        Technique::Pb2d => 2.0,
+                        _ => 8.0,
+                    };
+            assert!((more - expected).abs() < 1e-9, "{technique:?}: {more}, expected {expected}");
         }
+    }
+
+    #[test]
+    fn plans_pay_for_the_trees_that_they_query() {
+        let work = Work { points: [1.0, 10.0], beams: 100.0, ..Work::default() };
+        for (technique, trees) in [
+            (Technique::Surf, NS_PER_TREE_POINT),
+            (Technique::Pp3d, 10.0 * NS_PER_TREE_POINT),
+            (Technique::Pb2d, 10.0 * NS_PER_TREE_POINT),
+            (Technique::Bb1d, 100.0 * NS_PER_TREE_BEAM),
+            (Technique::LightTracing, 0.0),
+        ] {
+            let found = costs(&work, [1.0; 2], only(technique, 16))[1];
+            assert!((found - 16.0 * (NS_PER_LIGHT_PATH + trees)).abs() < 1e-6, "{technique:?}: {found}");
+        }
+        // None traced, none planned.
+        let pilot = PilotRender { work, thinning: [0.0; 2], plan: planned(0), ..pilot() };
+        assert!(Cost(&pilot).of_pilot().is_finite() && Cost(&pilot).iteration(&planned(0)).is_finite());
     }
 }

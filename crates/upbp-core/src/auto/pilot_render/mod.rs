@@ -89,7 +89,7 @@ impl Size {
 /// Samples and work of a pilot render. The picture is divided into cells, of each of which one pixel is
 /// looked at, several times.
 pub(super) struct PilotRender {
-    /// The plan that it ran, with fewer light sub-paths.
+    /// The plan that it is of, which it ran with [fewer light sub-paths](Self::plan_as_run).
     pub(super) plan: Plan,
     /// Pixels of the picture.
     pub(super) pixels: f64,
@@ -418,7 +418,7 @@ impl Pass {
         } else {
             LightMap::empty()
         };
-        pass.points = map.photons();
+        pass.points = map.photon_points();
         let kind = StreamKind::PilotCamera;
         let pieces = in_pieces(grid.cells(), halt, |cell, scratch, piece: &mut (Recorder, Counters)| {
             let (recorder, counters) = piece;

@@ -10,7 +10,7 @@ mod limits;
 mod sample_pairs;
 mod shared_sub_paths;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use glam::DVec3;
 

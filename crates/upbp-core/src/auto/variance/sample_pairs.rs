@@ -29,7 +29,8 @@ struct Seen {
     value: Vec3,
     /// Square of the value, of as many samples as the plan has.
     square: f32,
-    /// Density of the path with the pilot render's plan, mean over iterations, relative to that of the first.
+    /// Density of the path with the pilot render's plan, mean over iterations, relative to the first
+    /// iteration.
     of_pilot: f32,
     shares: [f32; TECHNIQUES],
 }
@@ -221,7 +222,7 @@ pub(super) struct Share {
     light: f32,
     /// Of all, each with the square of its factor in the weights.
     all: f32,
-    /// Of all together.
+    /// Of all, without factors.
     density: f32,
     /// One over the sum of all with their factors.
     inverse: f32,
@@ -269,13 +270,13 @@ impl Excess {
     }
 }
 
-/// Photons of each technique in a query of the pilot render's plan, mean over iterations, relative to those
-/// of the first one.
+/// Photons of each technique in a query of the pilot render's plan, mean over iterations, relative to the
+/// first iteration.
 pub(super) fn mean_photons(pilot: &PilotRender) -> [f32; TECHNIQUES] {
     Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32)
 }
 
-/// Density of a path with the pilot render's plan, mean over iterations, relative to that of the first one.
+/// Density of a path with the pilot render's plan, mean over iterations, relative to the first iteration.
 pub(super) fn density_of_pilot(shares: &[f32; TECHNIQUES], mean_photons: &[f32; TECHNIQUES]) -> f32 {
     shares.iter().zip(mean_photons).map(|(share, photons)| share * photons).sum()
 }

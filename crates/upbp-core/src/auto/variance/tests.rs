@@ -61,7 +61,7 @@ fn pilot_of(other: Technique) -> PilotRender {
 }
 
 /// Samples of some techniques, and light sub-paths, relative to those of the plan.
-fn planned(paths: u32) -> Plan {
+pub(in crate::auto) fn planned(paths: u32) -> Plan {
     let radii = RadiusSchedule {
         surf: 0.0,
         pp3d: 0.0,
@@ -102,7 +102,7 @@ fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts
     counts
 }
 
-fn pilot() -> PilotRender {
+pub(in crate::auto) fn pilot() -> PilotRender {
     pilot_of(Technique::Connect)
 }
 
