@@ -121,8 +121,8 @@ pub trait Observer<B> {
     }
 
     /// The walk has called a technique: tried one next event, connection or splat, or made one photon query.
-    /// `tests` is the number of nodes, leaves and blocks of a tree over photons or beams that a query looked at,
-    /// 0 for other calls.
+    /// `tests` is the number of nodes, leaves and blocks of a tree over photons or beams that a query looked
+    /// at, 0 for other calls.
     fn call(&mut self, technique: Technique, tests: u32) {
         let _ = (technique, tests);
     }
