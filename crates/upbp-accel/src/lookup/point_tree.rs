@@ -36,8 +36,8 @@ impl<P: Copy> Block<P> {
 ///
 /// The same points give the same tree and the same order of visits, whatever the number of threads.
 ///
-/// A query returns the number of nodes, leaves and blocks of the tree that it looked at, which its time goes
-/// with: groups of eight boxes or points. It is 0 if the radius is not positive.
+/// A query returns the number of groups of eight boxes or points that it looked at, the nodes, leaves and
+/// blocks of the tree: a measure of its time, 0 if the radius is not positive.
 #[derive(Clone, Debug)]
 pub struct PointTree<P> {
     tree: PackedTree<Rounded, Block<P>>,

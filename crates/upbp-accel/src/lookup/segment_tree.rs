@@ -60,8 +60,8 @@ impl Block {
 /// Long segments are split into pieces inside; each hit is still reported once. The same segments give the
 /// same tree and the same order of visits, whatever the number of threads.
 ///
-/// A query returns the number of nodes, leaves and blocks of the tree that it looked at, which its time goes
-/// with: groups of eight boxes or pieces of segments. It is 0 if the radius is not positive.
+/// A query returns the number of groups of eight boxes or pieces of segments that it looked at, the nodes,
+/// leaves and blocks of the tree: a measure of its time, 0 if the radius is not positive.
 #[derive(Clone, Debug)]
 pub struct SegmentTree<P> {
     pub(super) tree: PackedTree<Exact, Block>,

@@ -211,7 +211,7 @@ impl Builder<'_> {
 /// The mesh files of a scene.
 #[derive(Default)]
 pub(super) struct MeshFiles {
-    /// What was read.
+    /// Meshes that were read, or why they could not be, by file.
     known: BTreeMap<String, Result<TriangleMesh, String>>,
     /// Shapes that refer to each.
     uses: BTreeMap<String, usize>,

@@ -142,8 +142,8 @@ impl Variance {
     /// Variances of blocks of pixels, times their pixels, mean over [sides](crate::film::BLOCK_SIDES) of
     /// blocks: what pixels have in common counts once for each of them.
     ///
-    /// What more light sub-paths than the pilot render's bring is told by rare paths at their face value: the
-    /// charge for them guards against techniques that a pilot render knows too little of, and numbers of
+    /// The gain of more light sub-paths than the pilot render's is told by rare paths at their face value:
+    /// the charge for them guards against techniques that a pilot render knows too little of, and numbers of
     /// light sub-paths are no such techniques.
     pub(super) fn over_scales(&self, plan: &Plan) -> [f64; GROUPS] {
         let usual = self.pilot.plan.light_paths;
