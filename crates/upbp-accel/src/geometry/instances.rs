@@ -105,38 +105,42 @@ impl Model {
     }
 }
 
+/// What hears of intersections in scenes with copies. Not a type parameter: a call costs little beside the
+/// way into a copy, and the walks are compiled once instead of once per caller.
+pub(super) type OnHit<'a> = &'a mut dyn FnMut(&Candidate) -> Visit;
+
 /// A walk of a ray through the copies of meshes, with the nearer boxes first or in any order.
-pub(super) struct InstanceSearch<'a, V, const IN_ORDER: bool> {
+pub(super) struct InstanceSearch<'a, const IN_ORDER: bool> {
     pub(super) instances: &'a Instances,
     pub(super) ray: Ray,
     /// The greatest sum of coordinate differences between the ray's origin and any triangle.
     pub(super) extent: f32,
-    pub(super) visit: V,
+    pub(super) visit: OnHit<'a>,
 }
 
-impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Task for InstanceSearch<'_, V, IN_ORDER> {
+impl<const IN_ORDER: bool> Task for InstanceSearch<'_, IN_ORDER> {
     #[inline(always)]
     fn run(self, wide: impl Wide) {
         let Self { instances, ray, extent, visit } = self;
         let lanes = LaneRay::new(wide, &ray);
         let triangle_ray = TriangleRay::new(ray.origin, ray.direction, extent);
         let mut t_max = ray.t_max;
-        let mut each = EachInstance::<_, IN_ORDER> { instances, ray, extent, triangle_ray, visit };
+        let mut each = EachInstance::<IN_ORDER> { instances, ray, extent, triangle_ray, visit };
         // Nothing is left to do if it breaks off.
         let _ =
             instances.hierarchy.traverse::<IN_ORDER, SlabRay<_>, _>(wide, &lanes, (), &mut t_max, &mut each);
     }
 }
 
-struct EachInstance<'a, V, const IN_ORDER: bool> {
+struct EachInstance<'a, const IN_ORDER: bool> {
     instances: &'a Instances,
     ray: Ray,
     extent: f32,
     triangle_ray: TriangleRay,
-    visit: V,
+    visit: OnHit<'a>,
 }
 
-impl<V: FnMut(&Candidate) -> Visit, const IN_ORDER: bool> Visitor for EachInstance<'_, V, IN_ORDER> {
+impl<const IN_ORDER: bool> Visitor for EachInstance<'_, IN_ORDER> {
     #[inline(always)]
     fn visit<W: Wide>(
         &mut self,
@@ -192,7 +196,7 @@ fn entry(ray: &Ray, (min, max): (Vec3, Vec3), margin: f32, t_max: f32) -> Option
 }
 
 /// Triangles of a copy, tested where they are in the scene.
-struct InstanceTriangles<'a, V> {
+struct InstanceTriangles<'a, 'v> {
     ray: &'a Ray,
     triangle_ray: &'a TriangleRay,
     instance: &'a Instance,
@@ -200,10 +204,10 @@ struct InstanceTriangles<'a, V> {
     /// Where the ray starts in the mesh.
     start: f32,
     t_max: f32,
-    visit: &'a mut V,
+    visit: &'a mut OnHit<'v>,
 }
 
-impl<V> InstanceTriangles<'_, V> {
+impl InstanceTriangles<'_, '_> {
     /// The end of the ray as it is counted in the mesh, or somewhat more.
     #[inline(always)]
     fn own_t_max(&self) -> f32 {
@@ -211,7 +215,7 @@ impl<V> InstanceTriangles<'_, V> {
     }
 }
 
-impl<V: FnMut(&Candidate) -> Visit> Visitor for InstanceTriangles<'_, V> {
+impl Visitor for InstanceTriangles<'_, '_> {
     #[inline(always)]
     fn visit<W: Wide>(
         &mut self,

@@ -10,7 +10,7 @@ use super::build::{Leaves, build};
 use super::error::GeometryError;
 use super::hierarchy::{BlockRef, Hierarchy, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, SurfacePoint, Visit};
-use super::instances::{InstanceSearch, Instances};
+use super::instances::{InstanceSearch, Instances, OnHit};
 use super::lane_ray::{LaneRay, SlabRay};
 use super::primitive::{Name, Packing, Primitives, Probe};
 use super::shape::Shape;
@@ -122,11 +122,10 @@ impl SceneGeometry {
     /// Cheaper than [`for_each_hit`](Self::for_each_hit) where the nearest intersection is of no interest.
     pub fn any_where(&self, ray: Ray, mut accept: impl FnMut(&Candidate) -> bool) -> bool {
         let mut found = false;
-        let visit = |candidate: &Candidate| {
+        self.search::<false>(Best, ray, |candidate| {
             found = accept(candidate);
             if found { Visit::Stop } else { Visit::Continue }
-        };
-        self.search::<false>(Best, ray, visit);
+        });
         found
     }
 
@@ -140,19 +139,28 @@ impl SceneGeometry {
     ) {
         if self.instances.is_empty() {
             instructions.run(Search::<_, IN_ORDER> { scene: self, ray, visit });
-            return;
+        } else {
+            self.search_with_copies::<IN_ORDER>(instructions, ray, &mut visit);
         }
+    }
+
+    /// The part of [`search`](Self::search) for scenes with copies of meshes.
+    fn search_with_copies<const IN_ORDER: bool>(
+        &self,
+        instructions: impl Instructions,
+        ray: Ray,
+        visit: OnHit,
+    ) {
         let (mut rest, mut is_done) = (ray, false);
-        let visit_first = |candidate: &Candidate| {
+        let visit_first: OnHit = &mut |candidate| {
             let answer = visit(candidate);
             is_done = answer.apply(&mut rest.t_max).is_break();
             answer
         };
         instructions.run(Search::<_, IN_ORDER> { scene: self, ray, visit: visit_first });
         if !is_done {
-            let extent = self.extent_from(rest.origin);
-            let instances = &self.instances;
-            instructions.run(InstanceSearch::<_, IN_ORDER> { instances, ray: rest, extent, visit });
+            let (instances, extent) = (&self.instances, self.extent_from(rest.origin));
+            instructions.run(InstanceSearch::<IN_ORDER> { instances, ray: rest, extent, visit });
         }
     }
 

@@ -56,50 +56,54 @@ struct Traversal<'a, L, B, R, Q> {
 impl<L: Boxes, B, R: Region, Q: Query<B>> Task for Traversal<'_, L, B, R, Q> {
     #[inline(always)]
     fn run(mut self, wide: impl Wide) {
-        // Lanes still to be visited and the first child, per level. So the stack is as high as the tree.
-        let mut stack = [(0_u32, 0_u32); MAX_LEVELS];
-        let (mut level, mut index) = (0, 0);
+        let mut nodes = Nodes::default();
         let mut leaves = List::default();
+        // Each step stands here once, since tests and reports are inlined.
         loop {
-            let node = &self.tree.nodes[index];
-            *self.tests += 1;
-            let met = self.region.overlaps(wide, &node.boxes) & u32::from(node.existing);
-            if node.over_leaves {
-                leaves.extend(node.first, met);
-                if leaves.is_full() {
-                    self.leaves(wide, &mut leaves);
-                }
-            } else if met != 0 {
-                stack[level] = (met, node.first);
-                level += 1;
+            let ended = self.nodes(wide, &mut nodes, &mut leaves);
+            self.leaves(wide, &mut leaves);
+            if ended {
+                return;
             }
-            while level > 0 && stack[level - 1].0 == 0 {
-                level -= 1;
-            }
-            if level == 0 {
-                return self.leaves(wide, &mut leaves);
-            }
-            let (met, first) = &mut stack[level - 1];
-            index = (*first + met.trailing_zeros()) as usize;
-            *met &= *met - 1;
         }
     }
 }
 
 impl<L: Boxes, B, R: Region, Q: Query<B>> Traversal<'_, L, B, R, Q> {
+    /// Gathers leaves until there are enough; whether all nodes have been looked at.
+    #[inline(always)]
+    fn nodes(&mut self, wide: impl Wide, nodes: &mut Nodes, leaves: &mut List) -> bool {
+        loop {
+            let node = &self.tree.nodes[nodes.next];
+            *self.tests += 1;
+            let met = self.region.overlaps(wide, &node.boxes) & u32::from(node.existing);
+            if node.over_leaves {
+                leaves.extend(node.first, met);
+            } else if met != 0 {
+                nodes.push(met, node.first);
+            }
+            let more = nodes.advance();
+            if !more || leaves.is_full() {
+                return !more;
+            }
+        }
+    }
+
     #[inline(always)]
     fn leaves(&mut self, wide: impl Wide, leaves: &mut List) {
         let mut blocks = List::default();
         let leaves = leaves.take();
         *self.tests += leaves.len() as u32;
-        for &leaf in leaves {
-            let met = self.region.overlaps(wide, &self.tree.leaves[leaf as usize]);
-            blocks.extend(leaf * WIDTH as u32, met);
-            if blocks.is_full() {
-                self.blocks(wide, &mut blocks);
+        let mut waiting = leaves.iter();
+        while waiting.len() > 0 {
+            while !blocks.is_full()
+                && let Some(&leaf) = waiting.next()
+            {
+                let met = self.region.overlaps(wide, &self.tree.leaves[leaf as usize]);
+                blocks.extend(leaf * WIDTH as u32, met);
             }
+            self.blocks(wide, &mut blocks);
         }
-        self.blocks(wide, &mut blocks);
     }
 
     /// Tests all blocks before anything is reported: the tests wait for memory, not for each other.
@@ -125,6 +129,38 @@ impl<L: Boxes, B, R: Region, Q: Query<B>> Traversal<'_, L, B, R, Q> {
                 self.query.report(block, found, lane);
             }
         }
+    }
+}
+
+/// The way through the nodes.
+#[derive(Default)]
+struct Nodes {
+    next: usize,
+    /// Lanes still to be visited and the first child, per level. So it is as high as the tree.
+    stack: [(u32, u32); MAX_LEVELS],
+    level: usize,
+}
+
+impl Nodes {
+    #[inline(always)]
+    fn push(&mut self, met: u32, first: u32) {
+        self.stack[self.level] = (met, first);
+        self.level += 1;
+    }
+
+    /// Goes to the next node, if there is one.
+    #[inline(always)]
+    fn advance(&mut self) -> bool {
+        while self.level > 0 && self.stack[self.level - 1].0 == 0 {
+            self.level -= 1;
+        }
+        if self.level == 0 {
+            return false;
+        }
+        let (met, first) = &mut self.stack[self.level - 1];
+        self.next = (*first + met.trailing_zeros()) as usize;
+        *met &= *met - 1;
+        true
     }
 }
 
