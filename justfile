@@ -35,8 +35,9 @@ semver BASE:
 render:
     cargo run --release --example cornell_media
 
-# Photon queries, iterations and weights
+# Rays, photon queries, iterations and weights
 bench FILTER="":
+    cargo bench --bench rays -- {{FILTER}}
     cargo bench --bench lookups -- {{FILTER}}
     cargo bench --bench iteration -- {{FILTER}}
 

@@ -56,7 +56,7 @@ fn render(path: &Path, exr: &Path) -> Result<(), Box<dyn Error>> {
     check_writable(exr)?;
     check_writable(&png)?;
 
-    // Settings are checked once. By default the renderer chooses its techniques from a small trial, here.
+    // Settings are checked once. By default the renderer chooses its techniques from small pilot renders.
     let settings = Settings::default();
     let mut renderer = scene.renderer(settings.clone().validate()?)?;
     renderer.identify_scene(&path.display().to_string(), &scene.hash().to_le_bytes());

@@ -293,7 +293,7 @@ fn shares(cell: &Cell, samples: &[EmissionSample], axes: [usize; 2], light: f64)
     shares
 }
 
-/// The same in larger bins.
+/// Shares summed into larger bins.
 fn coarse(shares: &[[f64; BINS]; BINS]) -> [f64; COARSE_BINS * COARSE_BINS] {
     const SIDE: usize = BINS / COARSE_BINS;
     let mut sums = [0.0; COARSE_BINS * COARSE_BINS];

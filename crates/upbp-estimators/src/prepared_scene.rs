@@ -19,9 +19,9 @@ pub struct PreparedScene<'a, S: Scene> {
     pub scene: &'a S,
     /// Bounding sphere of the scene.
     pub bounds: BoundingSphere,
-    /// By power.
+    /// Choice of emitters by power.
     power: Selection,
-    /// By place and power; `None` where that tells nothing.
+    /// Choice of emitters by place and power; `None` where that tells nothing.
     tree: Option<EmitterTree>,
     choice: Arc<EmitterChoice>,
     /// Bounds of light sub-paths' starts, by [`EmitterChoice::emission_bounds`].

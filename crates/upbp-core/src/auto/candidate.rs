@@ -206,7 +206,7 @@ fn with_surf_radius(mut plan: Plan, radius: f32) -> Plan {
 /// four times as much. It blurs what a pixel blurs anyway, so that the prediction, which knows nothing of
 /// blur, may be asked.
 fn widest(usual: f32, statistics: &Statistics) -> f32 {
-    /// A narrower one is not worth a candidate.
+    /// Least ratio to the usual radius that is worth a candidate.
     const LEAST: f32 = 1.25;
     const MOST: f32 = 4.0;
     let footprint = statistics.footprint.min(statistics.radius_field.largest_radius());

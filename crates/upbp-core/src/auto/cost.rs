@@ -61,7 +61,7 @@ impl<'a> Cost<'a> {
 
     /// Iterations of a render by a plan that ends by `stop`, as far as that can be told.
     pub(super) fn iterations(self, plan: &Plan, stop: &Stop) -> f64 {
-        /// Of a render without such limits.
+        /// Iterations of a render without limits.
         const UNKNOWN: f64 = 64.0;
         let by_number = stop.iterations.map(|iterations| iterations as f64);
         let nanoseconds = |seconds: f64| 1e9 * seconds * rayon::current_num_threads() as f64;
@@ -125,7 +125,7 @@ impl<'a> Cost<'a> {
     /// of boxes that a line meets for those around a query beam. Pieces of beams get no smaller the more
     /// there are.
     fn tests(self, technique: Technique, plan: &Plan) -> f64 {
-        /// Of a query that finds nothing near, whatever there is: the root and a leaf.
+        /// Tests of a query that finds nothing near, whatever there is: the root and a leaf.
         const LEAST: f64 = 2.0;
         let Work { calls, tests, points, .. } = &self.0.work;
         let (i, roulette) = (technique as usize, self.0.roulette(plan));

@@ -139,7 +139,7 @@ struct Measured {
     /// Contributions of next events, in two halves of different camera sub-paths.
     next_events: [Vec<NextEvent>; 2],
     guides: Evidence,
-    /// Their number.
+    /// Number of contributions.
     contributions: usize,
 }
 

@@ -4,7 +4,7 @@ use upbp_estimators::{Roulette, TechniqueSet};
 
 /// Thresholds, ascending.
 const THRESHOLDS: [f32; COUNT] = [0.25, 0.5, 0.7, 1.0];
-/// Their number.
+/// Number of thresholds.
 pub(super) const COUNT: usize = 4;
 /// The number of the one that a pilot render runs with, from whose samples those of the others are predicted.
 pub(super) const PILOT: usize = 1;

@@ -355,7 +355,7 @@ impl Queries {
     }
 }
 
-/// Keeps `QUERIES` elements, evenly.
+/// Keeps at most `QUERIES` elements, evenly.
 fn thin<T>(elements: &mut Vec<T>) {
     let step = elements.len().div_ceil(QUERIES).max(1);
     let mut index = 0;

@@ -223,5 +223,3 @@ fn compare_histogram(observed: &[u32], expected: &[f64], rest: u32, rest_share: 
     let limit = k * (1.0 - 2.0 / (9.0 * k) + 4.75 * (2.0 / (9.0 * k)).sqrt()).powi(3);
     require(statistic <= limit, "frequencies follow the density", (from, statistic, limit, classes))
 }
-
-// --------------------------------------------------------------------------------------------------- lights

@@ -69,5 +69,3 @@ fn check_pixel(camera: &impl Camera, corner: Vec2, u_lens: [f32; 2]) -> Check {
     let within = (solid_angle - expected).abs() <= tolerance * expected;
     require(within, "a pixel's density is one over its solid angle", (corner, solid_angle, expected))
 }
-
-// ---------------------------------------------------------------------------------------------------- scene

@@ -283,5 +283,3 @@ fn check_environment_directions(
     chosen.agrees(flux.value(), "next event estimation sees all of the environment")?;
     emitted.agrees(flux.value(), "emission sees all of the environment")
 }
-
-// --------------------------------------------------------------------------------------------------- camera

@@ -39,7 +39,7 @@ pub struct ContractViolation {
     pub details: String,
 }
 
-/// Draws per direction of arrival.
+/// Draws per case: a direction of arrival, a receiver, a segment.
 const DRAWS: usize = 40_000;
 
 type Check = Result<(), ContractViolation>;
@@ -99,5 +99,3 @@ fn is_light(value: Spectrum) -> bool {
 fn is_density(value: f32) -> bool {
     value.is_finite() && value >= 0.0
 }
-
-// ------------------------------------------------------------------------------------------------- surfaces

@@ -239,7 +239,7 @@ fn continuation<M: Medium>(medium: &M, position: Vec3, roulette: Roulette) -> f3
 }
 
 impl<B: Bsdf> SurfaceInteraction<B> {
-    /// The basis in which the BSDF is asked: columns are the two tangents and the shading normal.
+    /// A direction in the basis in which the BSDF is asked: two tangents and the shading normal.
     pub(crate) fn local(&self, direction: Vec3) -> Vec3 {
         let (s, t) = orthonormal_basis(self.shading_normal);
         Vec3::new(direction.dot(s), direction.dot(t), direction.dot(self.shading_normal))

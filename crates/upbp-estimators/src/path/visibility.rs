@@ -80,7 +80,7 @@ pub fn clear_edge<S: Scene, L: Lanes>(
 enum Edge<L> {
     Clear(EdgeDensity<L>),
     Blocked,
-    /// Another one: with this crossing at its start.
+    /// The edge is another one, with this crossing at its start.
     Corrected(Crossing),
 }
 

@@ -108,10 +108,10 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 struct Chosen<'a, E> {
     emitter: EmitterId,
     light: &'a E,
-    /// Of choosing this light.
+    /// Probability of choosing this light.
     probability: f32,
     incident: Incident,
-    /// 1 where the light is no surface.
+    /// Cosine at the light, 1 where it is no surface.
     cos_light: f32,
 }
 

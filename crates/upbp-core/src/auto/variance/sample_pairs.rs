@@ -14,7 +14,7 @@ use crate::auto::roulette::{COUNT, relative_pass_probability};
 pub(super) struct Looks {
     /// By look, those after most albedos first.
     seen: Vec<Seen>,
-    /// Behind the last one of each look, and its number of light sub-paths with several photons.
+    /// Index behind the last of each look, and its number of light sub-paths with several photons.
     ends: Vec<(u32, u32)>,
 }
 
@@ -95,7 +95,7 @@ pub(super) struct View<'a> {
     roulette: usize,
     /// Samples of each technique relative to the pilot render's plan.
     relative: [f32; TECHNIQUES],
-    /// The same, times their factors in the weights.
+    /// Samples of each technique, relative, times their factors in the weights.
     weighted: [f32; TECHNIQUES],
     /// The factor of emission hits, next events and connections.
     camera_factor: f32,
@@ -259,7 +259,7 @@ impl Share {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Excess {
     pub(super) charge: f64,
-    /// The same, each times how much more rarely the plan finds the sample than the pilot render does.
+    /// Charges, each times how much more rarely the plan finds the sample than the pilot render does.
     pub(super) by_rarity: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Covariances of neighbouring pixels, which merge photons and beams of the same light sub-paths.
+//! Covariances of neighbouring pixels, to which the same light sub-paths bring merges and splats.
 
 use glam::Vec3;
 
@@ -7,7 +7,7 @@ use crate::auto::pilot_render::Shared;
 use crate::auto::pilot_render::recorder::Sample;
 
 impl View<'_> {
-    /// Product of two pixels' merges with one light sub-path under the plan, times its weight in the errors
+    /// Product of what one light sub-path brings to two pixels under the plan, times its weight in the errors
     /// of blocks.
     ///
     /// A covariance is less by the product of the means over the number of light sub-paths: little where
