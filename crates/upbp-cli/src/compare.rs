@@ -44,11 +44,13 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     let comparison = pair.compare().map_err(|reason| {
         Failure::Input(format!("{} and {}: {reason}", options.image.display(), options.reference.display()))
     })?;
+    let mut failures = Vec::new();
     if let Some(images) = &options.output {
         let error = pair.error();
-        Failure::all(images.write(&error, &in_colour(&error, options.exposure)).err().as_slice())?;
+        images.write(&error, &in_colour(&error, options.exposure), |written| failures.extend(written.err()));
     }
     say(&comparison.text(&options.image, &options.reference))?;
+    Failure::all(&failures)?;
     match &options.output {
         Some(images) => say(&format!("wrote {}", images.names())),
         None => Ok(()),

@@ -61,12 +61,17 @@ impl Images {
         self.too_bright(&image, tones)
     }
 
-    /// Writes an image, and another one to look at.
-    pub(crate) fn write(&self, image: &Image, shown: &Image) -> Result<(), OutputError> {
+    /// Writes an image, and another one to look at, each whatever became of the other.
+    pub(crate) fn write(
+        &self,
+        image: &Image,
+        shown: &Image,
+        mut attempt: impl FnMut(Result<(), OutputError>),
+    ) {
         if let Some(path) = &self.exr {
-            write_image(path, image)?;
+            attempt(write_image(path, image));
         }
-        write_png(&self.png, shown, ToneMapping::default())
+        attempt(write_png(&self.png, shown, ToneMapping::default()));
     }
 
     /// A hint for a PNG whose pixels are mostly too bright by more than a stop: a sky may be white.

@@ -59,6 +59,11 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
         check_writable(output.path).map_err(Failure::input)?;
     }
     let (merged, parts) = merge(&options.states, options.quiet)?;
+    if options.image.output.is_some() && merged.film().is_empty() {
+        return Err(Failure::Input(
+            "there is no picture in the states yet: no iteration was begun".to_owned(),
+        ));
+    }
     let report = merged.report();
     let mut failures = Vec::new();
     let mut attempt = |written: Result<(), OutputError>| failures.extend(written.err());

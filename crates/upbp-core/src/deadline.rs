@@ -146,7 +146,8 @@ impl<'a> Allowance<'a> {
     pub(crate) fn halt(&self) -> Halt<'a> {
         /// Factor by which work may take longer than there is time for.
         const PATIENCE: u32 = 2;
-        let deadline = self.time.and_then(|time| self.start.checked_add(PATIENCE * time));
+        let time = self.time.and_then(|time| time.checked_mul(PATIENCE));
+        let deadline = time.and_then(|time| self.start.checked_add(time));
         Halt { canceller: self.canceller, deadline }
     }
 
@@ -216,6 +217,8 @@ mod tests {
         });
         assert_eq!((result, parts.as_slice()), (Some(1.0), [1.0].as_slice()));
         assert_eq!(Allowance::new(&canceller, Some(f64::INFINITY)).time, None);
+        // Twice as much is no time that a clock can tell.
+        assert_eq!(Allowance::new(&canceller, Some(1.2e19)).halt().deadline, None);
     }
 
     #[test]

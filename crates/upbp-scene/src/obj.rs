@@ -43,7 +43,7 @@ const MAX_LINE: u64 = 1 << 20;
 const MAX_TRIANGLES: usize = if cfg!(test) { 1 << 12 } else { 1 << 25 };
 
 /// Statements that do not change the surface, which are skipped.
-const SKIPPED: [&str; 22] = [
+const SKIPPED: [&str; 20] = [
     "vt",
     "vp",
     "g",
@@ -64,8 +64,6 @@ const SKIPPED: [&str; 22] = [
     "trace_obj",
     "ctech",
     "stech",
-    "call",
-    "csh",
 ];
 
 impl ObjMesh {
@@ -124,7 +122,7 @@ impl Parser {
                 if corners.len() < 3 {
                     return Err(format!("a face needs at least 3 corners, found {}", corners.len()));
                 }
-                if self.triangles.len() + corners.len() > MAX_TRIANGLES {
+                if self.triangles.len() + corners.len() - 2 > MAX_TRIANGLES {
                     return Err(format!("the mesh has more than {MAX_TRIANGLES} triangles"));
                 }
                 self.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
@@ -250,6 +248,10 @@ mod tests {
         assert!(ObjMesh::parse(&polygon).is_ok());
         let error = ObjMesh::parse(&(polygon.clone() + &polygon[7..] + &polygon[7..])).unwrap_err();
         assert_eq!(error.to_string(), format!("line 4: the mesh has more than {MAX_TRIANGLES} triangles"));
+        // The most that is allowed, and one more.
+        let all = "v 0 0 0\nf".to_owned() + &" 1".repeat(MAX_TRIANGLES + 2);
+        assert_eq!(ObjMesh::parse(&all).unwrap().indices.len(), MAX_TRIANGLES);
+        assert!(ObjMesh::parse(&(all + " 1")).is_err());
     }
 
     #[test]
@@ -268,6 +270,10 @@ mod tests {
             (
                 "surf 0 1 0 1 1",
                 "line 1: expected a statement about polygons, such as `v` or `f`, found `surf`",
+            ),
+            (
+                "call part.obj",
+                "line 1: expected a statement about polygons, such as `v` or `f`, found `call`",
             ),
             ("v 0 0\n", "line 1: expected three coordinates"),
             ("\nv 0 x 0\n", "line 2: expected a finite coordinate, found `x`"),

@@ -179,18 +179,16 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
         attempt(files::write_report(&report, path));
     }
     Failure::all(&failures)?;
+    let mut said = Ok(());
     if !options.messages.quiet {
         let wrote = if rendered {
             format!("wrote {}", images.names())
         } else {
-            "nothing was rendered: the light sub-paths of the first iteration were not done (--time, --light-paths)"
-                .to_owned()
+            "no picture: the light sub-paths of the first iteration were not done".to_owned()
         };
-        say(&format!("{report}{wrote}"))?;
-        if let Some(hint) = hint {
-            say(&hint)?;
-        }
+        said = say(&format!("{report}{wrote}")).and_then(|()| hint.map_or(Ok(()), |hint| say(&hint)));
     }
+    // Said even if nobody reads the rest.
     if reason == StopReason::Cancelled {
         let kept = match &options.saving.state {
             Some(path) => format!("the state is in {}", path.display()),
@@ -201,5 +199,5 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
             report.iterations
         )));
     }
-    Ok(())
+    said
 }

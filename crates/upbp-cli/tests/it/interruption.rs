@@ -253,6 +253,13 @@ fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
         std::os::unix::fs::symlink("/dev/full", folder.join("full.exr")).expect("a link");
         failing(&["--state", "a.state", "-o", "full.exr"], "full.exr");
         assert!(folder.join("full.png").exists());
+        // The numbers do not need the picture of them.
+        fs::remove_file(folder.join("full.png")).expect("it is there");
+        let compare = ["b.exr", "b.exr", "-o", "full.exr"];
+        let output = command("compare", &folder, &compare).output().expect("the program runs");
+        assert_eq!(output.status.code(), Some(74));
+        assert!(String::from_utf8_lossy(&output.stdout).contains("relMSE"));
+        assert!(folder.join("full.png").exists());
     }
     // A folder that vanishes while it renders.
     let gone = folder.join("gone");
@@ -294,6 +301,39 @@ fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
         .expect("the program runs");
     drop(child.stderr.take());
     assert_eq!(child.wait().expect("it ends").code(), Some(0));
+}
+
+/// As in a pipe that a signal ends from both sides: a queue is to try again.
+#[test]
+fn a_signal_says_try_again_to_nobody_as_well() {
+    let folder = prepared("deaf");
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let arguments = ["scene.ron", "--state", "a.state", "--save-every", "0.01", "--light-paths", "64"];
+    let mut child = command("render", &folder, &arguments)
+        .args(["--threads", "1", "--deterministic", "-o", "a.exr", "--iterations", "200000000"])
+        .stdout(writer)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    wait_until(&mut child, "a saving", |_| folder.join("a.state").exists());
+    signal(&child, "TERM");
+    let (code, text) = end(&child.wait_with_output().expect("it ends"));
+    assert_eq!(code, Some(75), "{text}");
+    assert!(text.contains("the state is in a.state"), "{text}");
+}
+
+#[test]
+fn states_without_a_picture_do_not_become_one() {
+    let folder = prepared("empty");
+    let scene = upbp_scene::ReadyScene::load(folder.join("scene.ron")).expect("a scene");
+    let settings = upbp_core::Settings { deterministic: true, ..upbp_core::Settings::default() };
+    let renderer = scene.renderer(settings.validate().expect("good settings")).expect("a renderer");
+    renderer.state().save(&folder.join("a.state")).expect("a writable folder");
+    let output = command("merge", &folder, &["a.state", "-o", "a.exr"]).output().expect("the program runs");
+    let (code, text) = end(&output);
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("no picture") && !folder.join("a.exr").exists(), "{text}");
 }
 
 #[test]

@@ -154,7 +154,11 @@ impl<'a> Renderer<'a> {
         let halt = Halt { canceller: &self.canceller, deadline: self.deadline(stop) };
         let State { record, film, .. } = &mut self.state;
         let rect = film.rect();
-        let Some(light) = self.engine.trace_light(&plan, rect, &mut self.pixels, &halt) else { return false };
+        // There is always a picture, however late.
+        let unlimited = Halt { deadline: None, ..halt };
+        let light_halt = if film.is_empty() { &unlimited } else { &halt };
+        let light = self.engine.trace_light(&plan, rect, &mut self.pixels, light_halt);
+        let Some(light) = light else { return false };
         let missing = film.missing(iteration);
         let (mut counters, mut times) = (light.counters, light.times);
         if missing.start > 0 {
@@ -166,10 +170,9 @@ impl<'a> Renderer<'a> {
         while done < missing.end {
             let fit = self.set_time.map_or(1.0, |time| PORTION.as_secs_f64() / time.as_secs_f64().max(1e-9));
             let sets = done..done.saturating_add((fit as u32).max(1)).min(missing.end);
-            // There is always a picture, however late.
-            let halt = if film.is_empty() && done == 0 { Halt { deadline: None, ..halt } } else { halt };
+            let camera_halt = if film.is_empty() && done == 0 { &unlimited } else { &halt };
             let buffers = Buffers { pixels: &mut self.pixels, features: &mut self.features };
-            let traced = self.engine.trace_camera(&plan, rect, &sets, buffers, &halt);
+            let traced = self.engine.trace_camera(&plan, rect, &sets, buffers, camera_halt);
             let time = clock.lap();
             times.camera += time;
             let Some(own) = traced else { break };

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::single_value;
-use super::value::{Colour, Ior, NonNegative, Reflectance, Roughness};
+use super::value::{Colour, Exponent, Ior, Reflectance, Roughness};
 
 /// A surface material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub enum Material {
         /// Albedo of the lobe; with the matt part at most 1.
         specular: Reflectance,
         /// Exponent of the lobe: the higher, the narrower.
-        exponent: NonNegative,
+        exponent: Exponent,
     },
     /// A perfectly smooth metal, by its reflectance; both sides reflect.
     #[serde(deserialize_with = "single_value::reflectance")]

@@ -34,6 +34,7 @@ pub enum Medium {
 
 /// A phase function: the distribution of directions after scattering.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub enum Phase {
     /// Equal in all directions.
     #[default]

@@ -105,6 +105,10 @@ number!(
     Ior(f32), "an index of refraction from 0.1 to 10", |x| (0.1..=10.0).contains(&x)
 );
 number!(
+    /// Exponent of a glossy lobe, in `[0, 1e8]`: a narrower one is lost in single precision.
+    Exponent(f32), "an exponent from 0 to 1e8 (for more, use a mirror)", |x| (0.0..=1e8).contains(&x)
+);
+number!(
     /// Width of the distribution of normals of a rough surface, in `[0.001, 1]`.
     Roughness(f32), "a roughness from 0.001 to 1 (for less, use a smooth material)", |x| (0.001..=1.0).contains(&x)
 );

@@ -30,8 +30,16 @@ pub enum EnvironmentImageError {
     /// The file is no readable `OpenEXR` image with channels R, G and B.
     #[error("cannot be read as an OpenEXR image with channels R, G, B")]
     Unreadable(#[source] exr::error::Error),
-    /// No pixels, not as many as the size says, or too many.
-    #[error("has {pixels} pixels for {width} x {height}, expected all of them, from 1 to {MAX_PIXELS}")]
+    /// More pixels than an environment may have.
+    #[error("has {width} x {height} pixels, expected at most {MAX_PIXELS} in all")]
+    TooLarge {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// No pixels, or not as many as the size says.
+    #[error("has {pixels} pixels for {width} x {height}, expected all of them, at least 1")]
     Size {
         /// Columns.
         width: usize,
@@ -74,8 +82,9 @@ pub struct EnvironmentImage {
 impl EnvironmentImage {
     /// An environment from pixels row by row, the first row around +y. Values are radiance in W m⁻² sr⁻¹.
     pub fn new(width: usize, height: usize, pixels: Vec<Spectrum>) -> Result<Self, EnvironmentImageError> {
-        let expected = width.checked_mul(height).filter(|&count| count > 0 && count <= MAX_PIXELS);
-        if expected != Some(pixels.len()) {
+        let expected = width.checked_mul(height).filter(|&count| count <= MAX_PIXELS);
+        let expected = expected.ok_or(EnvironmentImageError::TooLarge { width, height })?;
+        if expected == 0 || expected != pixels.len() {
             return Err(EnvironmentImageError::Size { width, height, pixels: pixels.len() });
         }
         if let Some(index) = pixels.iter().position(|pixel| !(pixel.is_finite() && pixel.is_non_negative())) {

@@ -198,11 +198,10 @@ fn an_image_is_oriented_as_documented() {
     assert!(lit(4, 1, FRAC_PI_2).radiance_and_pdf(left).1 > 0.0);
     // All draws land in the only lit pixel.
     let light = lit(4, 1, 0.7);
-    for i in 0..1000_u16 {
-        let u = [f32::from(i) / 1000.0, f32::from(i * 37 % 1000) / 1000.0];
-        let incident = light.sample_incident(&BOUNDS, Vec3::ZERO, u);
-        assert!(incident.is_none_or(|incident| incident.pdf > 0.0));
-    }
+    let draws = (0..1000_u16).map(|i| [f32::from(i) / 1000.0, f32::from(i * 37 % 1000) / 1000.0]);
+    let found = draws.filter(|&u| light.sample_incident(&BOUNDS, Vec3::ZERO, u).is_some()).count();
+    // At its edge rounding may put one into the next pixel.
+    assert!(found >= 990, "{found}");
 }
 
 #[test]
@@ -212,7 +211,9 @@ fn images_that_are_no_light_are_refused() {
     let white = Spectrum::ONE;
     assert!(message(0, 0, vec![]).starts_with("has 0 pixels"));
     assert!(message(2, 2, vec![white; 3]).starts_with("has 3 pixels"));
-    assert!(message(usize::MAX, 2, vec![]).starts_with("has 0 pixels"));
+    assert!(message(usize::MAX, 2, vec![]).ends_with("x 2 pixels, expected at most 134217728 in all"));
+    // As it is read from a file, whose pixels are not kept then.
+    assert!(message(32768, 16384, vec![]).starts_with("has 32768 x 16384 pixels, expected at most"));
     assert_eq!(message(2, 1, vec![Spectrum::ZERO; 2]), "is black everywhere");
     let negative = Spectrum::new(0.0, -1.0, 0.0);
     assert!(message(2, 1, vec![white, negative]).starts_with("pixel (1, 0) is [0.0, -1.0, 0.0]"));
@@ -237,12 +238,13 @@ fn images_are_read_from_openexr() {
 fn a_receiver_inside_or_on_a_sphere_finds_its_density() {
     let sphere = Sphere::new(Vec3::ZERO, 1.0).unwrap();
     let light = area(sphere);
-    for receiver in [Vec3::X, Vec3::X * 1.0001, Vec3::X * 1.01, Vec3::X * 0.5, Vec3::X * 1e4] {
-        for i in 0..100_u16 {
-            let u = [f32::from(i) / 100.0, f32::from(i * 7 % 100) / 100.0];
-            if let Some(incident) = light.sample_incident(&BOUNDS, receiver, u) {
-                assert!(incident.pdf.is_finite() && incident.pdf > 0.0, "{receiver} {incident:?}");
-            }
-        }
+    // Very near the surface points are chosen on all of it, few of them on the side that is seen; from inside
+    // no front is.
+    let receivers = [(1.0, 0..=100), (1.0001, 0..=100), (1.01, 95..=100), (0.5, 0..=0), (1e4, 95..=100)];
+    for (x, expected) in receivers {
+        let draws = (0..100_u16).map(|i| [f32::from(i) / 100.0, f32::from(i * 7 % 100) / 100.0]);
+        let found: Vec<_> = draws.filter_map(|u| light.sample_incident(&BOUNDS, Vec3::X * x, u)).collect();
+        assert!(expected.contains(&found.len()), "{x}: {}", found.len());
+        assert!(found.iter().all(|incident| incident.pdf.is_finite() && incident.pdf > 0.0), "{x}");
     }
 }

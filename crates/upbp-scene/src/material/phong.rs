@@ -20,7 +20,7 @@ pub struct Phong {
     pub diffuse: Spectrum,
     /// Albedo of the lobe at normal incidence; at most `1 − diffuse` in every channel.
     pub specular: Spectrum,
-    /// Exponent `n` of the lobe, not negative.
+    /// Exponent `n` of the lobe, from 0 to about 1e8.
     pub exponent: f32,
 }
 
@@ -37,8 +37,9 @@ impl Phong {
 
     /// `cosⁿ α` between `to` and the mirror direction of `from`; zero on the far side, for n = 0 as well.
     fn lobe(&self, from: Vec3, to: Vec3) -> f32 {
-        let cosine = mirrored(from).dot(to);
-        if cosine > 0.0 { cosine.min(1.0).powf(self.exponent) } else { 0.0 }
+        // The difference tells small angles, whose cosines are rounded to 1.
+        let one_minus_cos = 0.5 * (mirrored(from) - to).length_squared();
+        if one_minus_cos < 1.0 { (self.exponent * f32::ln_1p(-one_minus_cos)).exp() } else { 0.0 }
     }
 }
 

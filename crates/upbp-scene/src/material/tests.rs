@@ -165,3 +165,19 @@ fn a_material_is_small() {
     // It is copied into every light vertex.
     assert!(size_of::<Material>() <= 36);
 }
+
+/// Directions are as dense as the lobe says where its cosines are rounded to 1.
+#[test]
+fn narrow_lobes_keep_their_shape() {
+    for exponent in [1.0, 1e3, 1e6, 1e8_f32] {
+        let phong = Phong { diffuse: Spectrum::ZERO, specular: Spectrum::ONE, exponent };
+        for (_, u) in points(1000) {
+            let sample = phong.sample(Vec3::Z, Walk::Camera, Interface::MATCHED, 0.5, u).unwrap();
+            // The cosine is (1 − u)^(1/(n + 1)).
+            let expected =
+                (exponent + 1.0) / std::f32::consts::TAU * (1.0 - u[0]).powf(exponent / (exponent + 1.0));
+            let ratio = sample.pdf / expected;
+            assert!((ratio - 1.0).abs() < 0.02, "{exponent} {u:?}: {ratio}");
+        }
+    }
+}

@@ -89,6 +89,14 @@ fn wrong_values_have_a_line_and_a_column() {
             "(version: 1, materials: { \"a\": Metal(alpha: 0, reflectance: 1) })",
             "1:45: expected a roughness from 0.001 to 1 (for less, use a smooth material), found 0",
         ),
+        (
+            "(version: 1, media: { \"a\": Homogeneous(phase: TwoLobes(g: (0.9, -0.3), share: 0.8, weight: 0.1)) })",
+            "1:84: Unexpected field named `weight` in `TwoLobes`, expected either `g` or `share` instead",
+        ),
+        (
+            "(version: 1, materials: { \"a\": Phong(diffuse: 0, specular: 1, exponent: 1e9) })",
+            "1:73: expected an exponent from 0 to 1e8 (for more, use a mirror), found 1e9",
+        ),
         ("(version: 1, film: (width: 0))", "1:28: expected a number of pixels from 1 to 65536, found 0"),
         ("(version: 1, film: (width: -3))", "1:29: Integer is out of bounds"),
         (
