@@ -26,8 +26,8 @@ const SQUARE: u32 = 1 << LEVELS;
 /// Times that a square is divided into four to get to a pixel.
 const LEVELS: u32 = 4;
 /// Draws that camera sub-paths of the pilot with one index have in common: the place on the film, that on the
-/// lens, the first distance in a medium, and the next event there, an emitter and a point on it. Without a
-/// medium, what is drawn next.
+/// lens, the first distance in a medium, and the next event there, an emitter and a point on it. In lanes the
+/// channel takes the place of that point; without a medium, it is what is drawn next.
 const COMMON_DRAWS: u32 = 5;
 
 /// The purpose of a stream.
