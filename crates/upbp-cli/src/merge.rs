@@ -60,9 +60,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     }
     let (merged, parts) = merge(&options.states, options.quiet)?;
     if options.image.output.is_some() && merged.film().is_empty() {
-        return Err(Failure::Input(
-            "there is no picture in the states yet: no iteration was begun".to_owned(),
-        ));
+        return Err(Failure::Input("there is no picture in the states yet: no pixel is rendered".to_owned()));
     }
     let report = merged.report();
     let mut failures = Vec::new();

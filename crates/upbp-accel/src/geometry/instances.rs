@@ -105,8 +105,8 @@ impl Model {
     }
 }
 
-/// What hears of intersections in scenes with copies. Not a type parameter: a call costs little beside the
-/// way into a copy, and the walks are compiled once instead of once per caller.
+/// A visitor of intersections in scenes with copies. Not a type parameter: a call costs little beside the way
+/// into a copy, and the walks are compiled once instead of once per caller.
 pub(super) type OnHit<'a> = &'a mut dyn FnMut(&Candidate) -> Visit;
 
 /// A walk of a ray through the copies of meshes, with the nearer boxes first or in any order.

@@ -29,8 +29,8 @@ pub(super) fn another(n: usize, index: usize, count: usize) -> usize {
     (index + 1 + (drawn as usize).min(others - 1)) % count
 }
 
-/// The offset of the n-th pair of pixels, and its weight over its probability. A ring at
-/// half the distance is twice as likely: there is more in common the nearer pixels are.
+/// The offset of the n-th pair of pixels, and its weight over its probability. A ring at half the
+/// distance is twice as likely: there is more in common the nearer pixels are.
 pub(super) fn offset(n: u32) -> ([i32; 2], f64) {
     let [u, v] = STEPS.map(|step| (f64::from(n) * step).fract());
     let all: f64 = (1..=FARTHEST).map(|ring| f64::from(ring).recip()).sum();
