@@ -28,8 +28,12 @@ pub(super) fn merge<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     };
     // The merge takes place at the camera vertex: its radii are those of all techniques there.
     let scale = f64::from(camera.scale);
+    let mut per_photon = kernel * plan.per_photon(technique);
     let (factor, merges) = match camera.interaction {
         Interaction::Surface(_) => {
+            // The photon may lie on another facet of a mesh, and is as rare there as light grazes that one:
+            // the shading-normal correction has to have its cosine.
+            per_photon *= (scattering.cos / light.interaction.cosine(light.towards_light)) as f32;
             let factor = mis.surface_factor(scale);
             (factor, O::Densities::of(technique, factor))
         }
@@ -42,7 +46,6 @@ pub(super) fn merge<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     };
     let before_light = light.mis.before(mis, scattering.rho_own, &camera.mis.shares);
     let before_camera = camera.mis.before(mis, scattering.rho_opposite, &light.mis.shares);
-    let per_photon = kernel * plan.per_photon(technique);
     out.record(&ObservedSample {
         technique,
         camera_depth: camera.depth,
