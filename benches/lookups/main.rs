@@ -337,9 +337,9 @@ fn ends(segment: &Segment) -> (Vec3, Vec3) {
     (a.min(b), a.max(b))
 }
 
-/// The tree of beams, with the splits that the renderer chooses.
+/// The tree of beams, with the splits that the renderer chooses for thin kernels.
 fn beam_tree(segments: Vec<(Segment, u32)>) -> SegmentTree<u32> {
-    let split = SplitParams::choose(&segments);
+    let split = SplitParams::choose(&segments, 1e-3);
     SegmentTree::build(segments, split)
 }
 
@@ -379,8 +379,7 @@ fn beam(criterion: &mut Criterion) {
                 })
             }),
             ("whole-tree", |segments, radius| {
-                let whole = SplitParams { pieces_per_segment: 1.0, ..SplitParams::default() };
-                let tree = SegmentTree::build(segments.to_vec(), whole);
+                let tree = SegmentTree::build(segments.to_vec(), SplitParams::WHOLE);
                 Box::new(move |ray| {
                     let mut count = 0;
                     tree.around_ray(ray, radius, |payload, _| visited(&mut count, payload));

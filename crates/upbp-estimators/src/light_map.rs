@@ -43,7 +43,8 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
             matches!(interaction, Interaction::Medium(_))
         });
         let segments: Vec<_> = beams.iter().enumerate().map(|(i, b)| (b.segment, i as u32)).collect();
-        let split = SplitParams::choose(&segments);
+        let radius = plan.radius_field.search_radius(plan.kernels.bb1d.radius());
+        let split = SplitParams::choose(&segments, radius);
         let beam_tree = SegmentTree::build(segments, split);
         Self { vertices, beams, surface, medium, beam_tree }
     }

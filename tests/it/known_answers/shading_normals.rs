@@ -1,4 +1,4 @@
-//! Irradiance on a smoothly shaded mesh: its facets have the cosines of the shading normal, whatever their own.
+//! Irradiance on a smoothly shaded mesh: facets have the cosines of the shading normal, whatever their own.
 
 use upbp_core::{LightPaths, Settings};
 use upbp_testing::analytic::{Table, narrow_camera, scene, settings};
@@ -6,8 +6,8 @@ use upbp_testing::render;
 
 #[test]
 fn facets_that_light_grazes_are_as_bright_as_the_next() {
-    // A ridge of two facets whose shading normals point up, under light that grazes the left one. Seen next to
-    // the edge, a half of the kernel's disc lies on either, and photons are fifteen times as dense on the
+    // A ridge of two facets whose shading normals point up, under light that grazes the left one. Seen at
+    // the edge, half of the disc of the kernel lies on either, and photons are fifteen times as dense on the
     // right one.
     let (slope, light) = (8.0_f64.to_radians(), 9.15_f64.to_radians());
     let (albedo, irradiance) = (0.8, 2.0);

@@ -18,7 +18,7 @@ use crate::simd::{WIDTH, Wide};
 /// which no comparison accepts.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Block {
+struct Block {
     origin: [[f32; WIDTH]; 3],
     direction: [[f32; WIDTH]; 3],
     start: [f32; WIDTH],
@@ -64,7 +64,7 @@ impl Block {
 /// leaves and blocks of the tree: a measure of its time, 0 if the radius is not positive.
 #[derive(Clone, Debug)]
 pub struct SegmentTree<P> {
-    pub(super) tree: PackedTree<Exact, Block>,
+    tree: PackedTree<Exact, Block>,
     payloads: Vec<P>,
     /// The greatest distance of an end from the origin of its segment, scene units.
     max_distance: f32,

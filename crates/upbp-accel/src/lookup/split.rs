@@ -3,8 +3,6 @@
 //! The box of a diagonal segment is mostly empty, and grows with the square of the length. Pieces have
 //! smaller boxes; each owns a half-open part of its segment, so that a hit belongs to exactly one piece.
 
-use glam::DVec3;
-
 use super::closest_approach::Segment;
 
 /// Limits of the split of long segments into pieces.
@@ -12,16 +10,17 @@ use super::closest_approach::Segment;
 pub struct SplitParams {
     /// Greatest number of pieces per segment, on average; values up to one leave segments whole.
     pub pieces_per_segment: f32,
-    /// Least length of a piece, as a fraction of the diagonal of the box around all segments.
-    pub shortest_piece: f32,
+}
+
+impl SplitParams {
+    /// Every segment is one piece.
+    pub const WHOLE: Self = Self { pieces_per_segment: 1.0 };
 }
 
 impl Default for SplitParams {
-    /// Four pieces per segment, none shorter than a ninth of the diagonal. Measured on ten thousand to a
-    /// million beams in all directions (`cargo bench --bench lookups`): more pieces cost more in memory
-    /// traffic than they save in tests.
+    /// Four pieces per segment: more cost more in memory traffic than they save in tests.
     fn default() -> Self {
-        Self { pieces_per_segment: 4.0, shortest_piece: 1.0 / 9.0 }
+        Self { pieces_per_segment: 4.0 }
     }
 }
 
@@ -41,18 +40,10 @@ pub(super) fn split<'a>(
 ) -> Vec<Piece> {
     let count = segments.len() as f64;
     let length = |segment: &Segment| f64::from(segment.end) - f64::from(segment.start);
-    let (mut total, mut min, mut max) = (0.0, DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for segment in segments.clone() {
-        total += length(segment);
-        for s in [segment.start, segment.end] {
-            let end = segment.origin.as_dvec3() + segment.direction.as_dvec3() * f64::from(s);
-            (min, max) = (min.min(end), max.max(end));
-        }
-    }
+    let total: f64 = segments.clone().map(length).sum();
     // Rounding up adds one piece per segment at most.
     let extra = (f64::from(params.pieces_per_segment) - 1.0).max(0.0) * count;
-    let shortest = (max - min).length() * f64::from(params.shortest_piece);
-    let target = (total / extra).max(shortest);
+    let target = total / extra;
 
     let mut pieces = Vec::with_capacity((total / target + count) as usize);
     for (index, segment) in segments.enumerate() {

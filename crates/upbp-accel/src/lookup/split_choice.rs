@@ -1,37 +1,34 @@
 //! The decision whether segments are worth splitting.
 
-use std::cell::Cell;
-
 use super::closest_approach::Segment;
-use super::query::Query;
-use super::region::ThickRay;
-use super::segment_tree::{Block, SegmentTree};
+use super::radius::SearchRadius;
+use super::segment_tree::SegmentTree;
 use super::split::SplitParams;
 use crate::ray::Ray;
-use crate::simd::Wide;
 
 impl SplitParams {
     /// Segments per sampled one.
-    const SAMPLED: usize = 16;
+    const SAMPLED: usize = 8;
 
-    /// Least and greatest size of the sample: fewer segments tell nothing, more tell nothing new.
-    const SAMPLE: (usize, usize) = (64, 1024);
+    /// Least and greatest size of the sample: fewer segments tell nothing, more take longer than they save.
+    const SAMPLE: (usize, usize) = (64, 4096);
 
     /// Rays that search the sample.
     const RAYS: usize = 128;
 
-    /// The default split, or none where searches look faster without: among beams through one place, whose
-    /// pieces would all lie there, and the more so the fewer beams there are.
+    /// The default split, or none where searches within `radius` look faster without: among beams through one
+    /// place, whose pieces would all lie there, and the more so the fewer beams there are, and among beams
+    /// that are not much longer than the radius.
     ///
-    /// Compares the boxes and blocks that rays between segments have to test in a sample with and without a
-    /// split. Depends on nothing but the segments.
+    /// Compares what rays between segments have to look at in a sample with and without a split. Depends on
+    /// nothing but the segments and the radius.
     #[must_use]
-    pub fn choose<P>(segments: &[(Segment, P)]) -> Self {
+    pub fn choose<P>(segments: &[(Segment, P)], radius: impl Into<SearchRadius>) -> Self {
+        let radius = radius.into();
         let (least, most) = Self::SAMPLE;
-        let (split, whole) = (Self::default(), Self { pieces_per_segment: 1.0, ..Self::default() });
         let count = (segments.len() / Self::SAMPLED).min(most);
         if count < least {
-            return split;
+            return Self::default();
         }
         // Scattered: segments may repeat with a period.
         let scattered =
@@ -49,35 +46,17 @@ impl SplitParams {
             Some(Ray::new(a, (b - a).try_normalize()?).with_range(f32::NEG_INFINITY, f32::INFINITY))
         };
         let rays: Vec<_> = (0..Self::RAYS).filter_map(ray).collect();
-        let effort = |params| SegmentTree::build(sample.clone(), params).effort(&rays) as f64;
-        // The gain by pieces grows about with this power of the number of segments; their memory asks for a
-        // gain of at least 1.45.
+        let effort = |params| {
+            let tree = SegmentTree::build(sample.clone(), params);
+            rays.iter().map(|ray| f64::from(tree.around_ray(ray, radius, |(), _| ()))).sum::<f64>()
+        };
+        // The gain by pieces grows about with this power of the number of segments; their memory asks for
+        // more than none.
         let more = (segments.len() as f64 / count as f64).powf(0.1);
-        if effort(whole) * more >= effort(split) * 1.45 { split } else { whole }
-    }
-}
-
-/// A query that finds nothing, but counts blocks.
-struct CountBlocks<'a>(&'a Cell<u64>);
-
-impl Query<Block> for CountBlocks<'_> {
-    type Found = ();
-
-    #[inline(always)]
-    fn test<W: Wide>(&self, _: W, _: &Block) -> (u32, ()) {
-        self.0.set(self.0.get() + 1);
-        (0, ())
-    }
-
-    #[inline(always)]
-    fn report(&mut self, _: &Block, (): &(), _: usize) {}
-}
-
-impl<P> SegmentTree<P> {
-    /// The number of nodes and leaves that rays without width have to look at, and twice that of blocks.
-    fn effort(&self, rays: &[Ray]) -> u64 {
-        let blocks = Cell::new(0);
-        let search = |ray| self.tree.search(ThickRay::new(ray, 0.0_f32, 0.0), CountBlocks(&blocks));
-        rays.iter().map(|ray| u64::from(search(ray))).sum::<u64>() + blocks.get()
+        if effort(Self::WHOLE) * more >= effort(Self::default()) * 1.25 {
+            Self::default()
+        } else {
+            Self::WHOLE
+        }
     }
 }

@@ -7,7 +7,7 @@ use upbp_accel::{ClosestApproach, Ray, Segment, SegmentTree, SplitParams, closes
 
 fn tree(segments: &[Segment], pieces_per_segment: f32) -> SegmentTree<u32> {
     let with_index = segments.iter().zip(0..).map(|(&segment, index)| (segment, index)).collect();
-    SegmentTree::build(with_index, SplitParams { pieces_per_segment, shortest_piece: 0.0 })
+    SegmentTree::build(with_index, SplitParams { pieces_per_segment })
 }
 
 fn bits(index: u32, hit: &ClosestApproach) -> (u32, [u32; 4]) {
@@ -194,20 +194,19 @@ fn beams_are_split_where_it_pays() {
         let mut beam = |origin| Segment { origin, direction: random.direction(), start: 0.0, end: 1.0 };
         origins.into_iter().map(|origin| (beam(lamp.unwrap_or(origin)), ())).collect()
     };
-    let whole = SplitParams { pieces_per_segment: 1.0, ..SplitParams::default() };
-    assert_eq!(SplitParams::choose(&beams(10_000, None)), SplitParams::default());
+    assert_eq!(SplitParams::choose(&beams(10_000, None), 1e-3), SplitParams::default());
     let mut from_one_point = beams(10_000, Some(Vec3::ONE));
-    assert_eq!(SplitParams::choose(&from_one_point), whole);
+    assert_eq!(SplitParams::choose(&from_one_point, 1e-3), SplitParams::WHOLE);
     // Those that will be dropped do not matter.
     for (beam, ()) in from_one_point.iter_mut().step_by(3) {
         beam.end = f32::NAN;
     }
-    assert_eq!(SplitParams::choose(&from_one_point), whole);
+    assert_eq!(SplitParams::choose(&from_one_point, 1e-3), SplitParams::WHOLE);
     for (beam, ()) in &mut from_one_point {
         beam.end = f32::NAN;
     }
-    assert_eq!(SplitParams::choose(&from_one_point), SplitParams::default());
-    assert_eq!(SplitParams::choose::<()>(&[]), SplitParams::default());
+    assert_eq!(SplitParams::choose(&from_one_point, 1e-3), SplitParams::default());
+    assert_eq!(SplitParams::choose::<()>(&[], 1e-3), SplitParams::default());
 }
 
 #[test]
