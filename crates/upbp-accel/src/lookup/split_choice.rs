@@ -21,7 +21,8 @@ impl SplitParams {
     /// that are not much longer than the radius.
     ///
     /// Compares what rays between segments have to look at in a sample with and without a split. Depends on
-    /// nothing but the segments and the radius.
+    /// nothing but the segments and the radius. The default, too, for fewer than 512 segments, and where rays
+    /// find nothing to look at: without a positive radius, or if all segments are at one point.
     #[must_use]
     pub fn choose<P>(segments: &[(Segment, P)], radius: impl Into<SearchRadius>) -> Self {
         let radius = radius.into();
@@ -50,8 +51,8 @@ impl SplitParams {
             let tree = SegmentTree::build(sample.clone(), params);
             rays.iter().map(|ray| f64::from(tree.around_ray(ray, radius, |(), _| ()))).sum::<f64>()
         };
-        // The gain by pieces grows about with this power of the number of segments; their memory asks for
-        // more than none.
+        // The part of the work that pieces save grows about with this power of the number of segments. A
+        // fifth, carried over from the sample to all, pays for their memory.
         let more = (segments.len() as f64 / count as f64).powf(0.1);
         if effort(Self::WHOLE) * more >= effort(Self::default()) * 1.25 {
             Self::default()

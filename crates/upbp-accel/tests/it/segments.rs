@@ -3,7 +3,9 @@
 use crate::support::{Random, SCALES_AND_PLACES, SPREADS, Spread, any_direction, any_ray, positions};
 use glam::Vec3;
 use proptest::prelude::*;
-use upbp_accel::{ClosestApproach, Ray, Segment, SegmentTree, SplitParams, closest_approach};
+use upbp_accel::{
+    ClosestApproach, GrowingRadius, Ray, SearchRadius, Segment, SegmentTree, SplitParams, closest_approach,
+};
 
 fn tree(segments: &[Segment], pieces_per_segment: f32) -> SegmentTree<u32> {
     let with_index = segments.iter().zip(0..).map(|(&segment, index)| (segment, index)).collect();
@@ -184,6 +186,8 @@ fn the_number_of_pieces_is_bounded() {
         assert!(tree.pieces() >= tree.len());
         assert!(tree.pieces() as f32 <= pieces * tree.len() as f32, "{} of {pieces}", tree.pieces());
     }
+    // Whatever is asked for.
+    assert!(tree(&segments, f32::INFINITY).pieces() <= 64 * segments.len());
 }
 
 #[test]
@@ -195,6 +199,17 @@ fn beams_are_split_where_it_pays() {
         origins.into_iter().map(|origin| (beam(lamp.unwrap_or(origin)), ())).collect()
     };
     assert_eq!(SplitParams::choose(&beams(10_000, None), 1e-3), SplitParams::default());
+    // Queries as wide as beams are long look at all pieces, those without a width at none.
+    let growing = |slope| GrowingRadius { centre: Vec3::ZERO, offset: 0.0, slope, least: 1e-3, most: 1.0 };
+    let everywhere = beams(10_000, None);
+    for (radius, expected) in [
+        (SearchRadius::Constant(1.0), SplitParams::WHOLE),
+        (SearchRadius::Constant(0.0), SplitParams::default()),
+        (SearchRadius::Growing(growing(1e-3)), SplitParams::default()),
+        (SearchRadius::Growing(growing(1.0)), SplitParams::WHOLE),
+    ] {
+        assert_eq!(SplitParams::choose(&everywhere, radius), expected, "{radius:?}");
+    }
     let mut from_one_point = beams(10_000, Some(Vec3::ONE));
     assert_eq!(SplitParams::choose(&from_one_point, 1e-3), SplitParams::WHOLE);
     // Those that will be dropped do not matter.

@@ -31,8 +31,8 @@ pub(super) fn merge<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let mut per_photon = kernel * plan.per_photon(technique);
     let (factor, merges) = match camera.interaction {
         Interaction::Surface(_) => {
-            // The photon may lie on another facet of a mesh, and is as rare there as light grazes that one:
-            // the shading-normal correction has to have its cosine.
+            // The value is corrected by the cosine of the camera vertex's facet, but photons are as dense as
+            // that of their own facet says, which may be another one of a mesh.
             per_photon *= (scattering.cos / light.interaction.cosine(light.towards_light)) as f32;
             let factor = mis.surface_factor(scale);
             (factor, O::Densities::of(technique, factor))

@@ -50,6 +50,10 @@ fn lies_on<B, D: Densities, L: Lanes>(
 ) -> bool {
     let Interaction::Surface(other) = &photon.interaction else { return false };
     let normal = surface.geometric_normal;
-    normal.dot(other.geometric_normal) > MIN_NORMAL_COSINE
+    // From another side of its facet, light is other light.
+    let from_same_side =
+        normal.dot(photon.towards_light) * other.geometric_normal.dot(photon.towards_light) > 0.0;
+    from_same_side
+        && normal.dot(other.geometric_normal) > MIN_NORMAL_COSINE
         && (photon.position - vertex.position).dot(normal).abs() < MAX_PLANE_DISTANCE * radius
 }
