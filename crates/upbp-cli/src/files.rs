@@ -76,7 +76,7 @@ impl Images {
 
     /// A hint for a PNG whose pixels are mostly too bright by more than a stop: a sky may be white.
     fn too_bright(&self, image: &Image, tones: ToneMapping) -> Option<String> {
-        /// Where the median of the brightest channels would lie, as a part of white.
+        /// The median of the brightest channels that the exposure aims at, as a part of white.
         const MIDDLE: f32 = 0.5;
         let darker = ToneMapping { exposure: tones.exposure - 1.0, ..tones };
         let is_white = |pixel: &&[f32; 3]| darker.apply(**pixel).iter().any(|value| *value >= 1.0);

@@ -92,7 +92,7 @@ fn bodies() -> impl Strategy<Value = Vec<Body>> {
     })
 }
 
-/// Where the grid is, and whether its boxes are meshes: they must be where they are turned.
+/// The place of the grid, and whether its boxes are meshes: they must be where they are turned.
 fn placement() -> impl Strategy<Value = (DAffine3, bool)> {
     let unit = || -1.0..1.0_f64;
     let offset = (unit(), unit(), unit()).prop_map(|(x, y, z)| 3.0 * DVec3::new(x, y, z));

@@ -53,7 +53,7 @@ fn with_scene<R: Send>(name: &str, side: u32, function: impl FnOnce(&ReadyScene)
     pool.install(|| function(&scene))
 }
 
-/// Where the plan is that a case is rendered by.
+/// The file of the plan that a case is rendered by.
 fn plan_path() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("memory_plan.ron")
 }

@@ -8,7 +8,8 @@ use super::closest_approach::Segment;
 /// The number of pieces that long segments are split into.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SplitParams {
-    /// Greatest number of pieces per segment, on average; values up to one leave segments whole.
+    /// Greatest number of pieces per segment, on average; values up to one leave segments whole. One segment
+    /// has at most 64.
     pub pieces_per_segment: f32,
 }
 

@@ -3,8 +3,8 @@
 //! Where a glass ball is a millionth of what the sun shines on, no light sub-path of a small run meets it. So
 //! the first guides lead to where camera sub-paths have been: to points of specular surfaces, behind which
 //! there may be a caustic, and to points that next events found lit. What the light sub-paths that follow
-//! these guides bring to the picture makes the next ones. A guide stays if one
-//! that half of the starts make leads to those of the other half.
+//! these guides bring to the picture makes the next ones. A guide stays if one that half of the starts make
+//! leads to those of the other half.
 
 use glam::Vec3;
 use upbp_estimators::observer::LightEnd;

@@ -28,12 +28,13 @@ pub(super) fn merge<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     };
     // The merge takes place at the camera vertex: its radii are those of all techniques there.
     let scale = f64::from(camera.scale);
-    let mut per_photon = kernel * plan.per_photon(technique);
+    let per_photon = kernel * plan.per_photon(technique);
+    let mut value = camera.throughput * light.throughput * scattering.value * per_photon;
     let (factor, merges) = match camera.interaction {
         Interaction::Surface(_) => {
             // The value is corrected by the cosine of the camera vertex's facet, but photons are as dense as
             // that of their own facet says, which may be another one of a mesh.
-            per_photon *= (scattering.cos / light.interaction.cosine(light.towards_light)) as f32;
+            value *= (scattering.cos / light.interaction.cosine(light.towards_light)) as f32;
             let factor = mis.surface_factor(scale);
             (factor, O::Densities::of(technique, factor))
         }
@@ -55,6 +56,6 @@ pub(super) fn merge<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             camera: (camera.position, camera.interaction),
         },
         weight: Weight::of_merge(factor, merges, before_light, before_camera),
-        value: camera.throughput * light.throughput * scattering.value * per_photon,
+        value,
     });
 }

@@ -50,7 +50,7 @@ fn lies_on<B, D: Densities, L: Lanes>(
 ) -> bool {
     let Interaction::Surface(other) = &photon.interaction else { return false };
     let normal = surface.geometric_normal;
-    // From another side of its facet, light is other light.
+    // Light that falls on the other side of the photon's facet does not reach this one.
     let from_same_side =
         normal.dot(photon.towards_light) * other.geometric_normal.dot(photon.towards_light) > 0.0;
     from_same_side

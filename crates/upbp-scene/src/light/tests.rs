@@ -199,9 +199,8 @@ fn an_image_is_oriented_as_documented() {
     // All draws land in the only lit pixel.
     let light = lit(4, 1, 0.7);
     let draws = (0..1000_u16).map(|i| [f32::from(i) / 1000.0, f32::from(i * 37 % 1000) / 1000.0]);
-    // One may be rounded into the next pixel.
     let found = draws.filter(|&u| light.sample_incident(&BOUNDS, Vec3::ZERO, u).is_some()).count();
-    // At its edge rounding may put one into the next pixel.
+    // At the pixel's edge rounding may put one into the next.
     assert!(found >= 999, "{found}");
 }
 
