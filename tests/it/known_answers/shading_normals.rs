@@ -11,7 +11,7 @@ const ALBEDO: f64 = 0.8;
 const IRRADIANCE: f64 = 2.0;
 
 /// Two facets with one edge whose shading normals point up. They fall off by so many degrees on both sides,
-/// light comes from the right at an elevation in degrees, and the camera looks down at a place beside the edge.
+/// light comes from the right at an elevation in degrees, and the camera looks down at a place near the edge.
 fn facets(fall: f64, elevation: f64, seen: f64) -> ReadyScene {
     let (low, width) = (-0.2 * fall.to_radians().tan(), 0.2);
     let (sin, cos) = elevation.to_radians().sin_cos();

@@ -177,7 +177,8 @@ impl<const IN_ORDER: bool> Visitor for EachInstance<'_, IN_ORDER> {
     }
 }
 
-/// Distance at which a ray enters a box that is wider by a margin, or starts in it; `None` if it does not before `t_max`.
+/// Distance at which a ray enters a box that is wider by a margin, or starts in it; `None` if it does not
+/// before `t_max`.
 #[inline(always)]
 fn entry(ray: &Ray, (min, max): (Vec3, Vec3), margin: f32, t_max: f32) -> Option<f32> {
     let margin = DVec3::splat(f64::from(margin));
