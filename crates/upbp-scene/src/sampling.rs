@@ -99,3 +99,84 @@ pub(crate) fn to_world(axis: Vec3, local: Vec3) -> Vec3 {
     let (tangent, bitangent) = orthonormal_basis(axis);
     (local.x * tangent + local.y * bitangent + local.z * axis).normalize()
 }
+
+/// Maps in double precision, for light that starts at one point or in one direction: random numbers of 24
+/// bits would light a small thing far away by the same few rays in all iterations.
+pub(crate) mod fine {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+
+    use glam::{DVec2, DVec3, Vec3};
+    use upbp_media::orthonormal_basis;
+
+    /// The numbers `u`, with digits beyond their last ones by numbers that have no other use.
+    pub(crate) fn numbers(u: [f32; 2], digits: [f32; 2]) -> [f64; 2] {
+        const LAST_BIT: f64 = 1.0 / 16_777_216.0;
+        [0, 1].map(|i| f64::from(u[i]) + f64::from(digits[i]) * LAST_BIT)
+    }
+
+    /// A point of the unit disc, as by [`disc`](super::disc).
+    pub(crate) fn disc(u: [f64; 2]) -> DVec2 {
+        let offset = DVec2::from(u) * 2.0 - DVec2::ONE;
+        if offset == DVec2::ZERO {
+            return DVec2::ZERO;
+        }
+        let (radius, phi) = if offset.x.abs() > offset.y.abs() {
+            (offset.x, FRAC_PI_4 * (offset.y / offset.x))
+        } else {
+            (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
+        };
+        radius * DVec2::from_angle(phi)
+    }
+
+    /// A direction, as by [`sphere`](super::sphere).
+    pub(crate) fn sphere(u: [f64; 2]) -> Vec3 {
+        cone_local(2.0, u).as_vec3().normalize()
+    }
+
+    /// A direction around `axis`, as by [`cone`](super::cone).
+    pub(crate) fn cone(axis: Vec3, height: f32, u: [f64; 2]) -> Vec3 {
+        let (tangent, bitangent) = orthonormal_basis(axis);
+        let local = cone_local(f64::from(height), u);
+        let [tangent, bitangent, axis] = [tangent, bitangent, axis].map(Vec3::as_dvec3);
+        (local.x * tangent + local.y * bitangent + local.z * axis).as_vec3().normalize()
+    }
+
+    fn cone_local(height: f64, u: [f64; 2]) -> DVec3 {
+        let below_pole = height * u[0];
+        let sin_theta = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
+        let (sin_phi, cos_phi) = (TAU * u[1]).sin_cos();
+        DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 1.0 - below_pole)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fine_maps_are_those_of_single_precision() {
+        const LAST: u32 = (1 << 24) - 1;
+        let middle = 1 << 23;
+        let mut numbers: Vec<u32> = (0..1024).map(|i| i * 16_381 % LAST).collect();
+        numbers.extend([0, 1, 2, 77, middle - 1, middle, middle + 1, LAST - 1, LAST]);
+        let number = |i: usize| numbers[i % numbers.len()] as f32 / 16_777_216.0;
+        let axis = Vec3::new(0.3, -0.8, 0.52).normalize();
+        for i in 0..20_000 {
+            let [u, digits] = [[number(i), number(i / 7 + 3 * i)], [number(5 * i), number(i / 3)]];
+            // At a pole the square root is taken of steps.
+            let bound = if u[0] > 1e-5 && u[0] < 1.0 - 1e-5 { 1e-4 } else { 2e-3 };
+            let precise = fine::numbers(u, digits);
+            assert!(
+                (0..2).all(|i| (0.0..6e-8).contains(&(precise[i] - f64::from(u[i])))),
+                "{u:?} {digits:?}"
+            );
+            assert!(precise.iter().all(|u| *u < 1.0), "{u:?} {digits:?}");
+            assert!(fine::disc(precise).as_vec2().distance(disc(u)) < 1e-6, "{u:?} {digits:?}");
+            assert!(fine::sphere(precise).distance(sphere(u)) < bound, "{u:?} {digits:?}");
+            assert!(
+                fine::cone(axis, 0.01, precise).distance(cone(axis, 0.01, u)) < bound,
+                "{u:?} {digits:?}"
+            );
+        }
+    }
+}

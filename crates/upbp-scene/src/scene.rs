@@ -88,6 +88,20 @@ impl ReadyScene {
         &self.surfaces[candidate.shape.0 as usize]
     }
 
+    /// Keeps the nearer of two candidates; at equal distance one that shines, as a lamp in the plane of a
+    /// ceiling, else that of the earlier shape: the order of the traversal does not matter. Returns the
+    /// distance of the other.
+    fn keep_nearer(&self, nearest: &mut Option<Candidate>, candidate: &Candidate) -> f32 {
+        let is_before = |a: &Candidate, b: &Candidate| {
+            let key = |c: &Candidate| (self.record(c).emitter.is_none(), c.shape, c.primitive);
+            a.t < b.t || a.t == b.t && key(a) <= key(b)
+        };
+        if nearest.as_ref().is_some_and(|nearest| is_before(nearest, candidate)) {
+            return candidate.t;
+        }
+        nearest.replace(*candidate).map_or(f32::INFINITY, |farther| farther.t)
+    }
+
     fn hit(&self, ray: &Ray, candidate: &Candidate) -> Hit<Material> {
         let point = self.geometry.surface(ray, candidate);
         let record = self.record(candidate);
@@ -114,16 +128,6 @@ fn sort(crossings: &mut [Crossing]) {
         let by_body = || a.interior.body.cmp(&b.interior.body);
         a.t.total_cmp(&b.t).then(b.entering.cmp(&a.entering)).then_with(by_body)
     });
-}
-
-/// Keeps the nearer of two candidates, at equal distance that of the earlier shape: the order of the
-/// traversal does not matter. Returns the distance of the other.
-fn keep_nearer(nearest: &mut Option<Candidate>, candidate: &Candidate) -> f32 {
-    let key = |candidate: &Candidate| (candidate.t, candidate.shape, candidate.primitive);
-    if nearest.as_ref().is_some_and(|nearest| key(nearest) <= key(candidate)) {
-        return candidate.t;
-    }
-    nearest.replace(*candidate).map_or(f32::INFINITY, |farther| farther.t)
 }
 
 impl Scene for ReadyScene {
@@ -175,11 +179,11 @@ impl Scene for ReadyScene {
                     Visit::Continue
                 }
                 (_, None) => {
-                    keep_nearer(&mut opaque, candidate);
+                    self.keep_nearer(&mut opaque, candidate);
                     Visit::ShrinkTo(candidate.t.next_up())
                 }
                 (Some(_), Some(_)) => {
-                    second = second.min(keep_nearer(&mut refracting, candidate));
+                    second = second.min(self.keep_nearer(&mut refracting, candidate));
                     // As far as something may coincide.
                     Visit::ShrinkTo(candidate.t + self.largest_width(ray, candidate.t))
                 }

@@ -233,7 +233,7 @@ impl TriangleMesh {
         let left = ((target - before) / (areas[triangle] - before)).clamp(0.0, 1.0);
         let root = left.sqrt();
         let (b, c) = (root * (1.0 - f64::from(u[1])), root * f64::from(u[1]));
-        (self.point(triangle as u32, b, c), self.geometric_normal(triangle as u32))
+        (self.point(triangle as u32, b, c).as_vec3(), self.geometric_normal(triangle as u32))
     }
 
     /// Whether every edge joins exactly two triangles that are wound alike.
@@ -282,16 +282,21 @@ impl TriangleMesh {
         self.bounds
     }
 
-    /// The point with weights `b` and `c` for the second and third corner, rounded once.
-    pub(super) fn point(&self, triangle: u32, b: f64, c: f64) -> Vec3 {
+    /// The point with weights `b` and `c` for the second and third corner.
+    pub(super) fn point(&self, triangle: u32, b: f64, c: f64) -> DVec3 {
         let [p, q, r] = self.corners(triangle).map(Vec3::as_dvec3);
         // From one corner along the edges: the point stays in the plane whatever the weights' errors.
-        (p + (q - p) * b + (r - p) * c).as_vec3()
+        p + (q - p) * b + (r - p) * c
+    }
+
+    /// A vector across the plane of a triangle, on the side of its unit normal.
+    pub(super) fn across(&self, triangle: u32) -> DVec3 {
+        cross(self.corners(triangle))
     }
 
     /// The unit normal of the plane of a triangle.
     pub(super) fn geometric_normal(&self, triangle: u32) -> Vec3 {
-        cross(self.corners(triangle)).normalize().as_vec3()
+        self.across(triangle).normalize().as_vec3()
     }
 
     /// The interpolated normal, in the hemisphere of `geometric`.

@@ -86,10 +86,18 @@ impl Quad {
     #[inline]
     #[must_use]
     pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        let position = self.origin.as_dvec3()
-            + self.edge_u.as_dvec3() * u[0] as f64
-            + self.edge_v.as_dvec3() * u[1] as f64;
-        (position.as_vec3(), self.normal)
+        (self.point(u).as_vec3(), self.normal)
+    }
+
+    /// The point with coordinates in `[0, 1]`.
+    #[inline]
+    pub(super) fn point(&self, [u, v]: [f32; 2]) -> DVec3 {
+        self.origin.as_dvec3() + self.edge_u.as_dvec3() * u as f64 + self.edge_v.as_dvec3() * v as f64
+    }
+
+    /// A vector across the quad, along its unit normal.
+    pub(super) fn across(&self) -> DVec3 {
+        self.plane.normal
     }
 
     /// The random numbers with which [`sample_area`](Self::sample_area) draws `point`, a point of the quad.

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::axis_box::AxisBox;
@@ -177,25 +177,38 @@ impl SceneGeometry {
     #[inline]
     #[must_use]
     pub fn surface(&self, ray: &Ray, candidate: &Candidate) -> SurfacePoint {
-        let along = ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(candidate.t);
+        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let along = origin + direction * f64::from(candidate.t);
+        // Where the ray meets the plane of a shape: a point by coordinates on the shape would be as coarse as
+        // the shape is wide, and one by the distance as coarse as the ray is long.
+        let in_plane = |point: DVec3, across: DVec3| {
+            let step = (point - along).dot(across) / direction.dot(across);
+            // No more than the rounding of the distance, but where that was cut to a shape that is seen
+            // edge-on.
+            let is_small = step.abs() <= 1e-6 * f64::from(candidate.t);
+            if is_small { along + direction * step } else { point }.as_vec3()
+        };
         match self.shape(candidate.shape) {
             Shape::Sphere(sphere) => {
-                let outwards = (along - sphere.centre().as_dvec3()).normalize();
+                let roots = sphere.intersect(ray.origin, ray.direction);
+                let point =
+                    roots.map_or(along, |roots| origin + direction * roots[candidate.primitive as usize]);
+                let outwards = (point - sphere.centre().as_dvec3()).normalize();
                 flat(sphere.on_surface(outwards), outwards.as_vec3())
             }
-            Shape::Quad(quad) => {
-                let (position, normal) = quad.sample_area(candidate.uv);
-                flat(position, normal)
-            }
+            Shape::Quad(quad) => flat(in_plane(quad.point(candidate.uv), quad.across()), quad.normal()),
             Shape::Box(axis_box) => {
-                let position = axis_box.on_face(candidate.primitive, along.as_vec3());
-                flat(position, AxisBox::face_normal(candidate.primitive))
+                let normal = AxisBox::face_normal(candidate.primitive);
+                let point =
+                    in_plane(axis_box.on_face(candidate.primitive, Vec3::ZERO).as_dvec3(), normal.as_dvec3());
+                flat(axis_box.on_face(candidate.primitive, point), normal)
             }
             Shape::Mesh(mesh) => {
                 let [b, c] = candidate.uv;
-                let geometric_normal = mesh.geometric_normal(candidate.primitive);
+                let across = mesh.across(candidate.primitive);
+                let geometric_normal = across.normalize().as_vec3();
                 SurfacePoint {
-                    position: mesh.point(candidate.primitive, b as f64, c as f64),
+                    position: in_plane(mesh.point(candidate.primitive, b as f64, c as f64), across),
                     geometric_normal,
                     shading_normal: mesh.shading_normal(candidate.primitive, b, c, geometric_normal),
                 }

@@ -102,18 +102,13 @@ impl Shape {
         }
     }
 
-    /// An upper bound of the enclosed volume, cubic scene units; zero for a shape that is not closed.
-    ///
-    /// Exact for spheres and boxes, the volume of the bounding box for meshes.
+    /// The enclosed volume, cubic scene units; zero for a shape that is not closed.
     #[must_use]
-    pub fn volume_bound(&self) -> f32 {
+    pub fn volume(&self) -> f32 {
         match self {
             Self::Sphere(sphere) => sphere.volume(),
             Self::Box(axis_box) => axis_box.volume(),
-            Self::Mesh(mesh) if mesh.is_closed() => {
-                let (min, max) = mesh.aabb();
-                (max - min).element_product()
-            }
+            Self::Mesh(mesh) if mesh.is_closed() => mesh.signed_volume().abs(),
             Self::Quad(_) | Self::Mesh(_) => 0.0,
         }
     }

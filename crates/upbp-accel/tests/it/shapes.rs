@@ -92,9 +92,9 @@ fn areas_and_bounds_are_right() {
     {
         assert!((area / expected - 1.0).abs() < 1e-5, "{area} instead of {expected}");
     }
-    let bounds: Vec<f32> = every_kind(scale, Vec3::ONE).iter().map(Shape::volume_bound).collect();
-    for (bound, expected) in bounds.iter().zip([33.510_323, 72.0, 0.0, 64.0, 0.0]) {
-        assert!((bound - expected).abs() < 1e-4, "{bound} instead of {expected}");
+    let volumes: Vec<f32> = every_kind(scale, Vec3::ONE).iter().map(Shape::volume).collect();
+    for (volume, expected) in volumes.iter().zip([33.510_323, 72.0, 0.0, 64.0, 0.0]) {
+        assert!((volume - expected).abs() < 1e-4, "{volume} instead of {expected}");
     }
     assert!((cube_mesh(Vec3::splat(9.0), Vec3::splat(11.0)).signed_volume() - 8.0).abs() < 1e-5);
 }
@@ -347,4 +347,54 @@ fn a_ray_that_leaves_a_surface_does_not_meet_it_again() {
         }
     }
     assert!(total > 100_000 && lost * 10_000 < total, "{lost} of {total}");
+}
+
+#[test]
+fn points_of_a_wide_ground_are_as_exact_as_their_coordinates() {
+    for tilt in [0.0, 0.25_f32] {
+        let (u, v) = (Vec3::new(0.0, 0.0, 2e7), Vec3::new(2e7, 2e7 * tilt, 0.0));
+        let corner = Vec3::new(-1e7, -1e7 * tilt, -1e7);
+        let quad = Quad::new(corner, u, v).unwrap();
+        let corners = vec![corner, corner + u, corner + u + v, corner + v];
+        let mesh = TriangleMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]], None).unwrap();
+        for shape in [Shape::from(quad), Shape::from(mesh)] {
+            let scene = SceneGeometry::build(vec![shape]).unwrap();
+            for i in 0..100 {
+                let towards = Vec3::new((i as f32).sin(), -0.3, (0.7 * i as f32).cos()).normalize();
+                let ray = Ray::new(Vec3::new(0.2, 1.0, -0.4), towards);
+                let found = scene.surface(&ray, &scene.closest(ray).unwrap()).position;
+                // The ground is y = tilt x.
+                let [origin, direction] = [ray.origin, ray.direction].map(Vec3::as_dvec3);
+                let tilt = f64::from(tilt);
+                let t = (origin.y - tilt * origin.x) / (tilt * direction.x - direction.y);
+                let expected = origin + t * direction;
+                let error = (found.as_dvec3() - expected).abs().max_element();
+                assert!(error <= 1.2e-7 * expected.abs().max_element(), "{found}, expected {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn points_are_as_exact_for_rays_from_far_away() {
+    let shapes: [Shape; 3] = [
+        Sphere::new(Vec3::new(0.1, 0.2, -0.3), 0.5).unwrap().into(),
+        AxisBox::new(Vec3::splat(-0.4), Vec3::new(0.3, 0.5, 0.6)).unwrap().into(),
+        cube_mesh(Vec3::splat(-0.4), Vec3::new(0.3, 0.5, 0.6)).into(),
+    ];
+    for shape in shapes {
+        let scene = SceneGeometry::build(vec![shape]).unwrap();
+        for i in 0..200 {
+            // Towards a point in them, from a million units.
+            let direction =
+                Vec3::new((i as f32).sin(), (1.7 * i as f32).sin(), (0.7 * i as f32).cos()).normalize();
+            let ray = Ray::new(Vec3::new(0.1, 0.11, 0.12) - direction * 1e6, direction);
+            let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+            // Rounding of the start may put the ray beside them.
+            let Some(candidate) = scene.closest(ray) else { continue };
+            let found = scene.surface(&ray, &candidate).position.as_dvec3();
+            let off_ray = (found - origin).cross(direction).length();
+            assert!(off_ray < 2e-7, "{found} is {off_ray} beside the ray");
+        }
+    }
 }

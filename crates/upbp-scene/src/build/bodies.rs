@@ -4,6 +4,8 @@
 //! the given priority, then the smaller volume above the larger, then the later in the file above the
 //! earlier. The second rule makes nested bodies work without any number: the inner one is smaller.
 
+use std::cmp::Reverse;
+
 use upbp_accel::{Shape, ShapeId, offset_origin};
 use upbp_media::{BodyId, Interior};
 
@@ -23,11 +25,8 @@ fn drafts_of_bodies(drafts: &[ShapeDraft]) -> Vec<BodyDraft<'_>> {
 /// Puts bodies in order, the lowest first: a body's [`Interior::priority`] is its place.
 pub(super) fn rank(drafts: &[ShapeDraft]) -> Vec<Body> {
     let mut drafts = drafts_of_bodies(drafts);
-    // Stable, so that the later in the file comes last.
-    drafts.sort_by(|(_, a, inside), (_, b, other)| {
-        let larger_first = || b.volume_bound().total_cmp(&a.volume_bound());
-        inside.priority.cmp(&other.priority).then_with(larger_first)
-    });
+    // Stable, so that the later in the file comes last. No volume is negative, so that its bits are in order.
+    drafts.sort_by_cached_key(|(_, shape, inside)| (inside.priority, Reverse(shape.volume().to_bits())));
     let mut bodies: Vec<Body> = Vec::with_capacity(drafts.len());
     for ((place, (index, shape, inside)), priority) in drafts.iter().enumerate().zip(0..) {
         let ior = inside.ior.unwrap_or_else(|| surrounding_ior(shape, &drafts[..place], &bodies));

@@ -43,7 +43,7 @@ impl Emitter for ConstantEnvironment {
         u: [f32; 2],
         u_direction: [f32; 2],
     ) -> Option<Emission> {
-        Some(self.along(sampling::sphere(u_direction)).emission(bounds, u))
+        Some(self.along(sampling::sphere(u_direction)).emission(bounds, u, [0.5; 2]))
     }
 
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {

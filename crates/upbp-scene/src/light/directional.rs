@@ -32,8 +32,8 @@ impl Emitter for DirectionalLight {
         disc_area(bounds) * self.irradiance.mean()
     }
 
-    fn sample_emission(&self, bounds: &BoundingSphere, u: [f32; 2], _: [f32; 2]) -> Option<Emission> {
-        Some(self.parallel().emission(bounds, u))
+    fn sample_emission(&self, bounds: &BoundingSphere, u: [f32; 2], digits: [f32; 2]) -> Option<Emission> {
+        Some(self.parallel().emission(bounds, u, digits))
     }
 
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, _: [f32; 2]) -> Option<Incident> {

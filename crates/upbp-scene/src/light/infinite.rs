@@ -19,8 +19,9 @@ pub(super) struct Parallel {
 }
 
 impl Parallel {
-    pub(super) fn emission(&self, bounds: &BoundingSphere, u: [f32; 2]) -> Emission {
-        let position = start_on_disc(bounds, self.direction, u);
+    /// Starts a ray; `digits` are random numbers that have no other use, if there are any.
+    pub(super) fn emission(&self, bounds: &BoundingSphere, u: [f32; 2], digits: [f32; 2]) -> Emission {
+        let position = start_on_disc(bounds, self.direction, u, digits);
         Emission {
             point: EmitterPoint { position, normal: self.direction },
             direction: self.direction,
@@ -67,12 +68,16 @@ pub(super) fn disc_area(bounds: &BoundingSphere) -> f32 {
 
 /// Draws the start of a ray in `direction`, uniformly over a disc in front of the scene that is as wide as
 /// its bounds.
-fn start_on_disc(bounds: &BoundingSphere, direction: Vec3, u: [f32; 2]) -> Vec3 {
-    let across = sampling::disc(u) * bounds.radius;
+fn start_on_disc(bounds: &BoundingSphere, direction: Vec3, u: [f32; 2], digits: [f32; 2]) -> Vec3 {
+    let radius = f64::from(bounds.radius);
+    let across = radius * sampling::fine::disc(sampling::fine::numbers(u, digits));
     let (tangent, bitangent) = orthonormal_basis(direction);
-    // Ten per cent outside, so that no rounding puts the start behind a surface on the bounds.
-    let back = direction * (1.1 * bounds.radius);
-    bounds.centre - back + tangent * across.x + bitangent * across.y
+    // Ten per cent outside, so that no rounding puts the start behind a surface on the bounds; and more or
+    // less, so that roundings differ from ray to ray instead of putting all on a grid.
+    let back = radius * (1.1 + 0.1 * f64::from(digits[0]));
+    let [centre, direction, tangent, bitangent] =
+        [bounds.centre, direction, tangent, bitangent].map(Vec3::as_dvec3);
+    (centre - back * direction + tangent * across.x + bitangent * across.y).as_vec3()
 }
 
 /// A point outside of the scene in the direction of an infinite light.

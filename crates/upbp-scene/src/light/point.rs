@@ -37,8 +37,13 @@ impl Emitter for PointLight {
         Some(EmitterBounds::all_around(self.position, self.position))
     }
 
-    fn sample_emission(&self, _: &BoundingSphere, _: [f32; 2], u_direction: [f32; 2]) -> Option<Emission> {
-        let direction = sampling::sphere(u_direction);
+    fn sample_emission(
+        &self,
+        _: &BoundingSphere,
+        digits: [f32; 2],
+        u_direction: [f32; 2],
+    ) -> Option<Emission> {
+        let direction = sampling::fine::sphere(sampling::fine::numbers(u_direction, digits));
         Some(Emission {
             point: EmitterPoint { position: self.position, normal: direction },
             direction,

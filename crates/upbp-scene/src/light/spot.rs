@@ -96,8 +96,14 @@ impl Emitter for SpotLight {
         })
     }
 
-    fn sample_emission(&self, _: &BoundingSphere, _: [f32; 2], u_direction: [f32; 2]) -> Option<Emission> {
-        let direction = sampling::cone(self.cone.axis, self.cone.height(), u_direction);
+    fn sample_emission(
+        &self,
+        _: &BoundingSphere,
+        digits: [f32; 2],
+        u_direction: [f32; 2],
+    ) -> Option<Emission> {
+        let u = sampling::fine::numbers(u_direction, digits);
+        let direction = sampling::fine::cone(self.cone.axis, self.cone.height(), u);
         let falloff = self.cone.falloff(direction);
         (falloff > 0.0).then(|| Emission {
             point: EmitterPoint { position: self.position, normal: direction },

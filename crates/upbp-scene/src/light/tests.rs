@@ -248,3 +248,28 @@ fn a_receiver_inside_or_on_a_sphere_finds_its_density() {
         assert!(found.iter().all(|incident| incident.pdf.is_finite() && incident.pdf > 0.0), "{x}");
     }
 }
+
+#[test]
+fn parallel_light_has_as_many_rays_as_random_numbers_have_digits() {
+    // Ten thousand units wide; on a thing of a hundredth of a unit only the last digits differ.
+    let bounds = BoundingSphere { centre: Vec3::ZERO, radius: 1e4 };
+    let cell = f64::from(bounds.radius) * 2.0 / 16_777_216.0;
+    for direction in [Vec3::NEG_Y, Vec3::new(1.0, -2.0, 0.5).normalize()] {
+        let light = DirectionalLight { direction, irradiance: Spectrum::splat(1.0) };
+        let place = |u: [f32; 2], digits: [f32; 2]| {
+            let emission = light.sample_emission(&bounds, u, digits).unwrap();
+            let start = emission.point.position.as_dvec3();
+            let direction = direction.as_dvec3();
+            start - start.dot(direction) * direction
+        };
+        let u = [0.5 + 37.0 / 16_777_216.0, 0.5 - 5.0 / 16_777_216.0];
+        let mut places: Vec<_> =
+            (0..1024).map(|i| i as f32 / 1024.0).map(|d| place(u, [d, 1.0 - d])).collect();
+        // Roundings of the start are as large as a cell, unless coordinates are small.
+        let most = if direction == Vec3::NEG_Y { 2.0 * cell } else { 6.0 * cell };
+        assert!(places.iter().all(|other| other.distance(places[0]) < most));
+        places.sort_by(|a, b| a.x.total_cmp(&b.x));
+        places.dedup();
+        assert!(places.len() > 500, "{} of 1024", places.len());
+    }
+}

@@ -6,7 +6,7 @@
 use upbp_accel::{Candidate, RAY_OFFSET, Ray, Shape, Visit};
 use upbp_estimators::scene::{Crossing, Hit};
 
-use super::{ReadyScene, keep_nearer, sort};
+use super::{ReadyScene, sort};
 use crate::material::Material;
 
 /// Distance between surfaces that coincide, relative to the largest coordinate of the place. Rays start
@@ -63,7 +63,7 @@ impl ReadyScene {
         self.geometry.for_each_hit(near, |candidate| {
             let record = self.record(candidate);
             let Some(interior) = record.interior else {
-                keep_nearer(&mut opaque, candidate);
+                self.keep_nearer(&mut opaque, candidate);
                 return Visit::Continue;
             };
             end = end.max(candidate.t);

@@ -334,3 +334,43 @@ fn bounds_hold_everything_finite() {
     let empty = self::scene(MEDIA, "");
     assert!(empty.bounds().radius > 0.0);
 }
+
+#[test]
+fn a_mesh_in_a_sphere_counts_whatever_its_box() {
+    // A cube that is turned: its box is larger than the sphere around it.
+    let scene = scene(
+        MEDIA,
+        "(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"glass\"),
+         (geometry: Box(min: (-0.5, -0.5, -0.5), max: (0.5, 0.5, 0.5),
+                        rotate: [(axis: (1, 1, 1), degrees: 60)]),
+          material: \"water\")",
+    );
+    let (min, max) = scene.geometry().shape(ShapeId(1)).aabb();
+    assert!((max - min).element_product() > 4.2, "{min} {max}");
+    assert_eq!(scene.stack_at(Vec3::ZERO).ior(), 1.33);
+}
+
+#[test]
+fn a_lamp_in_the_plane_of_a_ceiling_shines() {
+    for order in [0, 1] {
+        let mut shapes = [
+            "(geometry: Quad(origin: (1, -3, -3), edge_u: (0, 0, 6), edge_v: (0, 6, 0)), material: \"wall\"),",
+            "(geometry: Quad(origin: (1, -1, -1), edge_u: (0, 0, 2), edge_v: (0, 2, 0)), material: \"wall\",
+              emission: 1),",
+        ];
+        shapes.rotate_left(order);
+        let scene = scene(MEDIA, &shapes.concat());
+        assert!(scene.trace(&ALONG_X, &mut Vec::new()).unwrap().emitter.is_some());
+        let beside = Ray { origin: Vec3::new(-5.0, 2.0, 0.2), ..ALONG_X };
+        assert!(scene.trace(&beside, &mut Vec::new()).unwrap().emitter.is_none());
+    }
+}
+
+#[test]
+fn a_lamp_alone_in_fog_is_as_far_as_the_camera_sees_it() {
+    let text = "(version: 1, outside: \"fog\", media: {\"fog\": Homogeneous(sigma_s: 1)},
+        camera: Perspective(origin: (0, 1, 4), target: (0, 1, 0), fov_degrees: 40),
+        lights: [Point(position: (0.3, 1.7, 2), intensity: 1)])";
+    let bounds = ReadyScene::from_ron_str(text, "").unwrap().bounds();
+    assert!(bounds.radius > 1.0 && bounds.radius < 2.0, "{bounds:?}");
+}
