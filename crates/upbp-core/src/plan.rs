@@ -92,8 +92,8 @@ impl Plan {
             Err(format!("roulette: expected Off, or Below a number in (0, 1], found {:?}", self.roulette))
         } else if !(0.0..f64::INFINITY).contains(&self.vertices_per_light_path) {
             Err(format!("vertices_per_light_path: expected a number, found {}", self.vertices_per_light_path))
-        } else if !(lengths.iter().all(finite) && finite(&radii.floor) && radii.floor > 0.0) {
-            Err(format!("radii: expected lengths and a positive floor, found {radii:?}"))
+        } else if !(lengths.iter().all(finite) && finite(&radii.floor)) {
+            Err(format!("radii: expected lengths, found {radii:?}"))
         } else if !radii.field.is_valid(lengths.into_iter().fold(0.0, f32::max)) {
             Err(format!(
                 "radii.field: expected positive factors, of which the greatest is at most {} times the least, \

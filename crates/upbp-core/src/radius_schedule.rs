@@ -68,7 +68,8 @@ pub struct RadiusSchedule {
     pub field: RadiusField,
     /// Whether radii shrink at all.
     pub progressive: bool,
-    /// Radii do not fall below this, scene units: coordinates have no more digits.
+    /// Radii do not shrink below this, scene units: coordinates of what the picture shows have no more
+    /// digits.
     pub floor: f32,
 }
 
@@ -93,7 +94,7 @@ impl RadiusSchedule {
         }
         let shrink =
             if self.progressive { (1.0 + iteration).powf(-1.0 / (f64::from(dimension) + 4.0)) } else { 1.0 };
-        ((f64::from(first) * shrink) as f32).max(self.floor / self.field.least())
+        ((f64::from(first) * shrink) as f32).max(first.min(self.floor / self.field.least()))
     }
 
     /// The kernels of an iteration where `φ` is one.

@@ -1,5 +1,6 @@
 //! Techniques, counts, kernels and the weights' constants of one iteration.
 
+use glam::Vec3;
 use upbp_media::{Medium, MediumId};
 
 use crate::kernel::Kernel;
@@ -20,6 +21,13 @@ impl Kernels {
         let none = Kernel::NONE;
         Self { surf: none, pp3d: none, pb2d: none, bp2d: none, bb1d: none }
     };
+
+    /// The least radius of those that merge, scene units; infinite if none does.
+    fn least_radius(&self) -> f32 {
+        let Self { surf, pp3d, pb2d, bp2d, bb1d } = self;
+        let radii = [surf, pp3d, pb2d, bp2d, bb1d].map(Kernel::radius);
+        radii.into_iter().filter(|radius| *radius > 0.0).fold(f32::INFINITY, f32::min)
+    }
 }
 
 /// Path lengths that are rendered: the number of edges between the light and the camera, both ends included.
@@ -69,6 +77,9 @@ pub struct IterationPlan {
     pub periods: MergePeriods,
     /// Ranks of the pixels whose turn it is to make them, each below its period.
     pub turns: PerMerge<u32>,
+    /// Largest coordinate at which the least of the kernels is wide enough, where the scale of radii is one;
+    /// infinite without merges.
+    pub resolved: f32,
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
     /// Whether any of the techniques merges.
@@ -122,6 +133,11 @@ pub struct IterationChoices {
     /// The probability of each lane to be the hero of a sub-path, if walks run in lanes; they sum to one.
     pub lanes: Option<[f64; 3]>,
 }
+
+/// Least radius of a kernel, relative to the largest coordinate of its place: sixteen roundings. Positions
+/// lie on the grid of what single precision can tell apart, and a kernel that holds a few of its nodes finds
+/// all photons of one of them, or none.
+pub const LEAST_RADIUS: f32 = 16.0 * f32::EPSILON;
 
 /// `(r/ℓ)⁴` of a kernel in a medium, `w` of the factor `1 / (1 + w)` of its merges (`docs/theory.md`, section
 /// 6.5): the light changes within a mean free path of a boundary, and a wider kernel averages over that.
@@ -203,6 +219,7 @@ impl IterationPlan {
             kernels,
             // Weights without merges know no radius.
             radius_field: if merges { choices.radius_field } else { RadiusField::Uniform },
+            resolved: kernels.least_radius() / LEAST_RADIUS,
             periods,
             turns: periods.turns(choices.seed, choices.iteration),
             mis,
@@ -284,6 +301,14 @@ impl IterationPlan {
             None => true,
         };
         self.techniques.iter().filter(has_turn).collect()
+    }
+
+    /// The scale of kernel radii at a place; 0, which is no merges, where a kernel would be narrower than
+    /// [`LEAST_RADIUS`].
+    #[inline]
+    pub(crate) fn radius_scale(&self, position: Vec3) -> f32 {
+        let scale = self.radius_field.at(position);
+        if position.abs().max_element() <= scale * self.resolved { scale } else { 0.0 }
     }
 
     /// The merges that a path with this sine between its lines takes part in at a vertex, where kernel radii

@@ -67,11 +67,17 @@ impl Kernel {
         Self::new(Shape::ParabolicLine, radius)
     }
 
-    /// The kernel with `factor` times the radius.
+    /// The kernel with `factor` times the radius; [`NONE`](Self::NONE) with none of it.
     #[inline]
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
-        if factor == 1.0 || self.radius == 0.0 { *self } else { Self::new(self.shape, factor * self.radius) }
+        if factor == 1.0 || self.radius == 0.0 {
+            *self
+        } else if factor > 0.0 {
+            Self::new(self.shape, factor * self.radius)
+        } else {
+            Self::NONE
+        }
     }
 
     /// The kernel's radius, scene units.

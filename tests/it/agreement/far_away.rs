@@ -58,3 +58,48 @@ fn a_translation_by_a_million_radii_changes_no_bit() {
         assert!(render(&far, &settings, 2).1 == expected, "offset {offset}");
     }
 }
+
+/// A glass ball on a floor under a lamp, and whatever else.
+fn with(floor: f32, more: &str) -> ReadyScene {
+    let side = 2.0 * floor;
+    let text = format!(
+        "(version: 1, camera: Perspective(origin: (0, 1, 4), target: (0, 1, 0), fov_degrees: 40),
+        film: (width: 16, height: 16),
+        materials: {{\"grey\": Lambert(0.5), \"glass\": Dielectric(1.5)}},
+        shapes: [
+            (geometry: Quad(origin: (-{floor:?}, 0, -{floor:?}), edge_u: (0, 0, {side:?}), edge_v: ({side:?}, 0, 0)),
+             material: \"grey\"),
+            (geometry: Sphere(centre: (0, 1, 0), radius: 0.5), material: \"glass\"),
+            {more}
+        ],
+        lights: [Point(position: (0, 3, 0), intensity: 5)])"
+    );
+    ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+#[test]
+fn light_is_as_right_beside_things_that_are_far_away() {
+    let estimate = |scene: &ReadyScene, techniques: &str| {
+        let techniques = techniques.parse().expect("technique names");
+        let settings = Settings { techniques, light_paths: LightPaths::Count(4096), ..Settings::default() };
+        render(scene, &settings, 100).0
+    };
+    let ball = "(geometry: Sphere(centre: (1e9, 1, 0), radius: 0.4), material: \"glass\")";
+    // What is lit of the ground is near; on the wider ones photons lie where coordinates have no digits for
+    // kernels.
+    let (near, wide) = (with(4.0, ""), with(1e3, ""));
+    for (what, scene, expected) in [
+        ("a ball out of sight", with(4.0, ball), &near),
+        ("a wide ground", with(1e5, ""), &wide),
+        ("a wider ground", with(1e7, ""), &wide),
+    ] {
+        let expected = estimate(expected, "bpt");
+        for techniques in ["bpt", "bpt+surf"] {
+            let found = estimate(&scene, techniques);
+            let (sigmas, percent) = (found.sigmas(&expected), found.percent(&expected));
+            println!("{what}, {techniques}: {found:?}, {expected:?}, {sigmas:.2} sigma, {percent:+.2} %");
+            // Kernels blur the caustic over the edges of the picture.
+            assert!(sigmas.abs() < 4.5 || percent.abs() < 0.5, "{what}, {techniques}: {sigmas} sigma");
+        }
+    }
+}

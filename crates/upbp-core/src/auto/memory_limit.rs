@@ -44,11 +44,12 @@ impl Room {
         let total = budget(settings.memory);
         let film = Film::memory_bytes(rect, techniques, settings.features);
         let output = Film::output_bytes(rect, techniques, settings.features);
-        if film + output > total {
+        let needed = film.saturating_add(output);
+        if needed > total {
             return Err(RenderError::Memory {
                 width: rect.width,
                 height: rect.height,
-                needed: (film + output).div_ceil(1 << 20),
+                needed: needed.div_ceil(1 << 20),
                 budget: total >> 20,
             });
         }

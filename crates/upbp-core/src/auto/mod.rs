@@ -183,7 +183,7 @@ fn best_plan<S: Scene, L: Lanes>(
             if plan.is_some() || allowance.halt().now() || size.pixels <= Size::LEAST.pixels {
                 return plan.unwrap_or(candidates.usual());
             }
-            size.pixels /= 4;
+            size.pixels = (size.pixels / 4).max(Size::LEAST.pixels);
             continue;
         };
         let cost = Cost::of(&pilot).of_pilot();

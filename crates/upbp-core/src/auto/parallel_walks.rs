@@ -12,6 +12,33 @@ use crate::deadline::Halt;
 /// Sub-paths per piece of work.
 pub(super) const PIECE: usize = 16;
 
+/// A run before the first iteration. Each has random numbers of its own, so that none is judged by those that
+/// what it uses was made of.
+#[derive(Clone, Copy)]
+pub(super) enum PilotRun {
+    /// [Statistics](super::statistics).
+    Statistics,
+    /// A round of [measuring emitters](super::emitters).
+    Emitters { round: u32 },
+    /// A pass over [volumes that emit](super::volumes).
+    Volumes { pass: u32 },
+    /// A pass of a [pilot render](super::pilot_render).
+    Render { pass: u32 },
+}
+
+impl PilotRun {
+    /// The iteration that its random numbers are those of.
+    pub(super) const fn iteration(self) -> u64 {
+        let (run, part) = match self {
+            Self::Statistics => (0, 0),
+            Self::Emitters { round } => (1, round),
+            Self::Volumes { pass } => (2, pass),
+            Self::Render { pass } => (3, pass),
+        };
+        run << 32 | part as u64
+    }
+}
+
 /// Traces sub-paths by number, with an output for each piece of [`PIECE`] sub-paths. `None` if it was halted,
 /// or if `trace` breaks off by `false`.
 pub(super) fn in_pieces<B: Copy, L: Lanes, O: Default + Send>(

@@ -13,9 +13,9 @@ use upbp_estimators::{
 };
 use upbp_media::Lanes;
 
-use super::parallel_walks::{in_pieces, pixel};
+use super::parallel_walks::{PIECE, PilotRun, in_pieces, pixel};
 use super::photon_distances::{Nearest, Neighbours, median};
-use super::pixel_footprint;
+use super::pixel_footprint::{self, FAR};
 use super::roulette::usual_roulette;
 use crate::deadline::{Allowance, Clock, Halt};
 use crate::error::RenderError;
@@ -27,6 +27,8 @@ pub(crate) const FEW_LIGHT_PATHS: u32 = 1024;
 pub(crate) const LIGHT_PATHS: u32 = 8192;
 /// Light vertices that are enough: sub-paths are added until there are about as many.
 const ENOUGH_VERTICES: f64 = 24_576.0;
+/// Light vertices at most: fewer sub-paths than a few, if theirs are more.
+const MOST_VERTICES: f64 = 1e6;
 /// Light sub-paths for each one that leaves beams.
 pub(super) const PATHS_PER_BEAM_PATH: u32 = 8;
 /// Camera sub-paths.
@@ -57,6 +59,8 @@ pub(crate) struct Statistics {
     /// Width of a pixel where camera sub-paths first meet what scatters in more than one direction, median in
     /// scene units; 0 where nothing does.
     pub(crate) footprint: f32,
+    /// Largest coordinate of nearly all of these places, scene units.
+    pub(crate) largest_coordinate: f32,
     /// The field that kernel radii follow.
     pub(crate) radius_field: RadiusField,
     /// Photons on surfaces around points of camera sub-paths there; `None` where there is nothing.
@@ -118,7 +122,7 @@ fn nominal_plan<S: Scene>(
     let nominal = 1e-3 * scene.bounds.radius;
     let choices = IterationChoices {
         seed: settings.seed,
-        iteration: 0,
+        iteration: PilotRun::Statistics.iteration(),
         techniques: techniques.without(TechniqueSet::EMPTY.with(Technique::LightTracing)),
         light_paths,
         beam_paths: light_paths / PATHS_PER_BEAM_PATH,
@@ -155,7 +159,7 @@ struct LightPaths<B, L: Lanes> {
 }
 
 impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
-    /// Traces a few first, then at most `most` if their vertices are not [enough](ENOUGH_VERTICES).
+    /// Traces one, then a few, then at most `most` if their vertices are not [enough](ENOUGH_VERTICES).
     fn trace<S: Scene<Bsdf = B>>(
         scene: &PreparedScene<'_, S>,
         plan: impl Fn(u32) -> IterationPlan,
@@ -177,11 +181,18 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
             }
             Some(Self { paths, vertices, beams, seconds: clock.lap().as_secs_f64() / f64::from(paths) })
         };
-        let few = most.min(FEW_LIGHT_PATHS);
-        let first = trace(few)?;
-        let enough = ENOUGH_VERTICES / first.vertices.len().max(1) as f64 * f64::from(few);
-        let more = (enough as u32).min(most);
-        if more > few { trace(more) } else { Some(first) }
+        let mut found = trace(1)?;
+        // Walks that hardly ever end would fill all memory.
+        for (paths, vertices) in
+            [(PIECE as u32, MOST_VERTICES), (FEW_LIGHT_PATHS, MOST_VERTICES), (LIGHT_PATHS, ENOUGH_VERTICES)]
+        {
+            let enough = vertices / found.vertices.len().max(1) as f64 * f64::from(found.paths);
+            let paths = (enough as u32).min(paths).min(most);
+            if paths > found.paths {
+                found = trace(paths)?;
+            }
+        }
+        Some(found)
     }
 
     fn statistics(
@@ -214,6 +225,7 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
             light_path_seconds: self.seconds,
             vertices_per_path: self.vertices.len() as f64 / paths,
             footprint: median(&mut queries.footprints).unwrap_or(0.0),
+            largest_coordinate: largest_coordinate(&queries.first),
             radius_field: field,
             surface_per_path: per_path(plan.merges_by(Technique::Surf), &on_surfaces),
             medium_per_path: per_path(plan.stores_medium_photons(), &in_media),
@@ -254,6 +266,14 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
             }),
         }
     }
+}
+
+/// The largest coordinate of all places but the [farthest](FAR).
+fn largest_coordinate(places: &[Vec3]) -> f32 {
+    let mut largest: Vec<f32> = places.iter().map(|place| place.abs().max_element()).collect();
+    largest.sort_unstable_by(f32::total_cmp);
+    let last = largest.len().saturating_sub(1);
+    largest.get(((1.0 - FAR) * last as f32) as usize).copied().unwrap_or(0.0)
 }
 
 /// The vertices of the first light sub-paths, and how many sub-paths those are.

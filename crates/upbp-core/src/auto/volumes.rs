@@ -15,7 +15,7 @@ use upbp_estimators::{
 };
 
 use super::full_plan::{iteration_plan, plan_with};
-use super::parallel_walks::{in_pieces, pixel};
+use super::parallel_walks::{PilotRun, in_pieces, pixel};
 use super::statistics::Statistics;
 use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
@@ -64,7 +64,7 @@ pub(crate) fn choose<S: Scene>(
     let plan = iteration_plan(scene, settings, &plan, 0);
     let run = |part: f64, halt: &Halt<'_>| {
         let paths = (part * f64::from(PATHS)).ceil() as u32;
-        let passes = (1..=u64::from(PASSES)).map(|pass| look(scene, &plan, pass, paths, halt));
+        let passes = (0..PASSES).map(|pass| look(scene, &plan, pass, paths, halt));
         Some(Looks { paths, passes: passes.collect::<Option<_>>()? })
     };
     let looks = budget.part(PART).largest(run).ok_or(RenderError::Cancelled)?;
@@ -80,11 +80,11 @@ pub(crate) fn choose<S: Scene>(
 fn look<S: Scene>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
-    pass: u64,
+    pass: u32,
     paths: u32,
     halt: &Halt<'_>,
 ) -> Option<Vec<Seen>> {
-    let plan = &IterationPlan { iteration: pass, ..plan.clone() };
+    let plan = &IterationPlan { iteration: PilotRun::Volumes { pass }.iteration(), ..plan.clone() };
     let context = Context { prepared: scene, plan };
     let (width, height) = scene.scene.camera().resolution();
     let film = PixelRect { x: 0, y: 0, width, height };

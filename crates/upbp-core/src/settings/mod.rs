@@ -47,8 +47,8 @@ pub struct Settings {
     pub next_events: Option<f32>,
     /// Fewest edges of a path between light and camera, at least 1.
     pub min_length: u32,
-    /// Most edges of a path, at least `min_length`. Thick media that hardly absorb need many: walks that are
-    /// cut are counted in the report.
+    /// Most edges of a path, at least `min_length` and at most 1,048,576. Thick media that hardly absorb need
+    /// many: walks that are cut are counted in the report.
     pub max_length: u32,
     /// Russian roulette; `None` for the one that is chosen with the techniques, or usual for them.
     pub roulette: Option<Roulette>,
@@ -164,6 +164,9 @@ impl std::ops::Deref for CheckedSettings {
     }
 }
 
+/// Most edges of a path: a walk that nothing else ends takes about a second, and can be waited for.
+const MAX_LENGTH: u32 = 1 << 20;
+
 impl Settings {
     /// Checks every value.
     ///
@@ -201,6 +204,9 @@ impl Settings {
                 "at least min_length",
                 format!("{} with min_length {}", self.max_length, self.min_length),
             );
+        }
+        if self.max_length > MAX_LENGTH {
+            return refuse("max_length", "at most 1048576", self.max_length.to_string());
         }
         if self.memory == Some(0) {
             return refuse("memory", "at least 1 MiB", "0".into());
@@ -247,13 +253,14 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let cases: [(&str, &str); 9] = [
+        let cases: [(&str, &str); 10] = [
             ("(light_paths: Count(0))", "light_paths"),
             ("(beams: 0)", "beams"),
             ("(connections: 0)", "connections"),
             ("(next_events: 1001)", "next_events"),
             ("(min_length: 0)", "min_length"),
             ("(min_length: 5, max_length: 4)", "max_length"),
+            ("(max_length: 1048577)", "max_length"),
             ("(memory: 0)", "memory"),
             ("(radii: (pb2d: Absolute(0)))", "radii.pb2d"),
             ("(radii: (surf: Scene(inf)))", "radii.surf"),

@@ -135,7 +135,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             towards_camera: from,
             throughput,
             mis,
-            scale: plan.radius_field.at(arrived.position),
+            scale: plan.radius_scale(arrived.position),
             depth,
             interaction: arrived.interaction,
         };

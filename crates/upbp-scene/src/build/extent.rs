@@ -48,10 +48,10 @@ pub(super) fn bounds(drafts: &[ShapeDraft], lights: &[Light], camera: &Perspecti
         Light::Spot(light) => Some(light.position),
         _ => None,
     });
+    // Without shapes, how far the camera is from the lights tells best how large things are.
+    let positions = positions.chain(drafts.is_empty().then(|| camera.origin()));
     let boxes = shapes.clone().map(Shape::aabb).chain(positions.clone().map(|position| (position, position)));
-    // Without anything finite only the camera is somewhere.
-    let (min, max) =
-        boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((camera.origin(), camera.origin()));
+    let (min, max) = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default();
     let centre = 0.5 * min + 0.5 * max;
     let farthest_of_shapes = shapes.map(|shape| match shape {
         Shape::Sphere(sphere) => sphere.centre().distance(centre) + sphere.radius(),
@@ -62,9 +62,10 @@ pub(super) fn bounds(drafts: &[ShapeDraft], lights: &[Light], camera: &Perspecti
     });
     let radius =
         farthest_of_shapes.chain(positions.map(|position| position.distance(centre))).fold(0.0, f32::max);
-    // The roundings of the sum above; and a sphere must have an extent even around a single point.
-    let radius = radius * (1.0 + 1e-5) + 1e-6 * centre.abs().max_element();
-    BoundingSphere { centre, radius: if radius > 0.0 { radius } else { 1.0 } }
+    // A sphere must have an extent even around a single point.
+    let radius = if radius > 0.0 { radius } else { 1.0 };
+    // The roundings of the sums above.
+    BoundingSphere { centre, radius: radius * (1.0 + 1e-5) + 1e-6 * centre.abs().max_element() }
 }
 
 /// The largest coordinate of meshes that refract; zero if there are none.

@@ -21,7 +21,7 @@ use upbp_media::Lanes;
 
 use super::full_plan::iteration_plan;
 use super::memory_limit;
-use super::parallel_walks::{PIECE, in_pieces};
+use super::parallel_walks::{PIECE, PilotRun, in_pieces};
 use super::roulette;
 use crate::deadline::Halt;
 use crate::plan::Plan;
@@ -187,8 +187,7 @@ impl PilotRender {
         let room = Room::new(limits.samples);
         let mut passes = (0..PASSES)
             .map(|pass| {
-                // Not the iterations of other runs before the first iteration.
-                thinned.iteration = u64::from(pass) + 1;
+                thinned.iteration = PilotRun::Render { pass }.iteration();
                 Pass::trace::<S, L>(
                     &Context { prepared: scene, plan: &thinned },
                     &grid,
