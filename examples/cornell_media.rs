@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use upbp_core::{
-    Content, Metadata, Output, Settings, Stop, ToneMapping, check_outputs, check_writable, write_exr,
+    Content, Metadata, Output, Settings, Start, Stop, ToneMapping, check_outputs, check_writable, write_exr,
     write_png,
 };
 use upbp_scene::ReadyScene;
@@ -56,9 +56,11 @@ fn render(path: &Path, exr: &Path) -> Result<(), Box<dyn Error>> {
     check_writable(exr)?;
     check_writable(&png)?;
 
-    // Settings are checked once. By default the renderer chooses its techniques from small pilot renders.
+    // Settings are checked once. By default the renderer chooses its techniques from small pilot renders, for
+    // the time that there is.
     let settings = Settings::default();
-    let mut renderer = scene.renderer(settings.clone().validate()?)?;
+    let start = Start { stop: STOP, ..Start::default() };
+    let mut renderer = scene.start_renderer(settings.clone().validate()?, start)?;
     renderer.identify_scene(&path.display().to_string(), &scene.hash().to_le_bytes());
 
     let bar = ProgressBar::new(100).with_style(ProgressStyle::with_template("{elapsed} {wide_bar} {msg}")?);

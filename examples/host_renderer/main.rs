@@ -10,13 +10,15 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use upbp_core::{Metadata, Renderer, Settings, Stop, ToneMapping, write_exr, write_png};
+use upbp_core::{Metadata, Renderer, Settings, Start, Stop, ToneMapping, write_exr, write_png};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let room = scene::Room::new(256)?;
     let settings = Settings::default();
-    let mut renderer = Renderer::new(&room, settings.clone().validate()?)?;
     let stop = Stop { seconds: Some(20.0), ..Stop::default() };
+    // The choice of techniques has to know how much time there is.
+    let start = Start { stop, ..Start::default() };
+    let mut renderer = Renderer::start(&room, settings.clone().validate()?, start)?;
     renderer.render(&stop, |now| {
         println!("{:3.0} %, estimated relMSE {}", 100.0 * now.fraction, now.estimated_error);
         ControlFlow::Continue(())

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use upbp_core::scene::Scene;
-use upbp_core::{Renderer, Settings, Stop};
+use upbp_core::{Renderer, Settings, Start, Stop};
 use upbp_scene::ReadyScene;
 
 /// Folders that hold neither documents nor sources.
@@ -234,12 +234,15 @@ fn the_host_of_the_readme_is_compiled_below() {
 /// The lines that the README shows.
 #[expect(dead_code, reason = "compiled, not run: a host is needed")]
 fn host<S: Scene>(my_scene: &S, my_window: &Window) -> Result<(), Box<dyn std::error::Error>> {
-    let settings = Settings::default();
-    let mut renderer = Renderer::new(my_scene, settings.validate()?)?;
-    renderer.render(&Stop { seconds: Some(60.0), ..Stop::default() }, |progress| {
+    let stop = Stop { seconds: Some(60.0), ..Stop::default() };
+    let settings = Settings::default().validate()?;
+    let mut renderer = Renderer::start(my_scene, settings, Start { stop, ..Start::default() })?;
+    renderer.render(&stop, |progress| {
         my_window.show(&progress.film.image());
         ControlFlow::Continue(())
     });
+    // With what was done of the last iteration.
+    my_window.show(&renderer.film().image());
     Ok(())
 }
 

@@ -9,6 +9,8 @@ use upbp_core::{
     write_image, write_png, write_text,
 };
 
+use crate::exit::complain;
+
 /// Places of images: an OpenEXR image and a PNG beside it, or a PNG alone.
 #[derive(Clone, Debug)]
 pub(crate) struct Images {
@@ -58,7 +60,11 @@ impl Images {
         }
         let image = state.film().image();
         attempt(write_png(&self.png, &image, tones));
-        self.too_bright(&image, tones)
+        if image.pixels.iter().flatten().all(|value| *value == 0.0) {
+            // Nobody who renders in a script looks at every picture.
+            complain(BLACK);
+        }
+        self.too_bright(&image, tones).or_else(|| self.too_dark(&image, tones))
     }
 
     /// Writes an image, and another one to look at, each whatever became of the other.
@@ -74,19 +80,32 @@ impl Images {
         attempt(write_png(&self.png, shown, ToneMapping::default()));
     }
 
+    /// A hint for a PNG that is darker than a sixteenth of white, all but the brightest hundredth of it.
+    fn too_dark(&self, image: &Image, tones: ToneMapping) -> Option<String> {
+        const DARK: f32 = 1.0 / 16.0;
+        const BRIGHT: f32 = 0.99;
+        let mut brightest = brightest_channels(image);
+        let place = (BRIGHT * (brightest.len() - 1) as f32) as usize;
+        let (_, bright, _) = brightest.select_nth_unstable_by(place, f32::total_cmp);
+        let shown = *bright * tones.exposure.exp2();
+        if !(shown > 0.0 && shown < DARK) {
+            return None;
+        }
+        let (stops, png) = (stops_to(MIDDLE, *bright), self.png.display());
+        Some(format!("nearly all of {png} is dark: try --exposure {stops}"))
+    }
+
     /// A hint for a PNG whose pixels are mostly too bright by more than a stop: a sky may be white.
     fn too_bright(&self, image: &Image, tones: ToneMapping) -> Option<String> {
-        /// The median of the brightest channels that the exposure aims at, as a part of white.
-        const MIDDLE: f32 = 0.5;
         let darker = ToneMapping { exposure: tones.exposure - 1.0, ..tones };
         let is_white = |pixel: &&[f32; 3]| darker.apply(**pixel).iter().any(|value| *value >= 1.0);
         let (white, all) = (image.pixels.iter().filter(is_white).count(), image.pixels.len());
         if 2 * white <= all {
             return None;
         }
-        let mut brightest: Vec<_> = image.pixels.iter().map(|&[r, g, b]| r.max(g).max(b)).collect();
+        let mut brightest = brightest_channels(image);
         let (_, median, _) = brightest.select_nth_unstable_by(all / 2, f32::total_cmp);
-        let stops = (MIDDLE / *median).log2().round().clamp(-20.0, 20.0);
+        let stops = stops_to(MIDDLE, *median);
         let (percent, png) = (100 * white / all, self.png.display());
         Some(format!(
             "{percent} % of {png} are brighter than white by more than a stop: try --exposure {stops}"
@@ -98,6 +117,24 @@ impl Images {
         self.outputs().map(|file| file.path.display().to_string()).collect::<Vec<_>>().join(" and ")
     }
 }
+
+/// What the exposure of a hint makes of the median of a bright picture, and of the bright part of a dark one,
+/// as a part of white.
+const MIDDLE: f32 = 0.5;
+
+/// The brightest channel of each pixel.
+fn brightest_channels(image: &Image) -> Vec<f32> {
+    image.pixels.iter().map(|&[r, g, b]| r.max(g).max(b)).collect()
+}
+
+/// The exposure that shows a value as another one, within what the option takes.
+fn stops_to(shown: f32, value: f32) -> f32 {
+    (shown / value).log2().round().clamp(-20.0, 20.0)
+}
+
+const BLACK: &str = "warning: the picture is black. Does a lamp face away (a quad shines on the side of its normal), \
+                     or a spot? Is there an opaque shape around or before the lights or the camera? Is the medium \
+                     too thick?";
 
 /// Options for the look of a PNG.
 #[derive(Debug, Args)]

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 
-use exit::{Failure, finish, say_bytes};
+use exit::{Failure, finish, say, say_bytes};
 
 /// Renders light in participating media: photon points, photon beams and bidirectional paths in one estimate
 #[derive(Debug, Parser)]
@@ -33,8 +33,8 @@ enum Command {
     Render(Box<render::Options>),
     /// Check the scene and all options of a render, and render nothing
     ///
-    /// Takes the options of `upbp render` and reads and checks all that they name, so that a command line is
-    /// checked by replacing one word.
+    /// Takes the options of `upbp render`, reads and checks all that they name, and says how the scene would
+    /// be rendered: a command line is checked by replacing one word.
     #[command(after_long_help = render::names())]
     Check(Box<render::Options>),
     /// Put slices of a render together
@@ -48,6 +48,10 @@ enum Command {
     /// apart: pixel by pixel, and in blocks of 8 x 8 pixels, where noise is averaged out and what is too
     /// bright or too dark everywhere remains. Pixels that are not finite in either are left out and counted.
     Compare(compare::Options),
+    /// Print the scene format
+    ///
+    /// All that a scene file may hold, with examples and defaults, as Markdown: `upbp format | less`.
+    Format,
     /// Print the completions of a shell
     ///
     /// For bash: `upbp completions bash > ~/.local/share/bash-completion/completions/upbp`.
@@ -63,6 +67,7 @@ fn main() -> ExitCode {
         Command::Check(options) => render::check(options),
         Command::Merge(options) => merge::run(options),
         Command::Compare(options) => compare::run(options),
+        Command::Format => say(upbp_scene::scene_format().trim_end()),
         Command::Completions { shell } => completions(*shell),
     })
 }

@@ -16,7 +16,7 @@ pub(crate) struct Options {
     /// State files, of the same scene and settings
     #[arg(required = true, value_name = "STATE", value_hint = ValueHint::FilePath)]
     states: Vec<PathBuf>,
-    /// Where to save the merged state: it can be merged again, and resumed
+    /// File to save the merged state to: it can be merged again, and resumed
     #[arg(long, value_name = "FILE.state", value_parser = files::path(files::state), value_hint = ValueHint::FilePath)]
     state: Option<PathBuf>,
     /// Write the report as JSON

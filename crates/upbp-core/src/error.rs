@@ -55,7 +55,7 @@ pub enum RenderError {
     Settings(#[from] SettingsError),
     /// The scene.
     #[error(transparent)]
-    World(#[from] PrepareError),
+    Scene(#[from] PrepareError),
     /// The film, with what writing it takes, does not fit.
     #[error(
         "film of {width} x {height} pixels: its {needed} MiB exceed the {budget} MiB that the setting `memory` (--memory) allows; \

@@ -33,8 +33,8 @@ pub struct Report {
     pub deterministic: bool,
     /// Techniques, sample counts and first radii.
     pub plan: Plan,
-    /// Radii of the iteration with the largest index, where the scale of radii is one: `surf`, `pp3d`,
-    /// `pb2d`, `bp2d`, `bb1d`.
+    /// Radii of the iteration with the largest index, where the scale of radii is one, scene units: `surf`,
+    /// `pp3d`, `pb2d`, `bp2d`, `bb1d`.
     pub last_radii: [f32; 5],
     /// Counts over all iterations.
     pub counters: Counters,

@@ -26,6 +26,7 @@ const BLEND: f32 = 0.1;
 const TELLING_SAMPLES: f64 = 2.0;
 /// The tree keeps at least this part of the choice.
 const LEAST_TREE: f64 = 0.2;
+
 /// Light that a next event brought to a receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ClusterSample {

@@ -19,3 +19,10 @@ pub use self::error::{Problem, SceneError};
 pub use self::light::Light;
 pub use self::material::Material;
 pub use self::scene::ReadyScene;
+
+/// The scene format, as Markdown: what a scene file may hold, with examples and defaults.
+#[must_use]
+pub fn scene_format() -> &'static str {
+    let readme = include_str!("../README.md");
+    &readme[readme.find("## The scene format").unwrap_or(0)..]
+}

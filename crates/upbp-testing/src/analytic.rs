@@ -32,7 +32,7 @@ impl Case {
 
     /// Numbers among the inputs.
     pub fn inputs(&self, name: &str) -> Vec<f64> {
-        numbers(&self.inputs[name])
+        self.numbers(&self.inputs[name], name)
     }
 
     /// A word among the inputs.
@@ -48,12 +48,15 @@ impl Case {
 
     /// A list of what is expected.
     pub fn expected_list(&self, name: &str) -> Vec<f64> {
-        numbers(&self.expected[name])
+        self.numbers(&self.expected[name], name)
     }
-}
 
-fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().map(|list| list.iter().filter_map(Value::as_f64).collect()).unwrap_or_default()
+    fn numbers(&self, value: &Value, name: &str) -> Vec<f64> {
+        let numbers = || value.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<_>>>();
+        numbers()
+            .filter(|list| !list.is_empty())
+            .unwrap_or_else(|| panic!("{}: no numbers `{name}`", self.id))
+    }
 }
 
 /// The cases of a kind.

@@ -68,6 +68,20 @@ fn nothing_bad_reaches_the_film_and_nothing_panics() {
 }
 
 #[test]
+fn light_whose_place_on_the_film_is_no_number_falls_on_no_pixel() {
+    let mean = |fault| {
+        let scene = Hostile::new(fault);
+        let settings = Settings { techniques: "lt".parse().expect("a technique"), ..Settings::default() };
+        let mut renderer =
+            Renderer::new(&scene, settings.validate().expect("valid settings")).expect("starts");
+        renderer.iterate();
+        renderer.film().image().mean()
+    };
+    assert!(mean(F::None).iter().all(|mean| *mean > 0.0));
+    assert!(mean(F::CameraFilm).iter().all(|mean| *mean == 0.0));
+}
+
+#[test]
 fn scenes_without_bounds_or_power_are_refused() {
     for bad in [f32::NAN, f32::INFINITY, -1.0] {
         assert!(render(F::Bounds(bad), "all").unwrap_err().contains("bounds"), "{bad}");

@@ -217,8 +217,9 @@ fn what_nests_deeply_is_refused() {
     for depth in [10, 100, 1000, 100_000] {
         let phase = "Blend([(1, ".repeat(depth) + "Isotropic" + &")])".repeat(depth);
         let text = SCENES[2].replace("Rayleigh", &phase);
-        let _ = SceneDescription::from_ron(&text);
-        let _ = Settings::from_ron(&"(".repeat(depth));
-        let _ = SceneDescription::from_ron(&"[".repeat(depth));
+        let nested = SceneDescription::from_ron(&text);
+        assert!(depth < 1000 || nested.is_err(), "{depth}");
+        assert!(Settings::from_ron(&"(".repeat(depth)).is_err(), "{depth}");
+        assert!(SceneDescription::from_ron(&"[".repeat(depth)).is_err(), "{depth}");
     }
 }

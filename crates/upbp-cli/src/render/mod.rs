@@ -52,7 +52,8 @@ pub(crate) fn check(options: &Options) -> Result<(), Failure> {
         if options.messages.quiet {
             return Ok(());
         }
-        say(&format!("{}: no problems; {}", options.scene.display(), renderer.support()))
+        let (support, plan) = (renderer.support(), renderer.report().plan);
+        say(&format!("{}: no problems; {support}\nplan: {plan}", options.scene.display()))
     })
 }
 
@@ -136,6 +137,9 @@ fn load(options: &Options) -> Result<ReadyScene, SceneError> {
             description.film.width = width;
             description.film.height = height;
             description.film.crop = None;
+        }
+        if let Some(crop) = options.image.crop {
+            description.film.crop = Some(crop);
         }
     })
 }

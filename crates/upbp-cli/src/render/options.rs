@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueHint};
 use upbp_core::{Content, LightPaths, MAX_ITERATIONS, Output, Settings, Stop, Techniques, read_text};
-use upbp_scene::description::Count;
+use upbp_scene::description::{Count, Crop};
 
 use crate::exit;
 use crate::files::{self, Images, Look};
@@ -22,8 +22,7 @@ const THREADS_PER_CORE: usize = 16;
 pub(crate) struct Options {
     /// Scene file (RON)
     ///
-    /// The documentation of the crate upbp-scene describes the format (docs.rs/upbp-scene); scenes to
-    /// start from are in examples/scenes of the repository.
+    /// `upbp format` describes it; scenes to start from are in examples/scenes of the repository.
     #[arg(value_name = "SCENE.ron", value_hint = ValueHint::FilePath)]
     pub(crate) scene: PathBuf,
     #[command(flatten)]
@@ -50,6 +49,10 @@ pub(crate) struct ImageOptions {
     /// Size of the film in pixels, such as 640x360; drops the scene's crop [default: the scene's]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<[Count; 2]>,
+    /// Part of the film to render: column and row of its top left pixel, and its size, such as 100,50,64x36
+    /// [default: the scene's]
+    #[arg(long, value_name = "X,Y,WxH", value_parser = crop)]
+    pub(crate) crop: Option<Crop>,
     #[command(flatten)]
     pub(crate) look: Look,
 }
@@ -62,10 +65,13 @@ pub(crate) struct Limits {
     iterations: Option<Iterations>,
     /// Stop after this many seconds of rendering: preparation and resumed ones included, in the middle of an
     /// iteration if need be [default: 60 if no other limit is given]
-    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     time: Option<f64>,
     /// Stop when the estimated relMSE is below this with its whole interval, without the bias of kernels
-    #[arg(long, value_name = "E", value_parser = positive)]
+    ///
+    /// Errors are relative to the brightness of a pixel, but what is darker than about 0.1 counts less:
+    /// render a dark scene with brighter lights, or stop by time.
+    #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     target_error: Option<f64>,
 }
 
@@ -99,8 +105,7 @@ pub(crate) struct Method {
     /// Keep the first radii of kernels instead of shrinking them
     #[arg(long)]
     fixed_radius: bool,
-    /// Record albedo, normal, depth and the number of samples too, as layers of OUT.exr: for denoisers and
-    /// compositing
+    /// Record albedo, normal, depth and the number of samples too, as layers of OUT.exr: for denoisers
     #[arg(long)]
     features: bool,
     /// Seed of all random numbers [default: 0]
@@ -287,6 +292,16 @@ fn size(text: &str) -> Result<[Count; 2], String> {
         Some(&[width, height]) => Ok([width, height]),
         _ => Err("expected width x height in pixels, such as 640x360".to_owned()),
     }
+}
+
+fn crop(text: &str) -> Result<Crop, String> {
+    let parts = || {
+        let mut parts = text.splitn(3, ',');
+        let [x, y] = [parts.next()?.parse().ok()?, parts.next()?.parse().ok()?];
+        let [width, height] = size(parts.next()?).ok()?;
+        Some(Crop { x, y, width, height })
+    };
+    parts().ok_or_else(|| "expected column, row, width x height in pixels, such as 100,50,64x36".to_owned())
 }
 
 /// A range of iterations.

@@ -16,7 +16,7 @@ fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
 fn the_help_names_commands_groups_and_exit_codes() {
     let (code, help, _) = run(&["help"]);
     assert_eq!(code, Some(0));
-    for word in ["render", "check", "merge", "compare", "completions", "Exit codes:", "75", "130"] {
+    for word in ["render", "check", "merge", "compare", "format", "completions", "Exit codes:", "75", "130"] {
         assert!(help.contains(word), "{word}: {help}");
     }
     // The same without a word, as an error.

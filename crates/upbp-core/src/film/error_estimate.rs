@@ -17,14 +17,13 @@ use std::ops::AddAssign;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::image::DARK;
+
 /// Reach of the fine windows: 5 × 5 pixels, as few as still tell a spread from noise.
 const REACH: usize = 2;
 /// Side of the blocks of which 3 × 3 make a coarse window: with rare light, one sample in a hundred, its
 /// mean is of six.
 const BLOCK: usize = 8;
-/// Added to the square of the converged value, so that dark pixels do not count without bound: as
-/// [`crate::Image::relative_mse`].
-const DARK: f64 = 0.01;
 /// Part of the pixels that are the tail.
 const TAIL: f64 = 0.01;
 /// Tail index from which on a mean of errors does not converge.
@@ -167,6 +166,7 @@ impl fmt::Display for ErrorEstimate {
         let Self { relative_mse, low, high, .. } = self;
         match self.doubt {
             _ if relative_mse.is_infinite() => write!(f, "unknown"),
+            Some(Doubt::Black) => write!(f, "unknown: {}", Doubt::Black),
             None => write!(f, "{relative_mse:.2e}, between {low:.2e} and {high:.2e}"),
             Some(doubt) => write!(f, "{relative_mse:.2e} or more: {doubt}"),
         }

@@ -11,23 +11,30 @@ pub struct Image {
     pub pixels: Vec<[f32; 3]>,
 }
 
+/// Added to the square of the converged value in relative errors, so that dark pixels do not count without
+/// bound.
+pub(super) const DARK: f64 = 0.01;
+
 /// Sides in pixels of the square blocks whose errors count alike, where neighbours may share errors.
 pub(crate) const BLOCK_SIDES: [u32; 4] = [1, 4, 8, 16];
 
 impl Image {
-    /// relMSE against a reference of the same size: mean over pixels and channels of `(x − r)² / (r² +
-    /// 0.01)`.
+    /// relMSE against a reference: mean over pixels and channels of `(x − r)² / (r² + 0.01)`; NaN if it has
+    /// another size.
     #[must_use]
     pub fn relative_mse(&self, reference: &Self) -> f64 {
-        self.mean_of(reference, |x, r| (x - r).powi(2) / (r * r + 0.01))
+        self.mean_of(reference, |x, r| (x - r).powi(2) / (r * r + DARK))
     }
 
     /// relMSE of the means of square blocks of pixels times their pixels, mean over blocks of 1, 4, 8 and 16
     /// pixels a side: the relMSE where errors of pixels are independent, more where neighbours share them,
     /// as blotches and streaks do, less where they even out. Blocks that the picture cuts count by their
-    /// pixels.
+    /// pixels. NaN if the reference has another size.
     #[must_use]
     pub fn relative_mse_over_scales(&self, reference: &Self) -> f64 {
+        if !self.is_as_large_as(reference) {
+            return f64::NAN;
+        }
         self.difference_over(&BLOCK_SIDES, reference, reference)
     }
 
@@ -38,7 +45,7 @@ impl Image {
             let [x, y, r] = [self, other, reference].map(|image| image.block_sums(*side as usize));
             let term = |((x, y), r): ((&[f64; 4], &[f64; 4]), &[f64; 4])| {
                 let n = x[3];
-                let squares = (0..3).map(|c| ((x[c] - y[c]) / n).powi(2) / ((r[c] / n).powi(2) + 0.01));
+                let squares = (0..3).map(|c| ((x[c] - y[c]) / n).powi(2) / ((r[c] / n).powi(2) + DARK));
                 n * n * squares.sum::<f64>()
             };
             let sum: f64 = x.iter().zip(&y).zip(&r).map(term).sum();
@@ -61,7 +68,7 @@ impl Image {
         sums
     }
 
-    /// Root of the mean squared difference to a reference of the same size.
+    /// Root of the mean squared difference to a reference; NaN if it has another size.
     #[must_use]
     pub fn rmse(&self, reference: &Self) -> f64 {
         self.mean_of(reference, |x, r| (x - r).powi(2)).sqrt()
@@ -74,7 +81,14 @@ impl Image {
         std::array::from_fn(|c| self.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / n)
     }
 
+    fn is_as_large_as(&self, other: &Self) -> bool {
+        (self.width, self.height, self.pixels.len()) == (other.width, other.height, other.pixels.len())
+    }
+
     fn mean_of(&self, reference: &Self, term: impl Fn(f64, f64) -> f64) -> f64 {
+        if !self.is_as_large_as(reference) {
+            return f64::NAN;
+        }
         let pairs = self.pixels.iter().flatten().zip(reference.pixels.iter().flatten());
         let sum: f64 = pairs.map(|(x, r)| term(f64::from(*x), f64::from(*r))).sum();
         sum / (3 * self.pixels.len().max(1)) as f64

@@ -108,7 +108,7 @@ impl Film {
     pub fn memory_bytes(rect: PixelRect, techniques: TechniqueSet, features: bool) -> u64 {
         let pixel = (Self::layers_of(techniques).len() + 4) * size_of::<Sum3>() + size_of::<Pixel>();
         let features = if features { FeatureSums::BYTES + size_of::<Features>() } else { 0 };
-        pixels(rect) as u64 * (pixel + features) as u64
+        (pixels(rect) as u64).saturating_mul((pixel + features) as u64)
     }
 
     /// Bytes that writing a film as an image takes besides: the picture, the layers, two halves, variance and
@@ -116,7 +116,7 @@ impl Film {
     pub(crate) fn output_bytes(rect: PixelRect, techniques: TechniqueSet, features: bool) -> u64 {
         let images = Self::layers_of(techniques).len() + 6 + if features { 3 } else { 0 };
         let pixel = images * size_of::<[f32; 3]>();
-        pixels(rect) as u64 * pixel as u64
+        (pixels(rect) as u64).saturating_mul(pixel as u64)
     }
 
     /// The part of the camera's film that this is.

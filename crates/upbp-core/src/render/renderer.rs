@@ -46,7 +46,8 @@ const _: () = {
 };
 
 impl<'a> Renderer<'a> {
-    /// Looks at the scene and chooses a plan.
+    /// Looks at the scene and chooses a plan, in the time that this takes: with [`start`](Self::start) the
+    /// choice knows how much there is.
     ///
     /// The walks are compiled for the type of scene, where this is called.
     ///

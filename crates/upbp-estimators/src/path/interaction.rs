@@ -229,13 +229,13 @@ fn ends(goes_on: Decision, probability: f32) -> bool {
     probability < 1.0 && goes_on.uniform() >= probability
 }
 
-/// [`Bsdf::continuation`] as the walks take it.
+/// A host's probability to go on, as the walks take it.
 fn limited(continuation: f32, roulette: Roulette) -> f32 {
     if roulette.is_on() { continuation.clamp(0.0, 1.0) } else { 1.0 }
 }
 
 fn continuation<M: Medium>(medium: &M, position: Vec3, roulette: Roulette) -> f32 {
-    if roulette.is_on() { medium.continuation(position) } else { 1.0 }
+    limited(medium.continuation(position), roulette)
 }
 
 impl<B: Bsdf> SurfaceInteraction<B> {

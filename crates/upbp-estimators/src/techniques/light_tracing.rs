@@ -22,12 +22,17 @@ pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let scene = prepared.scene;
     let camera = scene.camera();
     let Some(view) = camera.connect(vertex.position, stream.pair()) else { return };
-    let pixel = [view.film.x.floor() as u32, view.film.y.floor() as u32];
     let crop = camera.crop();
-    let inside = |p: u32, start: u32, size: u32| p >= start && p - start < size;
-    if !inside(pixel[0], crop.x, crop.width) || !inside(pixel[1], crop.y, crop.height) {
+    let pixel = |place: f32, start: u32, size: u32| {
+        // A conversion of what is below zero, or no number, would be zero.
+        let pixel = (place >= 0.0).then_some(place as u32)?;
+        (start..start + size).contains(&pixel).then_some(pixel)
+    };
+    let (Some(column), Some(row)) =
+        (pixel(view.film.x, crop.x, crop.width), pixel(view.film.y, crop.y, crop.height))
+    else {
         return;
-    }
+    };
     let between = view.lens - vertex.position;
     let distance = between.length();
     let direction = between / distance;
@@ -55,7 +60,7 @@ pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         * density.transmittance
         * (ray_pdf / f64::from(plan.light_paths)) as f32;
     if let Some(value_weighted) = out.counters.accept(Technique::LightTracing, value, weight.value()) {
-        out.splats.push(Splat { pixel, value: value_weighted });
+        out.splats.push(Splat { pixel: [column, row], value: value_weighted });
         observer.sample(&ObservedSample {
             technique: Technique::LightTracing,
             camera_depth: 0,

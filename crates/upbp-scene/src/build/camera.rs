@@ -46,13 +46,13 @@ impl Builder<'_> {
         PerspectiveCamera::new(&view, width, height, crop)
     }
 
-    /// Reports a camera inside of an opaque shape, which would see nothing.
-    pub(super) fn check_camera_is_free(&mut self, origin: Vec3, drafts: &[Option<ShapeDraft>]) {
+    /// Reports a camera or a light inside of an opaque shape, which would see or light nothing.
+    pub(super) fn check_is_free(&mut self, item: &str, position: Vec3, drafts: &[Option<ShapeDraft>]) {
         for (index, draft) in drafts.iter().enumerate() {
             let Some(draft) = draft else { continue };
-            if draft.body.is_none() && draft.shape.contains(origin) == Some(true) {
+            if draft.body.is_none() && draft.shape.contains(position) == Some(true) {
                 let message = format!("lies inside of the opaque {}", self.shape_item(index));
-                self.problem("camera", message);
+                self.problem(item, message);
             }
         }
     }

@@ -8,6 +8,7 @@ use glam::Vec3;
 use upbp_media::{Homogeneous, Medium as _, MediumId};
 
 use super::builder::Builder;
+use super::surfaces::ShapeDraft;
 use crate::description::Light as Description;
 use crate::light::{
     ConstantEnvironment, DirectionalLight, EnvironmentImage, ImageEnvironment, Light, PointLight, SpotCone,
@@ -65,7 +66,10 @@ impl Builder<'_> {
                     (Some(target), None) => unit(target.get() - position.get())
                         .ok_or("`position` and `target` are the same point")?,
                     (None, Some(direction)) => unit(direction.get()).ok_or("`direction` is zero")?,
-                    _ => return Err("needs either `target` or `direction`".into()),
+                    (Some(_), Some(_)) => {
+                        return Err("has both `target` and `direction`: expected one".into());
+                    }
+                    (None, None) => return Err("needs either `target` or `direction`".into()),
                 };
                 let cutoff = cutoff_degrees.get();
                 let beam = beam_degrees.map_or(cutoff, crate::description::BeamAngle::get);
@@ -88,6 +92,15 @@ impl Builder<'_> {
                 Light::Image(ImageEnvironment::new(Arc::new(image), scale.get(), rotation))
             }
         })
+    }
+
+    /// Reports lights inside of an opaque shape, which would light nothing.
+    pub(super) fn check_lights_are_free(&mut self, drafts: &[Option<ShapeDraft>]) {
+        for (index, light) in self.description.lights.iter().enumerate() {
+            if let Description::Point { position, .. } | Description::Spot { position, .. } = light {
+                self.check_is_free(&item(index, light), position.get(), drafts);
+            }
+        }
     }
 
     fn environment_image(&mut self, file: &str) -> Result<EnvironmentImage, String> {

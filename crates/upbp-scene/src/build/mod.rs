@@ -108,10 +108,10 @@ impl Builder<'_> {
         if let Some(media) = &media {
             self.check_shines(media, &medium_ids);
         }
-
         if let Some(camera) = &camera {
-            self.check_camera_is_free(camera.origin(), &drafts);
+            self.check_is_free("camera", camera.origin(), &drafts);
         }
+        self.check_lights_are_free(&drafts);
         if !self.problems.is_empty() {
             return None;
         }

@@ -66,10 +66,18 @@ fn example(of: &str) -> Option<&'static str> {
 
 /// The message about an error of the parser, with the right spelling.
 pub(super) fn message(text: &str, error: &SpannedError) -> String {
+    let start = error.span.start;
+    let line: usize = text.split_inclusive('\n').take(start.line.saturating_sub(1)).map(str::len).sum();
+    let column: usize = text[line..].chars().take(start.col.saturating_sub(1)).map(char::len_utf8).sum();
+    let end = line + column;
     let (what, name_expected) = match &error.code {
         // The name that the parser's language has for a number.
         Error::InvalidValueForType { expected, found } if expected == "f32" => {
             return format!("Expected a number but found {found} instead");
+        }
+        Error::MissingStructField { field, outer } => {
+            let of = outer.as_ref().map_or_else(String::new, |outer| format!(" of `{outer}`"));
+            return format!("Missing field `{field}`{of}");
         }
         // These say what was expected.
         Error::Message(_)
@@ -77,17 +85,19 @@ pub(super) fn message(text: &str, error: &SpannedError) -> String {
         | Error::ExpectedDifferentLength { .. }
         | Error::NoSuchEnumVariant { .. }
         | Error::NoSuchStructField { .. }
-        | Error::MissingStructField { .. }
         | Error::DuplicateStructField { .. } => return error.code.to_string(),
         Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) | Error::ExpectedIdentifier => {
             ("Expected a name".to_owned(), true)
         }
+        Error::ExpectedString => ("Expected text in quotes".to_owned(), false),
+        Error::ExpectedFloat => ("Expected a number".to_owned(), false),
+        Error::ExpectedInteger => ("Expected a whole number".to_owned(), false),
+        Error::IntegerOutOfBounds => return "The whole number is too large or negative".to_owned(),
+        // The parser takes the digits before the point for the number.
+        Error::ExpectedComma if text[end..].starts_with('.') => return "Expected a whole number".to_owned(),
         code => (code.to_string(), false),
     };
-    let start = error.span.start;
-    let line: usize = text.split_inclusive('\n').take(start.line.saturating_sub(1)).map(str::len).sum();
-    let column: usize = text[line..].chars().take(start.col.saturating_sub(1)).map(char::len_utf8).sum();
-    what + &hint(text, line + column, name_expected)
+    what + &hint(text, end, name_expected)
 }
 
 fn hint(text: &str, end: usize, name_expected: bool) -> String {
@@ -402,7 +412,11 @@ mod tests {
                 "6: Expected a name, as in `Quad(origin: (-1, 0, -1), edge_u: (0, 0, 2), edge_v: (2, 0, 0))`",
             ),
             ("geometry", r#"Mesh("a\"(.obj")"#, r#"6: Expected a name, as in `Mesh(file: "bunny.obj")`"#),
-            ("geometry", "Mesh(file: a.obj)", r#"11: Expected string, as in `Mesh(file: "bunny.obj")`"#),
+            (
+                "geometry",
+                "Mesh(file: a.obj)",
+                r#"11: Expected text in quotes, as in `Mesh(file: "bunny.obj")`"#,
+            ),
             (
                 "geometry",
                 r#"Mesh(file: "a.obj", scale: 1e30)"#,

@@ -45,12 +45,6 @@ pub enum Material {
 }
 
 impl Material {
-    /// Whether light passes through, so that the material may bound a body.
-    #[must_use]
-    pub const fn is_refracting(&self) -> bool {
-        matches!(self, Self::Dielectric(_) | Self::RoughDielectric(_))
-    }
-
     /// Whether the material scatters light into single directions only.
     #[must_use]
     pub const fn is_specular(&self) -> bool {

@@ -28,7 +28,7 @@ fn problem(rest: &str) -> String {
 fn wrong_values_have_a_line_and_a_column() {
     let cases = [
         ("(version: 2)", "1:11: expected version 1 of the format, found 2"),
-        ("(version: 1)", "1:12: Unexpected missing field named `camera` in `Scene`"),
+        ("(version: 1)", "1:12: Missing field `camera` of `Scene`"),
         (
             "(version: 1,\n  came: 1)",
             "2:3: Unexpected field named `came` in `Scene`, expected one of `version`, `camera`, `film`, `outside`, `media`, `materials`, `shapes`, or `lights` instead",
@@ -71,7 +71,7 @@ fn wrong_values_have_a_line_and_a_column() {
         ),
         (
             "(version: 1, materials: { \"a\": Lambert([0.5, 0.5, 0.5]) })",
-            "1:58: Unexpected missing field named `camera` in `Scene`",
+            "1:58: Missing field `camera` of `Scene`",
         ),
         (
             "(version: 1, materials: { \"a\": Lambert(\"white\") })",
@@ -98,7 +98,7 @@ fn wrong_values_have_a_line_and_a_column() {
             "1:73: expected an exponent from 0 to 1e8 (for more, use a mirror), found 1e9",
         ),
         ("(version: 1, film: (width: 0))", "1:28: expected a number of pixels from 1 to 65536, found 0"),
-        ("(version: 1, film: (width: -3))", "1:29: Integer is out of bounds"),
+        ("(version: 1, film: (width: -3))", "1:29: The whole number is too large or negative"),
         (
             "(version: 1,\n\ncamera: Perspective(origin: (0, 0), target: (0, 0, 0), fov_degrees: 40))",
             "3:34: Expected three numbers in parentheses (x, y, z) but found 2 elements instead",
@@ -124,7 +124,7 @@ fn wrong_values_have_a_line_and_a_column() {
             "1:79: expected an angle from 0.01 to 180 degrees, found 200",
         ),
         ("", "1:1: Expected opening `(` for struct `Scene`"),
-        ("(version: 1) x", "1:12: Unexpected missing field named `camera` in `Scene`"),
+        ("(version: 1) x", "1:12: Missing field `camera` of `Scene`"),
     ];
     for (text, expected) in cases {
         assert_eq!(error(text), expected, "{text}");
@@ -188,7 +188,9 @@ fn problems_of_shapes_name_the_shape() {
         ),
         (
             r#"name: "a", geometry: Box(min: (-5, -5, -5), max: (5, 5, 5)), material: "white""#,
-            "camera: lies inside of the opaque shape `a`",
+            "2 problems in the scene
+  camera: lies inside of the opaque shape `a`
+  light 1 (Point): lies inside of the opaque shape `a`",
         ),
     ];
     for (shape, expected) in cases {
@@ -288,6 +290,10 @@ fn problems_of_lights_materials_and_film_name_them() {
         (
             "Spot(position: (0, 0, 0), intensity: 1, cutoff_degrees: 20)",
             "needs either `target` or `direction`",
+        ),
+        (
+            "Spot(position: (0, 0, 0), target: (1, 0, 0), direction: (1, 0, 0), intensity: 1, cutoff_degrees: 20)",
+            "has both `target` and `direction`: expected one",
         ),
         (
             "Spot(position: (0, 0, 0), target: (0, 0, 0), intensity: 1, cutoff_degrees: 20)",
