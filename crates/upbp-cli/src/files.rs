@@ -132,6 +132,7 @@ fn stops_to(shown: f32, value: f32) -> f32 {
     (shown / value).log2().round().clamp(-20.0, 20.0)
 }
 
+/// Said of a picture without any light.
 const BLACK: &str = "warning: the picture is black. Does a lamp face away (a quad shines on the side of its normal), \
                      or a spot? Is there an opaque shape around or before the lights or the camera? Is the medium \
                      too thick?";

@@ -125,7 +125,7 @@ fn nominal_plan<S: Scene>(
         iteration: PilotRun::Statistics.iteration(),
         techniques: techniques.without(TechniqueSet::EMPTY.with(Technique::LightTracing)),
         light_paths,
-        beam_paths: light_paths / PATHS_PER_BEAM_PATH,
+        beam_paths: (light_paths / PATHS_PER_BEAM_PATH).max(1),
         connections: 1.0,
         next_events: 1.0,
         camera_factor: 1.0,

@@ -37,9 +37,21 @@ pub(super) fn rank(drafts: &[ShapeDraft]) -> Vec<Body> {
 }
 
 impl Builder<'_> {
-    /// Reports bodies that lie all inside of one with a higher priority: they would be nowhere.
+    /// Reports bodies that lie all inside of an opaque shape, or of a body with a higher priority: they would
+    /// be nowhere.
     pub(super) fn check_bodies_count(&mut self, drafts: &[ShapeDraft]) {
         let mut bodies = drafts_of_bodies(drafts);
+        for (index, shape, _) in &bodies {
+            let is_around =
+                |(_, draft): &(usize, &ShapeDraft)| draft.body.is_none() && is_inside(shape, &draft.shape);
+            if let Some((outer, _)) = drafts.iter().enumerate().find(is_around) {
+                let outer = self.shape_item(outer);
+                let message = format!(
+                    "lies inside of the opaque {outer}: it would be nowhere (a basin is made of quads)"
+                );
+                self.problem(self.shape_item(*index), message);
+            }
+        }
         bodies.sort_by_key(|(.., inside)| inside.priority);
         for (index, shape, Inside { priority, .. }) in &bodies {
             let mut higher = bodies.iter().filter(|(.., other)| other.priority > *priority);

@@ -1,18 +1,31 @@
 //! Media and their phase functions.
 
-use upbp_media::{Homogeneous, PhaseFunction};
+use std::collections::{BTreeMap, BTreeSet};
+
+use upbp_media::{Homogeneous, MediumId, PhaseFunction};
 
 use super::builder::Builder;
-use crate::description::{Medium, Phase, tabulated};
+use crate::description::{Medium, Phase, SceneDescription, tabulated};
 use crate::phase_table;
 
+/// Numbers of the media that something is filled with: a scene need not be ready for others.
+pub(super) fn number(description: &SceneDescription) -> BTreeMap<&str, MediumId> {
+    let interiors = description.shapes.iter().filter_map(|shape| shape.interior.as_deref());
+    let used: BTreeSet<&str> = interiors.chain(description.outside.as_deref()).collect();
+    let names = description.media.names().filter(|name| used.contains(name));
+    names.zip(0..).map(|(name, number)| (name, MediumId(number))).collect()
+}
+
 impl Builder<'_> {
-    /// All media, by number; `None` if there are problems with any.
-    pub(super) fn media(&mut self) -> Option<Vec<Homogeneous>> {
+    /// The media that have a number, in its order; `None` if there are problems with any.
+    pub(super) fn media(&mut self, ids: &BTreeMap<&str, MediumId>) -> Option<Vec<Homogeneous>> {
         let mut media = Vec::new();
         for (name, medium) in self.description.media.iter() {
             let made = self.homogeneous(medium);
-            media.push(made.map_err(|error| self.problem(format!("medium `{name}`"), error)).ok());
+            let made = made.map_err(|error| self.problem(format!("medium `{name}`"), error)).ok();
+            if made.is_none() || ids.contains_key(name) {
+                media.push(made);
+            }
         }
         media.into_iter().collect()
     }

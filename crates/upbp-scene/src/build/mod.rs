@@ -17,7 +17,7 @@ use std::path::Path;
 
 use upbp_accel::{BoxTree, SceneGeometry};
 use upbp_estimators::scene::EmitterId;
-use upbp_media::{Homogeneous, MediumId};
+use upbp_media::Homogeneous;
 
 use self::builder::Builder;
 use self::surfaces::{MeshFiles, ShapeDraft};
@@ -93,13 +93,8 @@ impl Builder<'_> {
     /// `None` only if there are problems.
     fn build(&mut self) -> Option<ReadyScene> {
         let description = self.description;
-        let media = self.media();
-        let medium_ids: BTreeMap<&str, MediumId> = description
-            .media
-            .names()
-            .enumerate()
-            .map(|(index, name)| (name, MediumId(index as u32)))
-            .collect();
+        let medium_ids = media::number(description);
+        let media = self.media(&medium_ids);
         let outside =
             description.outside.as_deref().and_then(|name| self.medium("scene, outside", name, &medium_ids));
         let camera = self.camera();

@@ -1,7 +1,7 @@
 //! The scene's own traversals against the defaults of the trait, which only know the nearest surface.
 
 use upbp_estimators::check::check_scene;
-use upbp_media::BodyId;
+use upbp_media::{BodyId, Medium as _};
 
 use super::*;
 
@@ -373,4 +373,13 @@ fn a_lamp_alone_in_fog_is_as_far_as_the_camera_sees_it() {
         lights: [Point(position: (0.3, 1.7, 2), intensity: 1)])";
     let bounds = ReadyScene::from_ron_str(text, "").unwrap().bounds();
     assert!(bounds.radius > 1.0 && bounds.radius < 2.0, "{bounds:?}");
+}
+
+#[test]
+fn media_that_nothing_is_filled_with_are_left_out() {
+    let scene =
+        scene(MEDIA, "(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"b\")");
+    assert_eq!(scene.media().len(), 1);
+    assert_eq!(medium_at(&scene, 0.5), Some(MediumId(0)));
+    assert_eq!(scene.media()[0].sigma_s(Vec3::ZERO), upbp_media::Spectrum::splat(2.0));
 }

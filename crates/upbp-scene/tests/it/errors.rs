@@ -192,6 +192,11 @@ fn problems_of_shapes_name_the_shape() {
   camera: lies inside of the opaque shape `a`
   light 1 (Point): lies inside of the opaque shape `a`",
         ),
+        (
+            r#"name: "a", geometry: BALL, material: "glass"),
+               (name: "basin", geometry: Box(min: (-1.5, -1.5, -1.5), max: (1.5, 1.5, 1.5)), material: "white""#,
+            "shape `a`: lies inside of the opaque shape `basin`: it would be nowhere (a basin is made of quads)",
+        ),
     ];
     for (shape, expected) in cases {
         let shape = shape
