@@ -164,7 +164,8 @@ impl std::ops::Deref for CheckedSettings {
     }
 }
 
-/// Most edges of a path: a walk that nothing else ends takes about a second, and can be waited for.
+/// Most edges of a path: a bound of the memory of one sub-path, and of the time that a render goes on beyond
+/// its limit, since no walk is broken off. That of walks which nothing else ends is tens of seconds here.
 const MAX_LENGTH: u32 = 1 << 20;
 
 impl Settings {
