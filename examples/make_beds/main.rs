@@ -24,7 +24,7 @@ use mesh::Mesh;
 /// Writes six scenes with their meshes and a sky.
 #[derive(Parser)]
 struct Options {
-    /// Where to
+    /// Folder to write to
     #[arg(value_name = "FOLDER", default_value = "out/beds")]
     folder: PathBuf,
 }

@@ -118,8 +118,8 @@ impl Images {
     }
 }
 
-/// What the exposure of a hint makes of the median of a bright picture, and of the bright part of a dark one,
-/// as a part of white.
+/// Brightness, as a part of white, that the exposure of a hint gives to the median of a bright picture, or to
+/// the bright part of a dark one.
 const MIDDLE: f32 = 0.5;
 
 /// The brightest channel of each pixel.

@@ -1,7 +1,7 @@
 //! Shares of emitters by the place of the receiver: what light arrives there, learnt beforehand
 //! (`docs/theory.md`, section 6.6).
 //!
-//! Which lamps stand in the same room as a receiver no bounds tell. So space is divided where receivers are,
+//! No bounds tell which lamps stand in the same room as a receiver. So space is divided where receivers are,
 //! and each region has shares of the clusters of emitters whose light was seen to arrive. Neighbouring
 //! regions blend into each other: probabilities are continuous in the receiver, so that a photon and a query
 //! point that are merged agree on them.

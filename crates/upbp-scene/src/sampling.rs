@@ -4,24 +4,41 @@
 //! and Chiu, "A Low Distortion Map Between Disk and Square", JGT 2(3), 1997, for the disc; Archimedes for the
 //! rest: the area of a belt of the sphere is proportional to its height.
 
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+use std::f32::consts::{FRAC_PI_4, TAU};
 
 use glam::{Vec2, Vec3};
 use upbp_media::orthonormal_basis;
 
-/// A point of the unit disc, uniform by area.
-pub(crate) fn disc(u: [f32; 2]) -> Vec2 {
-    let offset = Vec2::from(u) * 2.0 - Vec2::ONE;
-    if offset == Vec2::ZERO {
-        return Vec2::ZERO;
-    }
-    let (radius, phi) = if offset.x.abs() > offset.y.abs() {
-        (offset.x, FRAC_PI_4 * (offset.y / offset.x))
-    } else {
-        (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
+/// The maps whose formulas both precisions have in common.
+macro_rules! maps {
+    ($real:ident, $Vec2:ident, $Vec3:ident) => {
+        /// A point of the unit disc, uniform by area.
+        pub(crate) fn disc(u: [$real; 2]) -> $Vec2 {
+            use std::$real::consts::{FRAC_PI_2, FRAC_PI_4};
+            let offset = $Vec2::from(u) * 2.0 - $Vec2::ONE;
+            if offset == $Vec2::ZERO {
+                return $Vec2::ZERO;
+            }
+            let (radius, phi) = if offset.x.abs() > offset.y.abs() {
+                (offset.x, FRAC_PI_4 * (offset.y / offset.x))
+            } else {
+                (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
+            };
+            radius * $Vec2::from_angle(phi)
+        }
+
+        /// A direction around z, uniform over the cone with `1 − cos θ_max = height`.
+        fn cone_local(height: $real, u: [$real; 2]) -> $Vec3 {
+            // The distance from the pole keeps its digits in a narrow cone, where the cosine has none.
+            let below_pole = height * u[0];
+            let sin_theta = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
+            let (sin_phi, cos_phi) = (std::$real::consts::TAU * u[1]).sin_cos();
+            $Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 1.0 - below_pole)
+        }
     };
-    radius * Vec2::from_angle(phi)
 }
+
+maps!(f32, Vec2, Vec3);
 
 /// The pair of numbers with which [`disc`] gives a point; `None` outside of the disc.
 pub(crate) fn disc_inverse(point: Vec2) -> Option<[f32; 2]> {
@@ -86,14 +103,6 @@ pub(crate) fn cone(axis: Vec3, height: f32, u: [f32; 2]) -> Vec3 {
     to_world(axis, cone_local(height, u))
 }
 
-fn cone_local(height: f32, u: [f32; 2]) -> Vec3 {
-    // The distance from the pole keeps its digits in a narrow cone, where the cosine has none.
-    let below_pole = height * u[0];
-    let sin_theta = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = (TAU * u[1]).sin_cos();
-    Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 1.0 - below_pole)
-}
-
 /// Turns a direction of the frame in which `axis` is z into a direction of the world.
 pub(crate) fn to_world(axis: Vec3, local: Vec3) -> Vec3 {
     let (tangent, bitangent) = orthonormal_basis(axis);
@@ -103,30 +112,17 @@ pub(crate) fn to_world(axis: Vec3, local: Vec3) -> Vec3 {
 /// Maps in double precision, for light that starts at one point or in one direction: random numbers of 24
 /// bits would light a small thing far away by the same few rays in all iterations.
 pub(crate) mod fine {
-    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
-
     use glam::{DVec2, DVec3, Vec3};
     use upbp_media::orthonormal_basis;
 
     /// The numbers `u`, with digits beyond their last ones by numbers that have no other use.
     pub(crate) fn numbers(u: [f32; 2], digits: [f32; 2]) -> [f64; 2] {
+        /// Random numbers are multiples of this.
         const LAST_BIT: f64 = 1.0 / 16_777_216.0;
         [0, 1].map(|i| f64::from(u[i]) + f64::from(digits[i]) * LAST_BIT)
     }
 
-    /// A point of the unit disc, as by [`disc`](super::disc).
-    pub(crate) fn disc(u: [f64; 2]) -> DVec2 {
-        let offset = DVec2::from(u) * 2.0 - DVec2::ONE;
-        if offset == DVec2::ZERO {
-            return DVec2::ZERO;
-        }
-        let (radius, phi) = if offset.x.abs() > offset.y.abs() {
-            (offset.x, FRAC_PI_4 * (offset.y / offset.x))
-        } else {
-            (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
-        };
-        radius * DVec2::from_angle(phi)
-    }
+    maps!(f64, DVec2, DVec3);
 
     /// A direction, as by [`sphere`](super::sphere).
     pub(crate) fn sphere(u: [f64; 2]) -> Vec3 {
@@ -139,13 +135,6 @@ pub(crate) mod fine {
         let local = cone_local(f64::from(height), u);
         let [tangent, bitangent, axis] = [tangent, bitangent, axis].map(Vec3::as_dvec3);
         (local.x * tangent + local.y * bitangent + local.z * axis).as_vec3().normalize()
-    }
-
-    fn cone_local(height: f64, u: [f64; 2]) -> DVec3 {
-        let below_pole = height * u[0];
-        let sin_theta = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = (TAU * u[1]).sin_cos();
-        DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 1.0 - below_pole)
     }
 }
 

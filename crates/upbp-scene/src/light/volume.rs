@@ -81,15 +81,14 @@ impl VolumeLight {
 /// Three numbers from the two of a start: the third is a hash of both, as are the digits that single
 /// precision leaves out.
 fn three([u, v]: [f32; 2]) -> [f64; 3] {
-    /// Random numbers are multiples of 2⁻²⁴.
-    const LAST_BIT: f64 = 1.0 / 16_777_216.0;
     // The finaliser of SplitMix64 (Steele et al. 2014).
     let mut z = (u64::from(u.to_bits()) << 32 | u64::from(v.to_bits())).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^= z >> 31;
-    let part = |shift: u32, bits: u32| (z >> shift & ((1 << bits) - 1)) as f64 / (1_u64 << bits) as f64;
-    [f64::from(u) + part(0, 20) * LAST_BIT, f64::from(v) + part(20, 20) * LAST_BIT, part(40, 24)]
+    let part = |shift: u32, bits: u32| (z >> shift & ((1 << bits) - 1)) as f32 / (1_u32 << bits) as f32;
+    let [u, v] = sampling::fine::numbers([u, v], [part(0, 20), part(20, 20)]);
+    [u, v, f64::from(part(40, 24))]
 }
 
 /// The cone of directions in which `receiver` sees a sphere: its axis, and one minus the cosine of its half
