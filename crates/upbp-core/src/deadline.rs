@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::error::RenderError;
+use crate::error::{RenderError, SettingsError};
 
 /// Stops a render from any thread, its preparation included: within the time of a few sub-paths. Of the
 /// iteration in hand the sets of pixels that are done stay on the film.
@@ -41,18 +41,34 @@ impl Halt<'_> {
 }
 
 /// Rules by which a render stops: as soon as one holds. Without rules a render goes on until it is
-/// cancelled.
+/// cancelled. Limits are numbers of at least 0: [`Renderer::start`](crate::Renderer::start) refuses others.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
     /// Number of iterations on the film.
     pub iterations: Option<u64>,
     /// Seconds of rendering, those before a resumption and those of the preparation included: at the end of
     /// the iteration that comes closest, or in the middle of one that would take longer than a twentieth
-    /// more, or than one second more if that is more.
+    /// more, or than one second more if that is more. The light sub-paths of the first iteration are traced
+    /// to the end, since without them there is no picture: a [count](crate::LightPaths::Count) that is given
+    /// may take any time.
     pub seconds: Option<f64>,
     /// Largest upper end of [`Film::estimated_error`](crate::Film::estimated_error). Asked for after 8, 10,
     /// 12, 14, 16, 20, 24, 28, 32, 40 iterations and so on: who asks after each stops at the luckiest answer.
     pub error: Option<f64>,
+}
+
+impl Stop {
+    /// Refuses limits that are negative or no numbers.
+    pub(crate) fn check(&self) -> Result<(), SettingsError> {
+        for (name, limit) in [("stop.seconds", self.seconds), ("stop.error", self.error)] {
+            if let Some(limit) = limit
+                && !(limit >= 0.0)
+            {
+                return Err(SettingsError { name, expected: "at least 0", found: limit.to_string() });
+            }
+        }
+        Ok(())
+    }
 }
 
 /// A step of the preparation of a render.

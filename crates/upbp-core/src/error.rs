@@ -17,18 +17,72 @@ pub struct SettingsError {
     pub found: String,
 }
 
+/// Text of settings or of a plan that is not understood.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{line}:{column}: {message}")]
+pub struct TextError {
+    /// Line of the first place that is wrong, from 1.
+    pub line: usize,
+    /// Column of that place, from 1.
+    pub column: usize,
+    /// What is wrong, or was expected, with the name of the field.
+    pub message: String,
+}
+
+impl TextError {
+    /// The message of the parser, in the words of whoever wrote the text.
+    pub(crate) fn new(text: &str, error: &ron::error::SpannedError) -> Self {
+        use ron::Error;
+        let (line, column) = (error.span.start.line, error.span.start.col);
+        let message = match &error.code {
+            Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) | Error::ExpectedIdentifier => {
+                "expected a word, such as `Auto` or `Count(1000)`".to_owned()
+            }
+            Error::ExpectedInteger | Error::InvalidIntegerDigit { .. } => {
+                "expected a whole number".to_owned()
+            }
+            Error::IntegerOutOfBounds => "the whole number is too large or negative".to_owned(),
+            // These name the field.
+            Error::MissingStructField { .. }
+            | Error::NoSuchStructField { .. }
+            | Error::DuplicateStructField { .. } => {
+                return Self { line, column, message: error.code.to_string() };
+            }
+            code => code.to_string(),
+        };
+        let before = text.lines().take(line.saturating_sub(1)).map(|line| line.len() + 1).sum::<usize>();
+        let rest = text.get(before..).unwrap_or_default();
+        let length: usize = rest.chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
+        let message = match last_field(&text[..before.min(text.len()) + length]) {
+            Some(field) => format!("`{field}`: {message}"),
+            None => message,
+        };
+        Self { line, column, message }
+    }
+}
+
+/// The word before the last colon.
+fn last_field(text: &str) -> Option<&str> {
+    let before = text.rsplit_once(':')?.0.trim_end();
+    let start = before.rfind(|c: char| !(c.is_alphanumeric() || c == '_')).map_or(0, |at| at + 1);
+    before.get(start..).filter(|word| !word.is_empty())
+}
+
 /// A render that does not start.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
     /// A plan whose light sub-paths leave more than the memory budget has room for.
-    #[error("plan: needs {needed} MiB, the setting `memory` (--memory) allows {budget}")]
+    #[error("plan: needs {needed} MiB, the setting `memory` allows {budget}")]
     PlanMemory {
         /// MiB that an iteration needs.
         needed: u64,
         /// MiB that are allowed.
         budget: u64,
     },
+    /// A value of a plan is out of its range.
+    #[error("plan: {0}")]
+    PlanValue(String),
     /// A plan that does not go with the scene or the settings.
     #[error("plan: {extra} cannot be used here, expected techniques of {techniques}")]
     Plan {
@@ -50,16 +104,16 @@ pub enum RenderError {
         /// The reasons for which the chosen ones cannot.
         reasons: String,
     },
-    /// A setting.
+    /// A setting or a stop rule that makes no sense.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// The scene.
+    /// A scene that cannot be rendered.
     #[error(transparent)]
     Scene(#[from] PrepareError),
     /// The film, with what writing it takes, does not fit.
     #[error(
-        "film of {width} x {height} pixels: its {needed} MiB exceed the {budget} MiB that the setting `memory` (--memory) allows; \
-         a smaller film (--size) or fewer techniques (--techniques) take less"
+        "film of {width} x {height} pixels: its {needed} MiB exceed the {budget} MiB that the setting `memory` allows; \
+         a smaller film or fewer techniques take less"
     )]
     Memory {
         /// Width in pixels.
@@ -88,7 +142,7 @@ pub enum StateError {
     /// The source cannot be read.
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    /// Something else, or nothing.
+    /// The source holds something else, or nothing.
     #[error("not a state of a render: it does not begin as one")]
     NotAState,
     /// A state of another version of the format.

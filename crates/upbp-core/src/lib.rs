@@ -19,7 +19,7 @@ pub use upbp_media as media;
 
 pub use auto::technique_support::TechniqueSupport;
 pub use deadline::{Canceller, Preparing, Stop};
-pub use error::{OutputError, RenderError, SettingsError, StateError};
+pub use error::{OutputError, RenderError, SettingsError, StateError, TextError};
 pub use files::{
     Content, Output, abandon_files, check_outputs, check_writable, open_exr, open_file, read_text,
     remove_leftovers, write_text,
@@ -35,8 +35,9 @@ pub use render::{Outcome, Progress, Renderer, Start, StopReason};
 pub use report::Report;
 pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTechniques};
 pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};
-pub use upbp_estimators::mis::{BeamExtent, Heuristic};
+pub use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan};
 pub use upbp_estimators::{
-    BodyId, Counters, EmitterChoice, FootprintField, Interior, IterationPlan, Layer, MediumId, MediumStack,
-    MergePeriods, RadiusField, Ray, Roulette, Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
+    BodyId, Counters, EmitterChoice, FootprintField, Interior, IterationPlan, Kernel, Kernels, Layer,
+    MediumId, MediumStack, MergePeriods, PathLengths, PerMerge, PrepareError, RAY_OFFSET, RadiusField, Ray,
+    Roulette, Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
 };

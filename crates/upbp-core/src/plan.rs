@@ -8,6 +8,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use upbp_estimators::{EmitterChoice, FootprintField, MergePeriods, Roulette, Technique, TechniqueSet};
 
+use crate::error::TextError;
 use crate::radius_schedule::RadiusSchedule;
 
 /// Samples of a technique that a camera vertex may have on average.
@@ -68,7 +69,8 @@ impl Plan {
         1.0 / f64::from(self.periods.period(technique))
     }
 
-    fn validate(&self) -> Result<(), String> {
+    /// Checks every value, since a host may have set it.
+    pub(crate) fn validate(&self) -> Result<(), String> {
         let radii = &self.radii;
         let lengths = [radii.surf, radii.pp3d, radii.pb2d, radii.bp2d, radii.bb1d];
         let finite = |x: &f32| (0.0..f32::INFINITY).contains(x);
@@ -130,8 +132,8 @@ impl FrozenPlan {
     ///
     /// # Errors
     /// Line, column and reason of what is not understood or cannot be.
-    pub fn from_ron(text: &str) -> Result<Self, ron::error::SpannedError> {
-        ron::from_str(text)
+    pub fn from_ron(text: &str) -> Result<Self, TextError> {
+        ron::from_str(text).map_err(|error| TextError::new(text, &error))
     }
 
     /// The plan as RON text, which begins with `FrozenPlan(`.

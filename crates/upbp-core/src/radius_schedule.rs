@@ -54,15 +54,15 @@ impl Radii {
 /// find, and is consistent, since `0 < γ < 1/d` (section 5.1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RadiusSchedule {
-    /// Radius of each technique in iteration 0 where `φ` is one, scene units; 0 where it is off.
+    /// Radius of surface merging, scene units, as all in iteration 0 where `φ` is one; 0 where it is off.
     pub surf: f32,
-    /// PP3D.
+    /// Radius of photon points around points, scene units; 0 where it is off.
     pub pp3d: f32,
-    /// PB2D.
+    /// Radius of photon points around query beams, scene units; 0 where it is off.
     pub pb2d: f32,
-    /// BP2D.
+    /// Radius of photon beams around points, scene units; 0 where it is off.
     pub bp2d: f32,
-    /// BB1D.
+    /// Radius of photon beams around query beams, scene units; 0 where it is off.
     pub bb1d: f32,
     /// `φ`, the same for all techniques.
     pub field: RadiusField,

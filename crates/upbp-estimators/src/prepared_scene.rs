@@ -11,7 +11,9 @@ use crate::emitter_selection::{EmitterSample, EmitterShares, Selection};
 use crate::emitter_tree::EmitterTree;
 use crate::emitters_by_receiver::{ClusterSample, ReceiverShares};
 use crate::random::Decision;
-use crate::scene::{BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, Scene};
+use crate::scene::{
+    BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, PixelRect, Scene,
+};
 
 /// A [`Scene`] with all that is derived from it once.
 pub struct PreparedScene<'a, S: Scene> {
@@ -57,7 +59,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
         };
         if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {
-            return Err(PrepareError::Crop { width, height });
+            return Err(PrepareError::Crop { width, height, crop });
         }
         let from_infinity = from_infinity::<S, f64>(scene, &bounds);
         // No light from infinity gets through: such emitters are never chosen.
@@ -414,7 +416,7 @@ const DENSE: f32 = 1e-3;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PrepareError {
-    /// Bounds.
+    /// Bounds without a finite centre or a positive radius.
     #[error(
         "bounds of the scene: expected a finite centre and a positive finite radius, found {centre:?} and {radius}"
     )]
@@ -440,13 +442,18 @@ pub enum PrepareError {
         /// Number of emitters.
         emitters: usize,
     },
-    /// Crop of the camera.
-    #[error("crop: expected a non-empty part of the film of {width} x {height} pixels")]
+    /// A crop that is not a part of the film, or an empty one.
+    #[error(
+        "crop: expected a non-empty part of the film of {width} x {height} pixels, found {} x {} at ({}, {})",
+        crop.width, crop.height, crop.x, crop.y
+    )]
     Crop {
         /// Width of the film.
         width: u32,
         /// Height of the film.
         height: u32,
+        /// Crop of the camera.
+        crop: PixelRect,
     },
     /// The medium around everything.
     #[error("medium around the scene: index {medium}, but there are {media} media")]

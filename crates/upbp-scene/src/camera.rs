@@ -66,7 +66,8 @@ impl PerspectiveCamera {
         let fits = |start: u32, length: u32, whole: u32| {
             length > 0 && start.checked_add(length).is_some_and(|end| end <= whole)
         };
-        let valid = fits(crop.x, crop.width, width)
+        let valid = (0.0..std::f32::consts::PI).contains(&view.horizontal_fov)
+            && fits(crop.x, crop.width, width)
             && fits(crop.y, crop.height, height)
             && half_size.is_finite()
             && half_size.min_element() > 0.0

@@ -37,6 +37,8 @@ pub(super) enum Fault {
     PositionElsewhere,
     MediumUnknown,
     EmitterUnknown,
+    RefractiveIndex(f32),
+    NothingConnectible,
     BsdfNan,
     BsdfNegative,
     BsdfInfinite,
@@ -44,6 +46,7 @@ pub(super) enum Fault {
     BsdfDirection,
     BsdfRoulette(f32),
     BsdfWeight(f32),
+    BsdfAlbedo(f32),
     Transmittance(f32),
     Reach(f64),
     Stop(f64),
@@ -58,6 +61,7 @@ pub(super) enum Fault {
     CameraPdf(f32),
     CameraDirection,
     CameraFilm,
+    CameraLens,
     Bounds(f32),
     Power(f32),
 }
@@ -176,6 +180,11 @@ impl Scene for Hostile {
                     interior.medium = Some(MediumId(99));
                 }
             }
+            F::RefractiveIndex(ior) => {
+                if let Some(interior) = &mut hit.interior {
+                    interior.ior = ior;
+                }
+            }
             F::EmitterUnknown => hit.emitter = Some(EmitterId(99)),
             _ => {}
         }
@@ -199,6 +208,10 @@ impl Scene for Hostile {
 
     fn camera(&self) -> &HostileCamera {
         &self.camera
+    }
+
+    fn has_connectible_surfaces(&self) -> bool {
+        self.fault != F::NothingConnectible
     }
 }
 
@@ -247,6 +260,10 @@ impl Bsdf for HostileBsdf {
             F::BsdfRoulette(probability) => probability,
             _ => self.0.continuation(from),
         }
+    }
+
+    fn albedo(&self, from: Vec3) -> Spectrum {
+        if let F::BsdfAlbedo(albedo) = self.1 { Spectrum::splat(albedo) } else { self.0.albedo(from) }
     }
 }
 
@@ -363,6 +380,7 @@ impl Camera for HostileCamera {
         match self.1 {
             F::CameraPdf(pdf) => ray.pdf = pdf,
             F::CameraDirection => ray.direction = Vec3::NAN,
+            F::CameraLens => ray.origin.x += u_lens[0],
             _ => {}
         }
         Some(ray)
@@ -413,6 +431,8 @@ pub(super) const GEOMETRY: [Fault; 21] = [
 /// Every kind of fault.
 pub(super) fn faults() -> Vec<Fault> {
     let mut faults = vec![
+        F::NothingConnectible,
+        F::CameraLens,
         F::BsdfNan,
         F::BsdfNegative,
         F::BsdfInfinite,
@@ -425,10 +445,12 @@ pub(super) fn faults() -> Vec<Fault> {
     faults.extend(GEOMETRY);
     for bad in BAD {
         faults.extend([F::BsdfPdf(bad), F::BsdfRoulette(bad), F::Reach(bad.into()), F::Stop(bad.into())]);
+        faults.push(F::RefractiveIndex(bad));
         faults.extend([F::Distance(bad), F::Continuation(bad), F::LightPdf(bad), F::CameraPdf(bad)]);
         // Black, opaque and clear are possible.
         if bad != 0.0 {
             faults.extend([F::BsdfWeight(bad), F::Transmittance(bad), F::Scattering(bad), F::Radiance(bad)]);
+            faults.push(F::BsdfAlbedo(bad));
         }
         if bad != f32::INFINITY {
             faults.push(F::FreePath(bad));

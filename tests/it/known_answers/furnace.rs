@@ -106,7 +106,7 @@ fn chromatic(ratio: f64, body: &str) -> String {
 #[test]
 fn chromatic_white_furnace() {
     for body in ["homogeneous", "dielectric", "nested"] {
-        for ratio in [3.0, 30.0, 1000.0] {
+        for ratio in [3.0, 1000.0] {
             let scene = scene(&chromatic(ratio, body));
             for techniques in ["pt", "bpt"] {
                 let settings = settings(techniques, None);

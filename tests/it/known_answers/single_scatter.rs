@@ -6,17 +6,9 @@ use upbp_core::{LightPaths, Settings};
 use upbp_testing::analytic::{Case, Table, cases, medium, narrow_camera, scene, settings, vector};
 use upbp_testing::render;
 
-/// Cases that merges can be asked in a test's time: the light neither hidden behind many mean free paths nor
-/// so close, or the phase function so peaked, that few photons carry all of it.
-const MERGED: [&str; 7] = [
-    "single_point_0",
-    "single_point_2",
-    "single_point_4",
-    "single_point_6",
-    "single_point_18",
-    "single_point_20",
-    "single_point_22",
-];
+/// Cases, each of another medium, that merges can be asked in a test's time: the light neither hidden behind
+/// many mean free paths nor so close, or the phase function so peaked, that few photons carry all of it.
+const MERGED: [&str; 4] = ["single_point_0", "single_point_4", "single_point_6", "single_point_20"];
 
 /// Settings for paths of two edges.
 fn once(techniques: &str, radius: Option<f64>) -> Settings {
@@ -156,21 +148,22 @@ fn bias_falls_with_the_square_of_the_radius() {
         assert!((exponent(0.2) - 2.0).abs() < 0.05);
         assert!(exponent(0.8) > exponent(0.4) && exponent(0.4) > exponent(0.2));
     }
-    let mut measured = |technique: &str, scene, radius: f64| {
+    let mut measured = |technique: &str, scene, radius: f64, iterations| {
         let settings = Settings {
             light_paths: LightPaths::Count(50_000),
             beams: Some(50_000),
             ..once(technique, Some(radius * distance(&case)))
         };
-        let (result, _) = render(scene, &settings, 60);
+        let (result, _) = render(scene, &settings, iterations);
         if technique != "bb1d" {
             let predicted = smoothed(technique, &case, radius * distance(&case));
             table.check(&format!("{technique}, radius {radius}"), result, predicted, 1e-4 * predicted);
         }
         (result.mean / expected - 1.0, result.error / expected)
     };
+    // Of the wide one a larger error is as small a part of the bias.
     for (technique, scene) in [("pp3d", &many), ("pb2d", &one), ("bb1d", &one)] {
-        let (wide, narrow) = (measured(technique, scene, 0.8), measured(technique, scene, 0.4));
+        let (wide, narrow) = (measured(technique, scene, 0.8, 20), measured(technique, scene, 0.4, 60));
         let exponent = (wide.0 / narrow.0).log2();
         let error = (wide.1 / wide.0).hypot(narrow.1 / narrow.0) / std::f64::consts::LN_2;
         println!(

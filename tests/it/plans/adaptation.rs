@@ -275,4 +275,8 @@ fn a_plan_that_does_not_fit_is_refused() {
     let plan = FrozenPlan { emitters: lamps.emitters, ..frozen(&matt, settings()) };
     let error = matt.start_renderer(checked(), by(plan)).map(|_| ()).expect_err("other lights").to_string();
     assert!(error.contains("among the 1 emitters"), "{error}");
+    let mut endless = frozen(&matt, settings());
+    endless.plan.connections = 1e9;
+    let error = matt.start_renderer(checked(), by(endless)).map(|_| ()).expect_err("not a plan").to_string();
+    assert!(error.starts_with("plan: connections") && error.contains("1000000000"), "{error}");
 }

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use upbp_core::{Renderer, Settings, Stop, StopReason};
+use upbp_core::{Renderer, Settings, Start, Stop, StopReason};
 use upbp_scene::ReadyScene;
 
 fn renderer(room: &ReadyScene) -> Renderer<'_> {
@@ -51,4 +51,18 @@ fn each_rule_stops() {
     });
     assert_eq!(outcome.reason, StopReason::Cancelled);
     assert_eq!(by_handle.film().iterations(), 2, "an abandoned iteration leaves no trace");
+}
+
+#[test]
+fn limits_that_are_no_numbers_are_refused() {
+    let room = upbp_testing::room(4);
+    for (stop, name) in [
+        (Stop { seconds: Some(f64::NAN), ..Stop::default() }, "stop.seconds"),
+        (Stop { seconds: Some(-1.0), ..Stop::default() }, "stop.seconds"),
+        (Stop { error: Some(f64::NAN), ..Stop::default() }, "stop.error"),
+    ] {
+        let settings = Settings::default().validate().expect("valid settings");
+        let error = room.start_renderer(settings, Start { stop, ..Start::default() }).map(|_| ());
+        assert!(error.expect_err("no limit").to_string().contains(name), "{stop:?}");
+    }
 }

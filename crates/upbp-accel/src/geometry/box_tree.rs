@@ -20,10 +20,16 @@ pub struct BoxTree {
 
 impl BoxTree {
     /// Builds the hierarchy over boxes, each by its least and its greatest coordinates.
+    ///
+    /// # Errors
+    /// A corner that is not finite, or more boxes than can be indexed.
     pub fn new(boxes: impl IntoIterator<Item = (Vec3, Vec3)>) -> Result<Self, GeometryError> {
         let boxes: Vec<_> = boxes.into_iter().collect();
         if boxes.len() > MAX_INDEX {
             return Err(GeometryError::TooManyPrimitives { count: boxes.len() });
+        }
+        if let Some(index) = boxes.iter().position(|(min, max)| !(min.is_finite() && max.is_finite())) {
+            return Err(GeometryError::NonFiniteElement { what: "box", index });
         }
         let boxed: Vec<_> = boxes.iter().map(|&(min, max)| Boxed { min, max, kind: Kind::Box }).collect();
         let block = |kind, members: &[u32]| Child::block(kind, members[0] as usize, 1);

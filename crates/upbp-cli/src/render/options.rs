@@ -85,7 +85,8 @@ pub(crate) struct Method {
     /// A..B
     #[arg(long)]
     deterministic: bool,
-    /// Run what a plan says that another render has saved
+    /// Run what a plan says that another render has saved, whatever other options say of sample counts and
+    /// radii
     #[arg(long, value_name = "FILE.ron", value_hint = ValueHint::FilePath)]
     pub(crate) plan: Option<PathBuf>,
     /// Save the plan: techniques, sample counts and first radii; `.ron` or `.plan`

@@ -186,3 +186,16 @@ fn exposure_and_tone_change_the_png_and_nothing_else() {
     };
     assert!(merge(&[]) == plain.0 && merge(&["--tone", "filmic"]) == filmic.0);
 }
+
+#[test]
+fn a_scene_may_have_a_name_in_any_script() {
+    let folder = folder("any_script");
+    fs::write(folder.join("牛乳.ron"), SMALL).expect("a writable folder");
+    let arguments = ["牛乳.ron", "--iterations", "1", "-o", "o.exr"];
+    let output = command("render", &folder, &arguments).output().expect("the program runs");
+    assert!(output.status.success(), "{output:?}");
+    let bytes = fs::read(folder.join("o.exr")).expect("an image");
+    let name = "牛乳".as_bytes();
+    assert!(bytes.windows(name.len()).any(|part| part == name), "the image names its scene in UTF-8");
+    assert_eq!(read_exr(&folder.join("o.exr")).expect("a picture").pixels.len(), 64);
+}

@@ -92,6 +92,9 @@ pub(crate) fn choose<S: Scene>(
     budget: &mut Budget<'_>,
 ) -> Result<Choice, RenderError> {
     budget.step("measuring lights", 0.0)?;
+    if let Some(frozen) = &given {
+        frozen.plan.validate().map_err(RenderError::PlanValue)?;
+    }
     match &given {
         Some(frozen) => scene.set_emitter_choice(&frozen.emitters)?,
         None => volumes::choose(scene, settings, settings.techniques.candidates(), budget)?,

@@ -39,7 +39,7 @@ const FEW_ITERATIONS: u64 = 8;
 /// The mean of the iterations of one half, per pixel, row by row.
 #[derive(Clone, Copy, Debug)]
 pub struct HalfImage<'a> {
-    /// All light.
+    /// Mean radiance of each pixel.
     pub image: &'a [[f32; 3]],
     /// The part of the light that the camera sees directly, or by mirrors and through glass only: then it is
     /// no sign of an error that a pixel is much brighter than its neighbours. `None` where it is not known.
@@ -69,6 +69,8 @@ pub struct ErrorEstimate {
 pub enum Doubt {
     /// Fewer than two halves, or fewer than eight iterations in both.
     FewIterations,
+    /// A pixel of a half is no number, or infinite.
+    NotANumber,
     /// No light was found at all.
     Black,
     /// A few pixels make the error, and more of the kind that were not met yet could make more of it.
@@ -117,8 +119,10 @@ impl ErrorMap {
         let (relative_mse, below) = mean_and_factor(&self.relative.par_iter().map(mean).collect::<Vec<_>>());
         let (most, above) = mean_and_factor(&upper);
         let tail_index = tail_index(&mut upper);
-        let doubt = if self.iterations < FEW_ITERATIONS || !relative_mse.is_finite() {
+        let doubt = if self.iterations < FEW_ITERATIONS || relative_mse == f64::INFINITY {
             Some(Doubt::FewIterations)
+        } else if !relative_mse.is_finite() {
+            Some(Doubt::NotANumber)
         } else if self.black {
             Some(Doubt::Black)
         } else if tail_index >= HEAVY {
@@ -177,6 +181,7 @@ impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::FewIterations => "fewer than eight iterations",
+            Self::NotANumber => "a pixel is no number, or infinite",
             Self::Black => "no light was found yet",
             Self::HeavyTail => "a few pixels make the error",
         })

@@ -112,7 +112,7 @@ mod tests {
             [at(0.5, Vec3::NEG_Z, Some(3.0)), Features::NONE],
         ];
         let add = |film: &mut Film, i: usize| {
-            film.add_part(i as u64, pixel_sets::ALL, &[Pixel::BLACK; 2], &iterations[i]);
+            film.add_part(i as u64, 0..pixel_sets::SETS, &[Pixel::BLACK; 2], &iterations[i]);
         };
         let film = || Film::new(RECT, TechniqueSet::BPT).with_features();
         let (mut whole, mut halves) = (film(), [film(), film()]);

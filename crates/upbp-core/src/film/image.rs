@@ -19,6 +19,11 @@ pub(super) const DARK: f64 = 0.01;
 pub(crate) const BLOCK_SIDES: [u32; 4] = [1, 4, 8, 16];
 
 impl Image {
+    /// Whether there are as many pixels as the size says.
+    pub(crate) fn is_whole(&self) -> bool {
+        u64::from(self.width) * u64::from(self.height) == self.pixels.len() as u64
+    }
+
     /// relMSE against a reference: mean over pixels and channels of `(x − r)² / (r² + 0.01)`; NaN if it has
     /// another size.
     #[must_use]
@@ -82,7 +87,7 @@ impl Image {
     }
 
     fn is_as_large_as(&self, other: &Self) -> bool {
-        (self.width, self.height, self.pixels.len()) == (other.width, other.height, other.pixels.len())
+        (self.width, self.height) == (other.width, other.height) && self.is_whole() && other.is_whole()
     }
 
     fn mean_of(&self, reference: &Self, term: impl Fn(f64, f64) -> f64) -> f64 {

@@ -67,8 +67,8 @@ impl IterationSet {
         })
     }
 
-    /// Adds an index.
-    pub fn insert(&mut self, index: u64) {
+    /// Adds an index below [`MAX_ITERATIONS`].
+    pub(crate) fn insert(&mut self, index: u64) {
         let at = self.following(index);
         if self.ranges.get(at).is_some_and(|own| own.start <= index) {
             return;
@@ -87,7 +87,7 @@ impl IterationSet {
     }
 
     /// Adds the indices of another set.
-    pub fn union(&mut self, other: &Self) {
+    pub(crate) fn union(&mut self, other: &Self) {
         self.ranges.extend_from_slice(&other.ranges);
         self.ranges.sort_unstable_by_key(|range| range.start);
         self.ranges.dedup_by(|next, last| {

@@ -75,8 +75,7 @@ const fn pixels(rect: PixelRect) -> usize {
 
 impl Film {
     /// A black film for the layers of `techniques`.
-    #[must_use]
-    pub fn new(rect: PixelRect, techniques: TechniqueSet) -> Self {
+    pub(crate) fn new(rect: PixelRect, techniques: TechniqueSet) -> Self {
         let layers = Self::layers_of(techniques).into_iter().map(|layer| (layer, black(rect))).collect();
         Self {
             rect,
@@ -91,8 +90,7 @@ impl Film {
     }
 
     /// A film that keeps [features](FeatureImages) as well.
-    #[must_use]
-    pub fn with_features(self) -> Self {
+    pub(crate) fn with_features(self) -> Self {
         Self { features: Some(FeatureSums::of(|| black(self.rect))), ..self }
     }
 
@@ -104,8 +102,7 @@ impl Film {
     }
 
     /// Bytes that a film takes, with the buffer of one iteration.
-    #[must_use]
-    pub fn memory_bytes(rect: PixelRect, techniques: TechniqueSet, features: bool) -> u64 {
+    pub(crate) fn memory_bytes(rect: PixelRect, techniques: TechniqueSet, features: bool) -> u64 {
         let pixel = (Self::layers_of(techniques).len() + 4) * size_of::<Sum3>() + size_of::<Pixel>();
         let features = if features { FeatureSums::BYTES + size_of::<Features>() } else { 0 };
         (pixels(rect) as u64).saturating_mul((pixel + features) as u64)
@@ -193,18 +190,18 @@ impl Film {
         parts.chain(self.iterations.overlap(&other.iterations)).min_by_key(|range| range.start)
     }
 
-    /// Adds an iteration, one value per pixel. Returns how many of the values were not finite or negative;
-    /// they count as zero.
-    ///
-    /// # Panics
-    /// If `pixels` has another size than the film, or the film holds some of the iteration already, or its
-    /// index is not below [`MAX_ITERATIONS`].
-    pub fn add(&mut self, iteration: u64, pixels: &[Pixel]) -> u64 {
-        self.add_part(iteration, pixel_sets::ALL, pixels, &[])
+    /// Adds an iteration as [`add_part`](Self::add_part) does its parts.
+    #[cfg(test)]
+    pub(crate) fn add(&mut self, iteration: u64, pixels: &[Pixel]) -> u64 {
+        self.add_part(iteration, 0..SETS, pixels, &[])
     }
 
     /// Adds the pixels of some sets: those that follow on what is there of the iteration. Features count if
-    /// the film keeps them.
+    /// the film keeps them. Returns how many of the values were not finite or negative; they count as zero.
+    ///
+    /// # Panics
+    /// If `pixels` has another size than the film, or the film holds these sets of the iteration already, or
+    /// its index is not below [`MAX_ITERATIONS`].
     pub(crate) fn add_part(
         &mut self,
         iteration: u64,

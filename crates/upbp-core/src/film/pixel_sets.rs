@@ -5,13 +5,8 @@
 //! rendered. The first set is a grid of one pixel per square; four, sixteen, 64 and 256 sets are grids of
 //! half the spacing each.
 
-use std::ops::Range;
-
 /// Number of sets.
 pub(crate) const SETS: u32 = 256;
-
-/// All sets.
-pub(crate) const ALL: Range<u32> = 0..SETS;
 
 /// Side of a square in pixels.
 const SIDE: usize = 16;

@@ -9,13 +9,14 @@ use std::path::Path;
 use exr::prelude::*;
 use serde::Serialize;
 
+use super::check_size;
 use crate::error::OutputError;
 use crate::files::{open_exr, write_whole};
 use crate::film::{FeatureImages, Film, Image as Picture};
 use crate::report::Report;
 use crate::settings::Settings;
 
-/// Origin of an image file, as RON text in its attribute `upbp`.
+/// Origin of an image file, as RON text in its attribute `upbp`, in UTF-8.
 #[derive(Clone, Debug, Serialize)]
 pub struct Metadata<'a> {
     /// Name or hash of the scene.
@@ -62,15 +63,18 @@ pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::resu
 
     let mut attributes = LayerAttributes::default();
     let text = ron::to_string(metadata).map_err(|error| fail(error.to_string()))?;
-    attributes.other.insert(Text::from("upbp"), AttributeValue::Text(Text::from(text.as_str())));
+    // Not `Text::from`, which takes nothing but Latin-1.
+    let text = Text::from_slice_unchecked(text.as_bytes());
+    attributes.other.insert(Text::from("upbp"), AttributeValue::Text(text));
     encode(path, film.rect().width, film.rect().height, attributes, channels)
 }
 
 /// Writes an image as `R`, `G`, `B`, with nothing besides: float32.
 ///
 /// # Errors
-/// The message of the file system or of the encoder.
+/// Those of the file system or of the encoder, or the image has other pixels than its size says.
 pub fn write_image(path: &Path, image: &Picture) -> std::result::Result<(), OutputError> {
+    check_size(path, image)?;
     let mut channels = SmallVec::new();
     push(&mut channels, "", image);
     encode(path, image.width, image.height, LayerAttributes::default(), channels)

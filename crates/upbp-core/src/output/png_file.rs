@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::check_size;
 use super::tone::ToneMapping;
 use crate::error::OutputError;
 use crate::files::write_whole;
@@ -10,8 +11,9 @@ use crate::film::Image;
 /// Writes `image` as `tones` has it, with the sRGB transfer curve, 8 bits per channel; NaN becomes black.
 ///
 /// # Errors
-/// Those of the file system or of the encoder.
+/// Those of the file system or of the encoder, or the image has other pixels than its size says.
 pub fn write_png(path: &Path, image: &Image, tones: ToneMapping) -> Result<(), OutputError> {
+    check_size(path, image)?;
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|pixel| tones.apply(*pixel)).map(quantise).collect();
     write_whole(path, |writer| {
         let fail = |error: png::EncodingError| OutputError::Encode {

@@ -26,7 +26,8 @@ pub(super) struct Prepared<'a> {
 pub struct Start<'a> {
     /// A plan that was made before, perhaps on another machine: that of a state which is going to be
     /// [resumed](crate::Renderer::resume), by [`Identity::frozen_plan`], or one from a file. `None` for one
-    /// that is made now.
+    /// that is made now. A plan has to go with the techniques and the heuristic of the settings; what the
+    /// settings say of sample counts, roulette and radii is not asked for beside it.
     pub plan: Option<FrozenPlan>,
     /// Stops the preparation, and the render after it.
     pub canceller: Canceller,
@@ -48,6 +49,7 @@ pub(super) fn prepare<'a, S: Scene>(
 ) -> Result<Prepared<'a>, RenderError> {
     let begun = Instant::now();
     let Start { plan, canceller, stop, progress } = start;
+    stop.check()?;
     let stop = if settings.deterministic { Stop::default() } else { stop };
     let mut budget = Budget { start: begun, canceller: canceller.clone(), stop, progress };
     let mut prepared = PreparedScene::new(scene)?;

@@ -63,7 +63,7 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// Those of [`new`](Self::new); or the plan has techniques that the settings or the scene rule out, or
-    /// exceeds the memory budget; or it was cancelled.
+    /// exceeds the memory budget, or it or the stop rules have a value out of its range; or it was cancelled.
     pub fn start<S: Scene>(
         scene: &'a S,
         settings: CheckedSettings,
@@ -199,7 +199,7 @@ impl<'a> Renderer<'a> {
 
     /// Seconds of rendering so far.
     fn seconds(&self) -> f64 {
-        self.state.record.times.seconds().total()
+        self.state.seconds().total()
     }
 
     /// Renders until a rule of `stop` holds or `progress`, which is called after every iteration, breaks.

@@ -7,13 +7,13 @@ use crate::state::State;
 /// The reason for which a render stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// The number of iterations, or nothing is left of the range.
+    /// The number of iterations is reached, or nothing is left of the range.
     Iterations,
-    /// The time.
+    /// The time is up.
     Time,
-    /// The estimated error.
+    /// The estimated error is small enough.
     Error,
-    /// The caller.
+    /// The caller has cancelled the render.
     Cancelled,
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use upbp_estimators::Roulette;
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 
-use crate::error::SettingsError;
+use crate::error::{SettingsError, TextError};
 use crate::plan::PER_VERTEX;
 use crate::radius_schedule::{Radii, Radius};
 
@@ -232,10 +232,11 @@ impl Settings {
     ///
     /// # Errors
     /// Line, column and reason of what is not understood.
-    pub fn from_ron(text: &str) -> Result<Self, ron::error::SpannedError> {
+    pub fn from_ron(text: &str) -> Result<Self, TextError> {
         ron::Options::default()
             .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
             .from_str(text)
+            .map_err(|error| TextError::new(text, &error))
     }
 }
 
@@ -271,7 +272,15 @@ mod tests {
             assert_eq!(error.name, name);
         }
         let error = Settings::from_ron("(\n  seed: 1,\n  radius: 2,\n)").unwrap_err();
-        assert_eq!(error.span.start.line, 3, "{error}");
+        assert_eq!(error.line, 3, "{error}");
+        for (text, message) in [
+            ("(light_paths: 5)", "1:15: `light_paths`: expected a word, such as `Auto` or `Count(1000)`"),
+            ("(radii: (surf: 3))", "1:16: `surf`: expected a word, such as `Auto` or `Count(1000)`"),
+            ("(\n  memory: -1)", "2:12: `memory`: the whole number is too large or negative"),
+            ("(seed: 1e3)", "1:8: `seed`: expected a whole number"),
+        ] {
+            assert_eq!(Settings::from_ron(text).unwrap_err().to_string(), message);
+        }
         assert!(Settings::from_ron("(techniques: \"bpt+beams\")").unwrap_err().to_string().contains("beams"));
     }
 }

@@ -14,6 +14,8 @@ pub use identity::Identity;
 pub use record::{ErrorPoint, ErrorSeries, PassSeconds};
 pub(crate) use record::{PassTimes, Record};
 
+use upbp_estimators::Counters;
+
 use crate::error::{OutputError, StateError};
 use crate::files::{open_file, write_whole};
 use crate::film::Film;
@@ -40,6 +42,18 @@ impl State {
     #[must_use]
     pub const fn film(&self) -> &Film {
         &self.film
+    }
+
+    /// Counts over all iterations.
+    #[must_use]
+    pub const fn counters(&self) -> &Counters {
+        &self.record.counters
+    }
+
+    /// Wall seconds of the passes of all iterations.
+    #[must_use]
+    pub fn seconds(&self) -> PassSeconds {
+        self.record.times.seconds()
     }
 
     /// Adds what another run of the same render has done. The result has the same bits in whatever order

@@ -8,7 +8,7 @@ use upbp_estimators::Counters;
 /// Wall seconds of the passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PassSeconds {
-    /// The pilot.
+    /// The preparation, with its pilot renders.
     pub pilot: f64,
     /// Light sub-paths.
     pub light: f64,
@@ -84,8 +84,11 @@ impl ErrorSeries {
     /// Least ratio of the numbers of iterations of two points that are kept.
     const SPACING: f64 = 1.01;
 
-    /// Adds a point with more iterations than those before.
+    /// Adds a point, which replaces those that have as many iterations or more.
     pub fn push(&mut self, point: ErrorPoint) {
+        while self.0.last().is_some_and(|last| last.iterations >= point.iterations) {
+            self.0.pop();
+        }
         if let [.., before, last] = self.0.as_mut_slice()
             && (last.iterations as f64) < Self::SPACING * before.iterations as f64
         {
@@ -112,4 +115,26 @@ pub(crate) struct Record {
     /// Bytes that the render is expected to need.
     pub(crate) expected_bytes: u64,
     pub(crate) series: ErrorSeries,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_series_has_ascending_iterations_and_few_points() {
+        let mut series = ErrorSeries::default();
+        let point = |iterations| ErrorPoint {
+            seconds: 1.0,
+            iterations,
+            relative_mse: f64::NAN,
+            over_scales: f64::NAN,
+            rmse: f64::NAN,
+        };
+        (0..1000).chain(0..100_000).for_each(|iterations| series.push(point(iterations)));
+        (0..1000).for_each(|_| series.push(point(100_000)));
+        let iterations: Vec<_> = series.points().iter().map(|point| point.iterations).collect();
+        assert!(iterations.is_sorted_by(|a, b| a < b) && iterations.len() < 1000, "{}", iterations.len());
+        assert_eq!((iterations[99], iterations.last()), (99, Some(&100_000)));
+    }
 }

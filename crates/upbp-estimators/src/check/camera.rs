@@ -6,7 +6,7 @@ use super::{Check, Random, is_density, is_unit, require, same};
 use crate::scene::Camera;
 
 /// Checks the contract of [`Camera`]: that `connect` inverts `ray`, and that the density of a pixel's
-/// directions is one over its solid angle on average.
+/// directions is one over its solid angle on average; and that the rays of a pinhole start in one point.
 pub fn check_camera(camera: &impl Camera) -> Check {
     let (width, height) = camera.resolution();
     require(width > 0 && height > 0, "the film is not empty", (width, height))?;
@@ -26,6 +26,12 @@ pub fn check_camera(camera: &impl Camera) -> Check {
         let case = (film, u_lens, ray);
         require(is_unit(ray.direction), "a ray's direction is a unit vector", case)?;
         require(is_density(ray.pdf) && ray.pdf > 0.0, "a ray has a density", case)?;
+        let other = camera.ray(film, random.pair()).map_or(ray.origin, |other| other.origin);
+        require(
+            !camera.is_pinhole() || other == ray.origin,
+            "all rays of a pinhole start there",
+            (case, other),
+        )?;
         let Some(connection) = camera.connect(ray.origin + ray.direction * distance, u_lens) else {
             let margin = film.min(size - film).min_element();
             require(margin < 0.01, "a point on a ray is seen", case)?;

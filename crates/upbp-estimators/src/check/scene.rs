@@ -4,12 +4,12 @@ use glam::Vec3;
 
 use super::normals::Normals;
 use super::{Check, ContractViolation, Random, is_unit, require};
-use crate::scene::{BoundingSphere, Crossing, Emitter, Scene};
+use crate::scene::{BoundingSphere, Bsdf, Crossing, Emitter, Scene};
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
-/// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside,
-/// `trace` and `is_clear` find what `intersect` does, and the bodies around a point follow from the
-/// boundaries on the way to it.
+/// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside
+/// with an index of refraction, surfaces are as the scene says of all of them, `trace` and `is_clear` find
+/// what `intersect` does, and the bodies around a point follow from the boundaries on the way to it.
 ///
 /// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the
 /// normals of a body one in ten.
@@ -87,13 +87,19 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
         require(near, "a hit's position is on the ray", case)?;
         let units = is_unit(hit.geometric_normal) && is_unit(hit.shading_normal);
         require(units, "normals are unit vectors", case)?;
+        let connectible = hit.bsdf.is_some_and(|bsdf| bsdf.is_connectible());
+        let told = scene.has_connectible_surfaces() || !connectible;
+        require(told, "a scene without connectible surfaces has none", case)?;
         let sides = hit.geometric_normal.dot(hit.shading_normal) >= 0.0;
         require(sides, "the shading normal is on the side of the geometric one", case)?;
     }
     let mut crossings = Vec::new();
     let hit = scene.trace(ray, &mut crossings);
-    let media = crossings.iter().map(|c| c.interior).chain(hit.as_ref().and_then(|hit| hit.interior));
-    let unknown = media.filter_map(|interior| interior.medium).find(|m| m.0 as usize >= scene.media().len());
+    let interiors = crossings.iter().map(|c| c.interior).chain(hit.as_ref().and_then(|hit| hit.interior));
+    let dull = interiors.clone().find(|interior| !(interior.ior > 0.0 && interior.ior.is_finite()));
+    require(dull.is_none(), "a body has a positive finite index of refraction", (ray, dull))?;
+    let unknown =
+        interiors.filter_map(|interior| interior.medium).find(|m| m.0 as usize >= scene.media().len());
     require(unknown.is_none(), "the medium of a body exists", (ray, unknown))?;
     let emitter = hit.as_ref().and_then(|hit| hit.emitter);
     let exists = emitter.is_none_or(|emitter| (emitter.0 as usize) < scene.emitters().len());

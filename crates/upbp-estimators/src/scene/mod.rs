@@ -79,7 +79,7 @@ pub trait Scene: Sync {
     /// Where surfaces of bodies coincide, it is that of the highest priority, and the other boundaries there,
     /// those that scatter too, are crossings at its distance: a path meets them as one, between the body that
     /// counts before them and the one that counts behind (`docs/theory.md`, section 1.7). Rays that leave
-    /// start behind what is as near as [`RAY_OFFSET`](upbp_accel::RAY_OFFSET), so that this must coincide.
+    /// start behind what is as near as [`RAY_OFFSET`](crate::RAY_OFFSET), so that this must coincide.
     ///
     /// The default asks [`intersect`](Self::intersect) again behind each boundary, and so misses one of two
     /// boundaries that coincide to rounding; a host with such geometry overrides this. It gives up at

@@ -159,7 +159,7 @@ impl Hemisphere {
 }
 
 fn checked(rows: impl ExactSizeIterator<Item = (f32, f32)>) -> Result<Vec<(f32, f32)>, MediaError> {
-    if rows.len() < 2 {
+    if rows.len() == 0 {
         let (what, expected) = ("the table of a phase function", "at least the angles 0 and 180 degrees");
         return Err(MediaError::Empty { what, expected });
     }

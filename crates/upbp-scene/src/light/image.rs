@@ -308,7 +308,8 @@ impl Emitter for ImageEnvironment {
 
     fn power(&self, bounds: &BoundingSphere) -> f32 {
         let power = disc_area(bounds) * self.scale * self.image.total_mean as f32;
-        if power.is_finite() { power } else { f32::MAX }
+        // A scale that is no number is for the renderer to refuse.
+        if power == f32::INFINITY && self.scale.is_finite() { f32::MAX } else { power }
     }
 
     fn sample_emission(
