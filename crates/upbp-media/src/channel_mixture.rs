@@ -57,13 +57,14 @@ fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum
 }
 
 /// The largest second moment that any channel has after a segment of any length, on which walks pass or,
-/// with the probability `continuation`, go on from where they stop (`docs/theory.md`, section 1.4). At least
-/// one, that of a segment without a length.
+/// with the probability `continuation`, go on from where they stop, in a direction that multiplies the second
+/// moment by `turn` (`docs/theory.md`, section 1.4). At least one, that of a segment without a length.
 pub(crate) fn segment_growth(
     alpha: &[f64; 3],
     sigma_s: Spectrum,
     sigma_t: Spectrum,
     continuation: f64,
+    turn: [f64; 3],
 ) -> f64 {
     let extinctions = [0, 1, 2].map(|c| f64::from(sigma_t[c]));
     let positive = || extinctions.into_iter().filter(|sigma| *sigma > 0.0);
@@ -88,7 +89,7 @@ pub(crate) fn segment_growth(
             let length = shortest * step.powf(f64::from(point));
             stopped += 0.5 * (length - before) * (stops(before) + stops(length));
             let passes = (-sigma * length).exp() / mixed(length, &|_| 1.0);
-            largest = largest.max(stopped / continuation + passes);
+            largest = largest.max(turn[channel] * stopped / continuation + passes);
             before = length;
         }
         largest

@@ -265,14 +265,13 @@ impl Medium for Homogeneous {
     }
 
     fn mixture_growth(&self) -> f64 {
-        match self.sampling {
-            Sampling::Chromatic { alpha, .. } => {
-                let continuation = f64::from(self.continuation(Vec3::ZERO));
-                segment_growth(&alpha, self.sigma_s, self.sigma_t, continuation)
-            }
-            // Nothing is divided by a density of other channels.
-            Sampling::Never | Sampling::Grey => 1.0,
-        }
+        let alpha = match self.sampling {
+            Sampling::Chromatic { alpha, .. } => alpha,
+            Sampling::Grey => [1.0 / 3.0; 3],
+            Sampling::Never => return 1.0,
+        };
+        let continuation = f64::from(self.continuation(Vec3::ZERO));
+        segment_growth(&alpha, self.sigma_s, self.sigma_t, continuation, self.phase.turn_growth())
     }
 
     #[inline]

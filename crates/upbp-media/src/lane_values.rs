@@ -60,6 +60,15 @@ pub trait LaneValues: Copy + Debug + PartialEq + Send + Sync + 'static {
     #[must_use]
     fn given(self, shares: &Self::Shares, mean: f64) -> Self::Shares;
 
+    /// The [mean](Self::mean) of the density of a step, and the shares [after](Self::given) it; where no lane
+    /// can take it, as before.
+    #[inline]
+    #[must_use]
+    fn step(self, shares: &Self::Shares) -> (f64, Self::Shares) {
+        let mean = self.mean(shares);
+        (mean, if mean > 0.0 { self.given(shares, mean) } else { *shares })
+    }
+
     /// The shares of a walk that starts, from the probabilities of the lanes.
     #[must_use]
     fn prior(probabilities: &[f64; 3]) -> Self::Shares;

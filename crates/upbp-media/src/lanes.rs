@@ -1,8 +1,9 @@
-//! Lanes: the distributions that a walk may draw all its distances from.
+//! Lanes: the distributions that a walk may draw all its distances and directions from.
 //!
 //! With one lane (`f64`) every segment draws its distance from the medium's own distribution, in a chromatic
-//! medium from a mixture of the channels, anew on each segment. With three lanes (`[f64; 3]`, a lane per
-//! channel) a walk draws one lane at its start, its hero, and all its distances from it. What it meets is
+//! medium from a mixture of the channels, anew on each segment, and every collision its direction from the
+//! mean of the channels' phase functions. With three lanes (`[f64; 3]`, a lane per channel) a walk draws one
+//! lane at its start, its hero, and all its distances and directions from it. What it meets is
 //! divided by the density that a walk with any hero has, so no channel's throughput exceeds one over the
 //! probability of its lane, however long the walk.
 //!
@@ -13,7 +14,9 @@
 //! Source: `docs/theory.md`, sections 1.4 and 6.13. Oracle:
 //! `tests::means_by_shares_are_the_mixture_of_products`.
 
-use crate::{LaneValues, Medium, RaySegment, SegmentDensity, Spectrum};
+use glam::Vec3;
+
+use crate::{LaneValues, Medium, PhaseFunction, PhaseValue, RaySegment, SegmentDensity, Spectrum};
 
 /// The lanes of a walk through media: `f64` for one, `[f64; 3]` for a lane per channel.
 pub trait Lanes: LaneValues {
@@ -27,6 +30,14 @@ pub trait Lanes: LaneValues {
         hero: Self::Hero,
         u: [f32; 2],
     ) -> Option<f32>;
+
+    /// Draws the direction after a collision for a walk with this hero that came along `before`, from two
+    /// uniform numbers in `[0, 1)`.
+    fn sample_direction(phase: &PhaseFunction, before: Vec3, hero: Self::Hero, u: [f32; 2]) -> Vec3;
+
+    /// The densities of a direction, per steradian, that a phase function has this value in.
+    #[must_use]
+    fn of_phase(value: &PhaseValue) -> Self;
 }
 
 impl Lanes for f64 {
@@ -38,6 +49,16 @@ impl Lanes for f64 {
     #[inline]
     fn sample_distance<M: Medium>(medium: &M, segment: &RaySegment, (): (), u: [f32; 2]) -> Option<f32> {
         medium.sample_distance(segment, u[0], u[1])
+    }
+
+    #[inline]
+    fn sample_direction(phase: &PhaseFunction, before: Vec3, (): (), u: [f32; 2]) -> Vec3 {
+        phase.sample_direction(before, None, u)
+    }
+
+    #[inline]
+    fn of_phase(value: &PhaseValue) -> Self {
+        f64::from(value.pdf)
     }
 }
 
@@ -51,10 +72,20 @@ impl Lanes for [f64; 3] {
     fn sample_distance<M: Medium>(medium: &M, segment: &RaySegment, hero: usize, u: [f32; 2]) -> Option<f32> {
         medium.sample_lane(segment, hero, u)
     }
+
+    #[inline]
+    fn sample_direction(phase: &PhaseFunction, before: Vec3, hero: usize, u: [f32; 2]) -> Vec3 {
+        phase.sample_direction(before, Some(hero), u)
+    }
+
+    #[inline]
+    fn of_phase(value: &PhaseValue) -> Self {
+        [0, 1, 2].map(|lane| f64::from(value.value[lane]))
+    }
 }
 
-/// Ratio of the lanes of a medium from which on they are worth their time: with less the second moment of the
-/// mixture that is drawn anew on each segment hardly grows. Not tuned.
+/// Ratio of the extinctions of a medium's lanes from which on they are worth their time: with less the second
+/// moment of the mixture that is drawn anew on each segment hardly grows. Not tuned.
 const LEAST_RATIO: f32 = 1.25;
 
 /// Factor by which the second moment may grow per segment without lanes, and be of no account.
@@ -62,22 +93,26 @@ const LEAST_GROWTH: f64 = 1.01;
 
 /// The probability of each lane to be the hero of a walk through `media`: equal shares for all lanes that
 /// differ in any of them, so that no channel's throughput exceeds the number of lanes. `None` if in all media
-/// lanes differ by a small factor only, or the [second moment](Medium::mixture_growth) of walks without them
-/// hardly grows.
+/// lanes differ by a small factor of extinction only, or the [second moment](Medium::mixture_growth) of walks
+/// without them hardly grows.
 #[must_use]
 pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
     let largest = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(0.0, f32::max);
     let least = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(f32::INFINITY, f32::min);
     let profits = |medium: &M| {
         let differ = |lanes| largest(&lanes) >= LEAST_RATIO * least(&lanes);
-        medium.lane_extinctions().is_some_and(differ) && medium.mixture_growth() > LEAST_GROWTH
+        let turns_differ = medium.scatters() && [1, 2].iter().any(|lane| medium.phase().differs(0, *lane));
+        (turns_differ || medium.lane_extinctions().is_some_and(differ))
+            && medium.mixture_growth() > LEAST_GROWTH
     };
     if !media.iter().any(profits) {
         return None;
     }
-    let lanes: Vec<_> = media.iter().filter_map(Medium::lane_extinctions).collect();
-    let is_new =
-        |lane: usize| (0..lane).all(|earlier| lanes.iter().any(|medium| medium[lane] != medium[earlier]));
+    let differ = |medium: &M, lane: usize, other: usize| {
+        medium.scatters() && medium.phase().differs(lane, other)
+            || medium.lane_extinctions().is_some_and(|lanes| lanes[lane] != lanes[other])
+    };
+    let is_new = |lane: usize| (0..lane).all(|other| media.iter().any(|medium| differ(medium, lane, other)));
     let drawn = [0, 1, 2].map(is_new);
     let count = drawn.iter().filter(|is_drawn| **is_drawn).count();
     (count > 1).then(|| drawn.map(|is_drawn| if is_drawn { 1.0 / count as f64 } else { 0.0 }))
@@ -138,6 +173,46 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn directions_are_drawn_with_the_densities_of_their_lanes() {
+        let lobe = |g| PhaseFunction::henyey_greenstein(g).expect("in range");
+        let colours = PhaseFunction::per_channel([lobe(0.9), lobe(0.2), PhaseFunction::Rayleigh]);
+        let phase = PhaseFunction::blend(vec![(1.0, colours), (2.0, lobe(-0.4))]).expect("a blend");
+        const DRAWS: u32 = 200_000;
+        for hero in 0..3 {
+            // The mean of one lane's density over another's is one, and so is that of any other.
+            let mut sums = [0.0; 3];
+            for i in 0..DRAWS {
+                let u = [(i as f32 + 0.5) / DRAWS as f32, (i as f32 * 0.618_034).fract()];
+                let after = <[f64; 3]>::sample_direction(&phase, Vec3::Y, hero, u);
+                let value = phase.eval(Vec3::Y, after);
+                let lanes = <[f64; 3]>::of_phase(&value);
+                assert!((lanes.iter().sum::<f64>() / 3.0 / f64::of_phase(&value) - 1.0).abs() < 1e-5);
+                (0..3).for_each(|lane| sums[lane] += lanes[lane] / lanes[hero] / f64::from(DRAWS));
+            }
+            assert!(sums.iter().all(|sum| (sum - 1.0).abs() < 0.02), "{hero}: {sums:?}");
+        }
+    }
+
+    #[test]
+    fn channels_that_scatter_into_other_directions_are_lanes() {
+        let lobe = |g| PhaseFunction::henyey_greenstein(g).expect("in range");
+        let of = |absorption: f32, g: [f32; 3]| {
+            let phase = PhaseFunction::per_channel(g.map(lobe));
+            let medium = Homogeneous::new([absorption; 3].into(), [1.0; 3].into(), phase).expect("in range");
+            lane_probabilities(&[medium])
+        };
+        let growth = PhaseFunction::per_channel([0.9, 0.7, 0.5].map(lobe)).turn_growth();
+        for (found, expected) in growth.into_iter().zip([1.61, 1.09, 1.36]) {
+            assert!((found - expected).abs() < 0.01, "{growth:?}");
+        }
+        assert_eq!(of(0.0, [0.5; 3]), None);
+        assert_eq!(of(0.0, [0.9, 0.7, 0.5]), Some([1.0 / 3.0; 3]));
+        assert_eq!(of(0.0, [0.9, 0.5, 0.5]), Some([0.5, 0.5, 0.0]));
+        assert_eq!(of(0.0, [0.52, 0.5, 0.5]), None, "hardly any difference");
+        assert_eq!(of(1.0, [0.9, 0.7, 0.5]), None, "roulette ends walks sooner");
     }
 
     #[test]

@@ -24,13 +24,14 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 ///
 /// # Path-level lanes
 ///
-/// A walk through strongly chromatic media draws all its distances from the lane of one channel
-/// (`docs/theory.md`, section 6.13). A medium offers lanes by [`lane_extinctions`](Self::lane_extinctions),
-/// [`segment_lanes`](Self::segment_lanes) and [`sample_lane`](Self::sample_lane). The lane of channel `c`
-/// should pass at least the light that the channel passes, `S_c ≥ T_c`, and stop at least where it scatters,
-/// `p_c ≥ σ_s,c T_c`: with the exponential of the channel, `S_c = T_c` and `p_c = σ_t,c T_c`. That holds
-/// along any ray if the extinction varies in space, as long as distances are sampled without bias. In a
-/// medium that says nothing, all three lanes are the distribution of `segment` and `sample_distance`.
+/// A walk through strongly chromatic media draws all its distances and directions from the lane of one
+/// channel (`docs/theory.md`, section 6.13). A medium offers lanes by
+/// [`lane_extinctions`](Self::lane_extinctions), [`segment_lanes`](Self::segment_lanes) and
+/// [`sample_lane`](Self::sample_lane). The lane of channel `c` should pass at least the light that the
+/// channel passes, `S_c ≥ T_c`, and stop at least where it scatters, `p_c ≥ σ_s,c T_c`: with the exponential
+/// of the channel, `S_c = T_c` and `p_c = σ_t,c T_c`. That holds along any ray if the extinction varies in
+/// space, as long as distances are sampled without bias. In a medium that says nothing, all three lanes are
+/// the distribution of `segment` and `sample_distance`.
 ///
 /// # Example
 ///
@@ -149,8 +150,9 @@ pub trait Medium: Send + Sync {
     }
 
     /// The largest factor, over the channels and over lengths, by which the second moment of a walk grows on
-    /// a segment, which it passes or stops in, if distances are drawn by
-    /// [`sample_distance`](Self::sample_distance), roulette by [`continuation`](Self::continuation) included
+    /// a segment, which it passes or stops and scatters in, if distances are drawn by
+    /// [`sample_distance`](Self::sample_distance) and directions by [`PhaseFunction::sample`], roulette by
+    /// [`continuation`](Self::continuation) included
     /// (`docs/theory.md`, section 1.4). At least one, that of a segment without a length. If it is one, walks
     /// need no lanes, however long they are. The default, infinity, is for media of which it is unknown.
     fn mixture_growth(&self) -> f64 {

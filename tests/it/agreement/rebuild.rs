@@ -126,8 +126,8 @@ fn henyey_greenstein(g: f64, cos: f64) -> f64 {
 /// comes from the light's side.
 struct Scattering {
     kind: VertexKind,
-    rho_light: f64,
-    rho_camera: f64,
+    rho_light: [f64; 3],
+    rho_camera: [f64; 3],
     cos_light: f64,
     cos_camera: f64,
     sin_theta: f64,
@@ -172,8 +172,8 @@ fn at_surface(
     let arrival = light_object.shape.normal(vertex.light);
     Scattering {
         kind: if vertex.delta { VertexKind::Delta } else { VertexKind::Surface },
-        rho_light: rho_light * survival(light),
-        rho_camera: rho_camera * survival(camera),
+        rho_light: [rho_light * survival(light); 3],
+        rho_camera: [rho_camera * survival(camera); 3],
         cos_light: to_light.dot(arrival).abs(),
         cos_camera: to_camera.dot(normal).abs(),
         sin_theta: 0.0,
@@ -186,10 +186,12 @@ fn in_medium(
     medium: MediumId,
     to_light: DVec3,
     to_camera: DVec3,
+    in_lanes: bool,
 ) -> Scattering {
     let fog = &scene.media[medium.0 as usize];
     let survival = if roulette.is_on() { Fog::CONTINUATION } else { 1.0 };
-    let rho = henyey_greenstein(f64::from(fog.g), -to_light.dot(to_camera)) * survival;
+    let lobes = fog.g.map(|g| henyey_greenstein(f64::from(g), -to_light.dot(to_camera)) * survival);
+    let rho = if in_lanes { lobes } else { [lobes.iter().sum::<f64>() / 3.0; 3] };
     Scattering {
         kind: VertexKind::Medium(medium),
         rho_light: rho,
@@ -306,8 +308,8 @@ impl Trace {
         let is_volume = matches!(light.source, Source::Volume(..));
         let end = PathVertex {
             kind: if is_volume { VertexKind::Volume } else { VertexKind::End },
-            rho_light: pdf_direction,
-            rho_camera: 0.0,
+            rho_light: [pdf_direction; 3],
+            rho_camera: [0.0; 3],
             cos_light: 1.0,
             cos_camera: cos,
             sin_theta: 0.0,
@@ -319,7 +321,7 @@ impl Trace {
             let scattering = if vertex.in_medium {
                 let (here, there) = (passed[i].last, passed[i + 1].first);
                 let Some(medium) = here.filter(|_| here == there) else { return Err(Doubt::Boundary) };
-                in_medium(scene, roulette, medium, to_light, to_camera)
+                in_medium(scene, roulette, medium, to_light, to_camera, in_lanes)
             } else {
                 at_surface(scene, roulette, vertex, to_light, to_camera)
             };
@@ -339,8 +341,8 @@ impl Trace {
         let cos = -direction(k - 1).dot(DVec3::NEG_Z);
         let film = f64::from(scene.camera.film_distance);
         vertices.push(PathVertex {
-            rho_light: 0.0,
-            rho_camera: (film / cos).powi(2) / cos,
+            rho_light: [0.0; 3],
+            rho_camera: [(film / cos).powi(2) / cos; 3],
             cos_camera: 1.0,
             kind: VertexKind::End,
             ..end

@@ -218,11 +218,11 @@ fn subsets_of_techniques() {
 }
 
 /// The scene with stronger colours: a channel that passes one of the media unseen, one that another only
-/// absorbs.
+/// absorbs, channels that scatter into other directions.
 fn colourful(camera: Vec3, size: u32) -> ClosedForm {
     let mut scene = ClosedForm::new(camera, size);
-    scene.media[0] = Fog::new([0.05, 0.02, 0.0], [0.4, 2.5, 0.0], 0.6);
-    scene.media[3] = Fog::new([0.3, 0.1, 1.5], [0.2, 0.8, 0.0], 0.3);
+    scene.media[0] = Fog::new([0.05, 0.02, 0.0], [0.4, 2.5, 0.0], 0.6).with_mean_cosines([0.6, 0.2, -0.3]);
+    scene.media[3] = Fog::new([0.3, 0.1, 1.5], [0.2, 0.8, 0.0], 0.3).with_mean_cosines([-0.5, 0.3, 0.3]);
     scene
 }
 
@@ -239,6 +239,7 @@ fn sub_paths_in_lanes() {
         let choices = IterationChoices { photon_beams, query_beams, lanes, ..choices() };
         audit_scene(&name, &colourful(CAMERAS[1], 48), &choices, 1000);
     }
+    audit_scene("colours without lanes", &colourful(CAMERAS[1], 48), &choices(), 1000);
     for camera in CAMERAS {
         let choices = IterationChoices { light_paths: 16_000, beam_paths: 1000, lanes, ..choices() };
         audit_scene("lanes, glowing bodies", &ClosedForm::glowing(camera, 64), &choices, 1000);

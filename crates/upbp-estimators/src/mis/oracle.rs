@@ -26,16 +26,17 @@ pub enum VertexKind {
     Delta,
 }
 
-/// A vertex of a path; index 0 is on the light.
+/// A vertex of a path; index 0 is on the light. Densities of directions are those of each of the lanes `L`;
+/// at the ends all lanes have the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PathVertex {
+pub struct PathVertex<L = f64> {
     /// Kind of the vertex.
     pub kind: VertexKind,
     /// `ρL_i`: solid-angle density (Dirac: probability) of the light walk towards the camera's side, roulette
     /// included.
-    pub rho_light: f64,
+    pub rho_light: L,
     /// `ρC_i`: the same of the camera walk towards the light's side.
-    pub rho_camera: f64,
+    pub rho_camera: L,
     /// `χ_i` towards the light's side; 1 in media.
     pub cos_light: f64,
     /// `χ_i` towards the camera's side; 1 in media.
@@ -44,6 +45,16 @@ pub struct PathVertex {
     pub sin_theta: f64,
     /// Kernel radii there, relative to those of the plan.
     pub scale: f64,
+}
+
+impl PathVertex {
+    /// The vertex with the densities of directions that `lanes` makes of its own.
+    #[must_use]
+    pub fn with_lanes<L>(self, lanes: impl Fn(f64) -> L) -> PathVertex<L> {
+        let Self { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta, scale } = self;
+        let (rho_light, rho_camera) = (lanes(rho_light), lanes(rho_camera));
+        PathVertex { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta, scale }
+    }
 }
 
 /// The edge between vertices `i` and `i + 1`.
@@ -59,11 +70,11 @@ pub struct PathEdge<L = f64> {
     pub pass_probability: L,
 }
 
-/// A whole path with `edges.len() + 1` vertices; densities of distances are those of each of the lanes `L`.
+/// A whole path with `edges.len() + 1` vertices, of walks in the lanes `L`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Path<L = f64> {
     /// Vertices from the light to the camera.
-    pub vertices: Vec<PathVertex>,
+    pub vertices: Vec<PathVertex<L>>,
     /// Edges from the light to the camera.
     pub edges: Vec<PathEdge<L>>,
     /// `L_0`, with the choice of the emitter.
@@ -109,18 +120,18 @@ impl<L: Lanes> Path<L> {
         self.edges.len()
     }
 
-    /// `L_i`, i ≥ 1, but for the distance: density of vertex `i` as the light walk makes it.
-    fn light_density(&self, i: usize) -> f64 {
+    /// `L_i`, i ≥ 1, but for the distance: density of vertex `i` as the light walk of a hero makes it.
+    fn light_density(&self, i: usize, hero: usize) -> f64 {
         let edge = &self.edges[i - 1];
         let d2 = if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 };
-        self.vertices[i - 1].rho_light * self.vertices[i].cos_light / d2
+        self.vertices[i - 1].rho_light.get(hero) * self.vertices[i].cos_light / d2
     }
 
-    /// `C_i`, i ≤ k − 1, but for the distance: density of vertex `i` as the camera walk makes it.
-    fn camera_density(&self, i: usize) -> f64 {
+    /// `C_i`, i ≤ k − 1, but for the distance: density of vertex `i` as the camera walk of a hero makes it.
+    fn camera_density(&self, i: usize, hero: usize) -> f64 {
         let edge = &self.edges[i];
         let d2 = if edge.distance.is_finite() { edge.distance * edge.distance } else { 1.0 };
-        self.vertices[i + 1].rho_camera * self.vertices[i].cos_camera / d2
+        self.vertices[i + 1].rho_camera.get(hero) * self.vertices[i].cos_camera / d2
     }
 
     /// The logarithms of the effective densities, counts included, of all strategies, if the light sub-path
@@ -128,6 +139,8 @@ impl<L: Lanes> Path<L> {
     fn densities(&self, plan: &MisPlan, hero_light: usize, hero_camera: usize) -> Vec<(Strategy, f64)> {
         let k = self.length();
         let ok = |i: usize| matches!(self.vertices[i].kind, VertexKind::Surface | VertexKind::Medium(_));
+        let light_density = |i: usize| self.light_density(i, hero_light);
+        let camera_density = |i: usize| self.camera_density(i, hero_camera);
         let t_light = |i: usize| self.edges[i - 1].t_light.get(hero_light);
         let t_camera = |i: usize| self.edges[i].t_camera.get(hero_camera);
 
@@ -135,11 +148,11 @@ impl<L: Lanes> Path<L> {
         let mut light = vec![0.0; k + 1];
         light[1] = log(self.pdf_position);
         for s in 2..=k {
-            light[s] = light[s - 1] + log(self.light_density(s - 1)) + log(t_light(s - 1));
+            light[s] = light[s - 1] + log(light_density(s - 1)) + log(t_light(s - 1));
         }
         let mut camera = vec![0.0; k + 1];
         for s in (0..k).rev() {
-            camera[s] = camera[s + 1] + log(self.camera_density(s)) + log(t_camera(s));
+            camera[s] = camera[s + 1] + log(camera_density(s)) + log(t_camera(s));
         }
 
         let mut densities = Vec::new();
@@ -165,7 +178,7 @@ impl<L: Lanes> Path<L> {
             }
         }
         for i in 1..k {
-            let both = light[i] + log(self.light_density(i)) + log(self.camera_density(i)) + camera[i + 1];
+            let both = light[i] + log(light_density(i)) + log(camera_density(i)) + camera[i + 1];
             match self.vertices[i].kind {
                 VertexKind::Surface => {
                     let both = both + log(t_light(i)) + log(t_camera(i));

@@ -31,24 +31,26 @@ pub struct VertexMis<D: Densities = f64, L: Lanes = f64> {
 }
 
 impl<D: Densities, L: Lanes> VertexMis<D, L> {
-    /// `B_i = D_i + ρ′ E_i` for the opposite scattering density `ρ′`, roulette included, sr⁻¹, and the shares
-    /// with which the other walk stops at the vertex.
+    /// `B_i = D_i + ρ′ E_i` for the opposite scattering density `ρ′` in each lane, roulette included, sr⁻¹,
+    /// and the shares with which the other walk stops at the vertex.
     #[inline]
     #[must_use]
-    pub fn before(&self, plan: &MisPlan, rho_opposite: f64, opposite: &L::Shares) -> D {
-        with_below(plan, self.connect, rho_opposite, || L::blend(D::ZERO, &self.below, opposite))
+    pub fn before(&self, plan: &MisPlan, rho_opposite: L, opposite: &L::Shares) -> D {
+        let (rho_opposite, scattered) = rho_opposite.step(opposite);
+        with_below(plan, self.connect, rho_opposite, || L::blend(D::ZERO, &self.below, &scattered))
     }
 
     /// `B_i` for each lane of the other walk.
     #[inline]
     #[must_use]
-    pub fn before_each(&self, plan: &MisPlan, rho_opposite: f64) -> L::Each<D> {
-        L::each(|lane| with_below(plan, self.connect, rho_opposite, || L::pick(&self.below, lane)))
+    pub fn before_each(&self, plan: &MisPlan, rho_opposite: L) -> L::Each<D> {
+        L::each(|lane| with_below(plan, self.connect, rho_opposite.get(lane), || L::pick(&self.below, lane)))
     }
 
     /// `F_i + B_i` times the density with which the `other` walk would make the vertex, for a connection to
     /// it: `kind` is the vertex with the direction of the connection, `density` the other walk's, but for its
-    /// distance, and `rho_opposite` the density with which it would then scatter along this sub-path.
+    /// distance, and `rho_opposite` the density with which each of its lanes would then scatter along this
+    /// sub-path.
     #[inline]
     #[must_use]
     pub fn end(
@@ -57,7 +59,7 @@ impl<D: Densities, L: Lanes> VertexMis<D, L> {
         walk: Walk,
         kind: MergeKind,
         other: &OtherWalk<L>,
-        rho_opposite: f64,
+        rho_opposite: L,
         density: f64,
     ) -> D {
         let OtherWalk { density: distance, ref shares } = *other;
@@ -110,7 +112,7 @@ pub struct EdgeMis<D: Densities = f64, L: Lanes = f64> {
     pub kind: MergeKind,
     /// The distance factor of the edge that arrived at it.
     pub distance_factor: f64,
-    /// Shares of the sub-path's own lanes.
+    /// Shares of the sub-path's own lanes, after it has scattered.
     pub shares: L::Shares,
     /// Whether the vertex can be connected to the next one.
     pub connectible: bool,

@@ -78,12 +78,13 @@ pub(crate) fn scatter<S: Scene, D: Densities, L: Lanes>(
     mis: &VertexMis<D, L>,
     interaction: &Interaction<S::Bsdf>,
     scale: f32,
-    scattered: &Scattered,
+    scattered: &Scattered<L>,
 ) -> EdgeMis<D, L> {
+    let (rho, shares) = scattered.rho_own.step(&mis.shares);
     let smooth = if scattered.delta { VertexMis { connect: D::ZERO, ..*mis } } else { *mis };
     EdgeMis {
         before: smooth.before_each(&context.plan.mis, scattered.rho_opposite),
-        rho: scattered.rho_own,
+        rho,
         cos_out: scattered.cos,
         kind: if scattered.delta {
             MergeKind::None
@@ -91,7 +92,7 @@ pub(crate) fn scatter<S: Scene, D: Densities, L: Lanes>(
             context.plan.merge_kind(interaction, scattered.sin_theta, scale)
         },
         distance_factor: mis.distance_factor,
-        shares: mis.shares,
+        shares,
         connectible: !scattered.delta,
         start: if interaction.in_medium() { EdgeStart::Medium } else { EdgeStart::Surface },
     }

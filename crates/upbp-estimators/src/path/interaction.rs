@@ -1,7 +1,7 @@
 //! Vertices where a path can be connected and merged, and how they scatter.
 
 use glam::Vec3;
-use upbp_media::{Medium, MediumId, MediumStack, PhaseFunction, Spectrum, orthonormal_basis};
+use upbp_media::{Lanes, Medium, MediumId, MediumStack, Spectrum, orthonormal_basis};
 
 use crate::random::{Decision, Stream};
 use crate::roulette::{Roulette, Survival};
@@ -53,13 +53,14 @@ impl<'a> MediumInterface<'a> {
 
 /// A pair of directions at a vertex, evaluated.
 #[derive(Clone, Copy, Debug)]
-pub struct Evaluation {
+pub struct Evaluation<L> {
     /// The scattering function `s`: BSDF times the shading-normal correction, or `σ_s ρ`.
     pub value: Spectrum,
-    /// Density of the own walk choosing this direction, times the albedo if there is roulette, sr⁻¹.
-    pub rho_own: f64,
+    /// Density of each lane of the own walk choosing this direction, times the albedo if there is roulette,
+    /// sr⁻¹.
+    pub rho_own: L,
     /// Density of the opposite walk, which comes from there and leaves to where this walk came from.
-    pub rho_opposite: f64,
+    pub rho_opposite: L,
     /// Cosine factor of the direction: with the geometric normal, 1 in a medium.
     pub cos: f64,
     /// Sine of the angle between the two lines in a medium.
@@ -68,7 +69,7 @@ pub struct Evaluation {
 
 /// A sampled direction at a vertex.
 #[derive(Clone, Copy, Debug)]
-pub struct Scattered {
+pub struct Scattered<L> {
     /// The new direction, a unit vector.
     pub direction: Vec3,
     /// Factor of the throughput, roulette included.
@@ -76,9 +77,9 @@ pub struct Scattered {
     /// The vertex's own probability to continue the walk, 1 without roulette.
     pub albedo: f32,
     /// Density as [`Evaluation::rho_own`]; for a Dirac lobe its probability.
-    pub rho_own: f64,
+    pub rho_own: L,
     /// Density as [`Evaluation::rho_opposite`]; for a Dirac lobe as in (4.6).
-    pub rho_opposite: f64,
+    pub rho_opposite: L,
     /// Cosine as [`Evaluation::cos`].
     pub cos: f64,
     /// Sine as [`Evaluation::sin_theta`].
@@ -149,7 +150,7 @@ impl<B: Bsdf> Interaction<B> {
 
     /// Evaluates the smooth scattering of `walk`, which came from `from` and goes to `to`; both directions
     /// point away from the vertex. `None` if nothing is scattered.
-    pub fn evaluate<S: Scene<Bsdf = B>>(
+    pub fn evaluate<S: Scene<Bsdf = B>, L: Lanes>(
         &self,
         scene: &S,
         roulette: Roulette,
@@ -157,7 +158,7 @@ impl<B: Bsdf> Interaction<B> {
         position: Vec3,
         from: Vec3,
         to: Vec3,
-    ) -> Option<Evaluation> {
+    ) -> Option<Evaluation<L>> {
         match self {
             Self::Surface(surface) => surface.evaluate(roulette, walk, from, to),
             Self::Medium(medium) => {
@@ -167,7 +168,8 @@ impl<B: Bsdf> Interaction<B> {
                 if value.is_black() {
                     return None;
                 }
-                let rho = f64::from(phase.pdf) * f64::from(continuation(medium, position, roulette));
+                let albedo = continuation(medium, position, roulette);
+                let rho = L::of_phase(&phase).times(L::splat(f64::from(albedo)));
                 Some(Evaluation {
                     value,
                     rho_own: rho,
@@ -179,16 +181,20 @@ impl<B: Bsdf> Interaction<B> {
         }
     }
 
-    /// Samples a direction for `walk`, which came from `from`. `None`: the walk ends.
-    pub fn scatter<S: Scene<Bsdf = B>>(
+    /// Samples a direction for `walk` with a hero, which came from `from` and whose lanes have `shares`.
+    /// `None`: the walk ends.
+    #[expect(clippy::too_many_arguments, reason = "called by the two walks, with their state")]
+    pub fn scatter<S: Scene<Bsdf = B>, L: Lanes>(
         &self,
         scene: &S,
         survival: &mut Survival,
         walk: Walk,
         position: Vec3,
         from: Vec3,
+        hero: L::Hero,
+        shares: &L::Shares,
         stream: &mut Stream,
-    ) -> Option<Scattered> {
+    ) -> Option<Scattered<L>> {
         let goes_on = stream.decide();
         match self {
             Self::Surface(surface) => {
@@ -202,19 +208,23 @@ impl<B: Bsdf> Interaction<B> {
                 if ends(goes_on, probability) {
                     return None;
                 }
-                let sample = PhaseFunction::sample(medium.phase(), -from, turn.pair());
-                if sample.pdf == 0.0 {
+                let direction = L::sample_direction(medium.phase(), -from, hero, turn.pair());
+                // From the direction as it was rounded, as whoever evaluates the density later has it.
+                let phase = medium.phase().eval(-from, direction);
+                let pdf = L::of_phase(&phase);
+                let mean = pdf.mean(shares) as f32;
+                if !(mean > 0.0) {
                     return None;
                 }
-                let rho = f64::from(sample.pdf) * f64::from(albedo);
+                let rho = pdf.times(L::splat(f64::from(albedo)));
                 Some(Scattered {
-                    direction: sample.after,
-                    weight: medium.sigma_s(position) * sample.weight / probability,
+                    direction,
+                    weight: medium.sigma_s(position) * (phase.value / mean) / probability,
                     albedo,
                     rho_own: rho,
                     rho_opposite: rho,
                     cos: 1.0,
-                    sin_theta: sine(from, sample.after),
+                    sin_theta: sine(from, direction),
                     delta: false,
                     transmitted: false,
                 })
@@ -260,7 +270,13 @@ impl<B: Bsdf> SurfaceInteraction<B> {
         (cos * shading_cosine > 0.0 && cos.abs() >= MIN_COSINE).then_some(cos)
     }
 
-    fn evaluate(&self, roulette: Roulette, walk: Walk, from: Vec3, to: Vec3) -> Option<Evaluation> {
+    fn evaluate<L: Lanes>(
+        &self,
+        roulette: Roulette,
+        walk: Walk,
+        from: Vec3,
+        to: Vec3,
+    ) -> Option<Evaluation<L>> {
         let (local_from, local_to) = (self.local(from), self.local(to));
         let cos_from = self.agreeing_cosine(from, local_from.z)?;
         let cos_to = self.agreeing_cosine(to, local_to.z)?;
@@ -274,14 +290,14 @@ impl<B: Bsdf> SurfaceInteraction<B> {
         let continuation = |of_bsdf: f32| f64::from(limited(of_bsdf, roulette));
         Some(Evaluation {
             value: bsdf.value * correction.abs(),
-            rho_own: f64::from(bsdf.pdf) * continuation(bsdf.continuation),
-            rho_opposite: f64::from(bsdf.pdf_reverse) * continuation(bsdf.continuation_reverse),
+            rho_own: L::splat(f64::from(bsdf.pdf) * continuation(bsdf.continuation)),
+            rho_opposite: L::splat(f64::from(bsdf.pdf_reverse) * continuation(bsdf.continuation_reverse)),
             cos: f64::from(cos_to.abs()),
             sin_theta: 0.0,
         })
     }
 
-    fn scatter(
+    fn scatter<L: Lanes>(
         &self,
         survival: &mut Survival,
         walk: Walk,
@@ -289,7 +305,7 @@ impl<B: Bsdf> SurfaceInteraction<B> {
         goes_on: Decision,
         lobe: Decision,
         turn: Decision,
-    ) -> Option<Scattered> {
+    ) -> Option<Scattered<L>> {
         let local_from = self.local(from);
         let cos_from = self.agreeing_cosine(from, local_from.z)?;
         let roulette = survival.roulette();
@@ -324,8 +340,8 @@ impl<B: Bsdf> SurfaceInteraction<B> {
             direction,
             weight,
             albedo,
-            rho_own: own,
-            rho_opposite: opposite,
+            rho_own: L::splat(own),
+            rho_opposite: L::splat(opposite),
             cos: f64::from(cos_to.abs()),
             sin_theta: 0.0,
             delta: sample.delta,

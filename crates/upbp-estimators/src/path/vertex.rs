@@ -41,7 +41,7 @@ impl<B: Bsdf, D: Densities, L: Lanes> LightVertex<B, D, L> {
         &self,
         context: &Context<'_, S>,
         to: Vec3,
-    ) -> Option<Evaluation> {
+    ) -> Option<Evaluation<L>> {
         let (scene, roulette) = (context.prepared.scene, context.plan.roulette);
         self.interaction.evaluate(scene, roulette, Walk::Light, self.position, self.towards_light, to)
     }
@@ -175,7 +175,7 @@ impl<B: Bsdf, D: Densities, L: Lanes> CameraVertex<B, D, L> {
         &self,
         context: &Context<'_, S>,
         to: Vec3,
-    ) -> Option<Evaluation> {
+    ) -> Option<Evaluation<L>> {
         let (scene, roulette) = (context.prepared.scene, context.plan.roulette);
         self.interaction.evaluate(scene, roulette, Walk::Camera, self.position, self.towards_camera, to)
     }

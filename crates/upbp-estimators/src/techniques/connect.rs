@@ -81,15 +81,17 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let distance2 = f64::from(distance).powi(2);
     let passes = density.pass_probability;
     // Each walk, had it gone on instead of this connection.
-    let light_walk = mis.other_walk(Walk::Light, near, passes, density.backward(near), &light.mis.shares);
-    let camera_walk = mis.other_walk(Walk::Camera, far, passes, density.forward(far), &vertex.mis.shares);
+    let (light_rho, light_shares) = light_side.rho_own.step(&light.mis.shares);
+    let (camera_rho, camera_shares) = camera_side.rho_own.step(&vertex.mis.shares);
+    let light_walk = mis.other_walk(Walk::Light, near, passes, density.backward(near), &light_shares);
+    let camera_walk = mis.other_walk(Walk::Camera, far, passes, density.forward(far), &camera_shares);
     let camera_end = vertex.mis.end(
         mis,
         Walk::Camera,
         plan.merge_kind(&vertex.interaction, camera_side.sin_theta, vertex.scale),
         &light_walk,
         camera_side.rho_opposite,
-        light_side.rho_own * camera_side.cos / distance2,
+        light_rho * camera_side.cos / distance2,
     );
     let light_end = light.mis.end(
         mis,
@@ -97,7 +99,7 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         plan.merge_kind(&light.interaction, light_side.sin_theta, light.scale),
         &camera_walk,
         light_side.rho_opposite,
-        camera_side.rho_own * light_side.cos / distance2,
+        camera_rho * light_side.cos / distance2,
     );
     let weight = mis.connect_weight(light_end, camera_end);
     let geometry = camera_side.cos * light_side.cos / distance2;

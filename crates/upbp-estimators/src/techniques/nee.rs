@@ -68,12 +68,13 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let pdf_position = f64::from(prepared.emission_probability(emitter)) * f64::from(incident.pdf_position);
     let geometry = f64::from(cos_light) * scattering.cos / distance2;
 
+    let (rho, shares) = scattering.rho_own.step(&vertex.mis.shares);
     let arrives = match kind {
         EmitterKind::Volume(_) => f64::from(light.pdf_passage(&incident.point)),
-        _ if kind.is_hittable() => density.pass_probability.mean(&vertex.mis.shares),
+        _ if kind.is_hittable() => density.pass_probability.mean(&shares),
         _ => 0.0,
     };
-    let hit_density = scattering.rho_own * f64::from(cos_light) / distance2 * arrives;
+    let hit_density = rho * f64::from(cos_light) / distance2 * arrives;
     let factor = prepared.emission_factor(emitter, &incident.point, -direction, vertex.position);
     let light_density = f64::from(incident.pdf_direction * factor) * scattering.cos / distance2;
     let (passes, stops) = (density.pass_probability, density.backward(in_medium));

@@ -163,12 +163,14 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             }
         }
 
-        let Some(scattered) = vertex.interaction.scatter(
+        let Some(scattered) = vertex.interaction.scatter::<_, L>(
             scene,
             &mut survival,
             Walk::Camera,
             vertex.position,
             from,
+            hero,
+            &vertex.mis.shares,
             &mut stream,
         ) else {
             break;

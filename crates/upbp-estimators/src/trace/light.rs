@@ -121,9 +121,17 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             }
         }
 
-        let Some(scattered) =
-            interaction.scatter(scene, &mut survival, Walk::Light, position, from, &mut stream)
-        else {
+        let hero = flight.hero;
+        let Some(scattered) = interaction.scatter::<_, L>(
+            scene,
+            &mut survival,
+            Walk::Light,
+            position,
+            from,
+            hero,
+            &mis.shares,
+            &mut stream,
+        ) else {
             return;
         };
         observer.light_vertex(
@@ -144,7 +152,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,
             infinite: false,
-            hero: flight.hero,
+            hero,
         };
     }
 }

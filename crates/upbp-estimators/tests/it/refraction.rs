@@ -144,11 +144,20 @@ fn jacobian(direction: DVec3, normal: DVec3, ratio: f64) -> f64 {
     DMat3::from_cols(ds, dt, refract(direction, normal, ratio)).determinant().abs()
 }
 
-fn transmitted(interaction: &Interaction<Glass>, walk: Walk, from: Vec3) -> Option<Scattered> {
+fn transmitted(interaction: &Interaction<Glass>, walk: Walk, from: Vec3) -> Option<Scattered<f64>> {
     (0..64).find_map(|index| {
         let mut stream = Stream::new(1, 0, StreamKind::Light, index);
         let mut survival = Survival::of_light(Roulette::Below(1.0));
-        let scattered = interaction.scatter(&Nothing, &mut survival, walk, Vec3::ZERO, from, &mut stream);
+        let scattered = interaction.scatter::<_, f64>(
+            &Nothing,
+            &mut survival,
+            walk,
+            Vec3::ZERO,
+            from,
+            (),
+            &(),
+            &mut stream,
+        );
         scattered.filter(|scattered| scattered.transmitted)
     })
 }

@@ -53,7 +53,8 @@ pub enum PhaseFunction {
 pub struct PhaseValue {
     /// Value per steradian, at most three times the density in each channel.
     pub value: Spectrum,
-    /// Density per steradian with which [`PhaseFunction::sample`] draws the direction.
+    /// Density per steradian with which [`PhaseFunction::sample`] draws the direction; for one channel it is
+    /// drawn with the density that is the value there.
     pub pdf: f32,
 }
 
@@ -180,12 +181,41 @@ impl PhaseFunction {
     #[inline]
     #[must_use]
     pub fn sample(&self, before: Vec3, u: [f32; 2]) -> PhaseSample {
-        let after = self.sample_direction(before, u);
+        let after = self.sample_direction(before, None, u);
         // From the direction as it was rounded, not from `u`: in a narrow peak the two differ by percents,
         // and whoever evaluates the density later only has the direction.
         let PhaseValue { value, pdf } = self.eval(before, after);
         let weight = if pdf > 0.0 { value / pdf } else { Spectrum::ZERO };
         PhaseSample { after, weight, pdf }
+    }
+
+    /// Whether two channels see different phase functions.
+    pub(crate) fn differs(&self, channel: usize, other: usize) -> bool {
+        match self {
+            Self::Blend(_) | Self::PerChannel(_) => self.channel(channel) != self.channel(other),
+            _ => false,
+        }
+    }
+
+    /// For each channel the factor by which the second moment of a walk grows where it scatters, if
+    /// directions are drawn by [`sample`](Self::sample): `∫ ρ_c² / p dω`. One if channels do not differ.
+    pub(crate) fn turn_growth(&self) -> [f64; 3] {
+        /// Points of the quadrature, over the distribution of the channel.
+        const POINTS: u32 = 1024;
+        /// One over the golden ratio.
+        const STEP: f64 = 0.618_033_988_749_894_8;
+        if !(self.differs(0, 1) || self.differs(0, 2)) {
+            return [1.0; 3];
+        }
+        [0, 1, 2].map(|channel| {
+            let ratio = |i: u32| {
+                let u = [(f64::from(i) + 0.5) / f64::from(POINTS), (STEP * f64::from(i)).fract()];
+                let after = self.sample_direction(Vec3::Z, Some(channel), u.map(|u| u as f32));
+                let PhaseValue { value, pdf } = self.eval(Vec3::Z, after);
+                if pdf > 0.0 { f64::from(value[channel] / pdf) } else { 0.0 }
+            };
+            (0..POINTS).map(ratio).sum::<f64>() / f64::from(POINTS)
+        })
     }
 
     /// Mean cosine of the angle between the directions of propagation, in `(-1, 1)`.
@@ -223,8 +253,14 @@ impl PhaseFunction {
         })
     }
 
+    /// Draws the direction after a collision, for one channel or for any.
     #[inline]
-    fn sample_direction(&self, before: Vec3, [u_angle, u_azimuth]: [f32; 2]) -> Vec3 {
+    pub(crate) fn sample_direction(
+        &self,
+        before: Vec3,
+        channel: Option<usize>,
+        [u_angle, u_azimuth]: [f32; 2],
+    ) -> Vec3 {
         let deflection = match self {
             Self::Isotropic => isotropic(u_angle),
             Self::HenyeyGreenstein(g) => henyey_greenstein::sample(*g, f64::from(u_angle)),
@@ -233,11 +269,14 @@ impl PhaseFunction {
             Self::Tabulated(table) => table.sample(u_angle),
             Self::Blend(blend) => {
                 let (part, u_azimuth) = blend.choose(u_azimuth);
-                return part.sample_direction(before, [u_angle, u_azimuth]);
+                return part.sample_direction(before, channel, [u_angle, u_azimuth]);
             }
             Self::PerChannel(channels) => {
-                let (part, u_azimuth) = channels.choose(u_azimuth);
-                return part.sample_direction(before, [u_angle, u_azimuth]);
+                let (part, u_azimuth) = match channel {
+                    Some(channel) => (&channels.channels()[channel], u_azimuth),
+                    None => channels.choose(u_azimuth),
+                };
+                return part.sample_direction(before, None, [u_angle, u_azimuth]);
             }
         };
         deflection.direction(before, u_azimuth)

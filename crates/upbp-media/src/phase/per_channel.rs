@@ -6,8 +6,10 @@ use crate::Spectrum;
 
 /// A phase function for each channel, made by [`PhaseFunction::per_channel`].
 ///
-/// Directions are drawn for a channel that is itself drawn uniformly, so that their density is the mean of
-/// the three: both ends of a path know it, and no channel's value is more than three times the density.
+/// A walk with [lanes](crate::Lanes) draws all its directions for the channel of its hero. Without lanes a
+/// channel is drawn uniformly anew at each collision, so that the density is the mean of the three: both ends
+/// of a path know it, and no channel's value is more than three times the density, but over many collisions
+/// the factors multiply.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PerChannel {
     /// None of them is itself per channel.

@@ -11,8 +11,8 @@ pub struct Fog {
     pub sigma_a: [f32; 3],
     /// Scattering coefficients per channel, per unit of length.
     pub sigma_s: [f32; 3],
-    /// Mean cosine of the scattering angle.
-    pub g: f32,
+    /// Mean cosine of the scattering angle per channel.
+    pub g: [f32; 3],
     /// Radiance that is emitted per length.
     pub glow: Spectrum,
     phase: PhaseFunction,
@@ -28,7 +28,14 @@ impl Fog {
     /// Fog of these coefficients that scatters by Henyey and Greenstein.
     pub fn new(sigma_a: [f32; 3], sigma_s: [f32; 3], g: f32) -> Self {
         let phase = PhaseFunction::henyey_greenstein(g).expect("in range");
-        Self { sigma_a, sigma_s, g, glow: Spectrum::ZERO, phase }
+        Self { sigma_a, sigma_s, g: [g; 3], glow: Spectrum::ZERO, phase }
+    }
+
+    /// The same with a mean cosine for each channel.
+    #[must_use]
+    pub fn with_mean_cosines(self, g: [f32; 3]) -> Self {
+        let lobes = g.map(|g| PhaseFunction::henyey_greenstein(g).expect("in range"));
+        Self { g, phase: PhaseFunction::per_channel(lobes), ..self }
     }
 
     /// Extinction coefficients per channel, per unit of length.

@@ -19,15 +19,15 @@ pub(crate) struct Recursion<'a, D: Densities, L: Lanes = f64> {
     pub(crate) at_light: VertexMis<D, L>,
 }
 
-pub(crate) fn is_ok(vertex: &PathVertex) -> bool {
+pub(crate) fn is_ok<L>(vertex: &PathVertex<L>) -> bool {
     matches!(vertex.kind, VertexKind::Surface | VertexKind::Medium(_))
 }
 
-fn in_medium(vertex: &PathVertex) -> bool {
+fn in_medium<L>(vertex: &PathVertex<L>) -> bool {
     matches!(vertex.kind, VertexKind::Medium(_))
 }
 
-fn start(vertex: &PathVertex) -> EdgeStart {
+fn start<L>(vertex: &PathVertex<L>) -> EdgeStart {
     match vertex.kind {
         VertexKind::Medium(_) => EdgeStart::Medium,
         VertexKind::Volume => EdgeStart::Volume,
@@ -35,7 +35,7 @@ fn start(vertex: &PathVertex) -> EdgeStart {
     }
 }
 
-fn kind(vertex: &PathVertex) -> MergeKind {
+fn kind<L>(vertex: &PathVertex<L>) -> MergeKind {
     match vertex.kind {
         VertexKind::Surface => MergeKind::Surface { scale: vertex.scale },
         VertexKind::Medium(medium) => {
@@ -52,12 +52,13 @@ fn distance_squared<L>(edge: &PathEdge<L>) -> f64 {
 /// The values that a vertex passes on after it has scattered.
 fn scatter<D: Densities, L: Lanes>(
     plan: &MisPlan,
-    vertex: &PathVertex,
+    vertex: &PathVertex<L>,
     vertex_mis: &VertexMis<D, L>,
-    rho: f64,
-    rho_opposite: f64,
+    rho_own: L,
+    rho_opposite: L,
     cos_out: f64,
 ) -> EdgeMis<D, L> {
+    let (rho, shares) = rho_own.step(&vertex_mis.shares);
     let vertex_mis = if is_ok(vertex) { *vertex_mis } else { VertexMis { connect: D::ZERO, ..*vertex_mis } };
     EdgeMis {
         before: vertex_mis.before_each(plan, rho_opposite),
@@ -65,7 +66,7 @@ fn scatter<D: Densities, L: Lanes>(
         cos_out,
         kind: kind(vertex),
         distance_factor: vertex_mis.distance_factor,
-        shares: vertex_mis.shares,
+        shares,
         connectible: is_ok(vertex),
         start: start(vertex),
     }
@@ -85,8 +86,9 @@ impl<'a, D: Densities, L: Lanes> Recursion<'a, D, L> {
             VertexKind::Volume => path.edges[0].t_camera.mean(&L::prior(&plan.lanes)),
             _ => f64::from(u8::from(path.hittable)),
         };
+        let pdf_direction = v[0].rho_light.get(0);
         let mut edge_mis =
-            EdgeMis::at_light(plan, start(&v[0]), hit, v[0].cos_camera, path.pdf_position, v[0].rho_light);
+            EdgeMis::at_light(plan, start(&v[0]), hit, v[0].cos_camera, path.pdf_position, pdf_direction);
         for i in 1..k {
             let e = &path.edges[i - 1];
             let edge = Edge {
@@ -109,7 +111,7 @@ impl<'a, D: Densities, L: Lanes> Recursion<'a, D, L> {
         }
         let mut camera = vec![nowhere; k + 1];
         let mut at_light = nowhere;
-        let mut edge_mis = EdgeMis::at_camera(plan, v[k].rho_camera);
+        let mut edge_mis = EdgeMis::at_camera(plan, v[k].rho_camera.get(0));
         for i in (0..k).rev() {
             let e = &path.edges[i];
             let edge = Edge {
@@ -142,14 +144,15 @@ impl<'a, D: Densities, L: Lanes> Recursion<'a, D, L> {
     /// from where its lanes have `shares`.
     fn light_end(&self, i: usize, shares: &L::Shares) -> D {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i]);
+        let (rho, shares) = self.path.vertices[i + 1].rho_camera.step(shares);
         let other = self.plan.other_walk(
             Walk::Camera,
             in_medium(vertex),
             edge.pass_probability,
             edge.t_camera,
-            shares,
+            &shares,
         );
-        let density = self.path.vertices[i + 1].rho_camera * vertex.cos_camera / distance_squared(edge);
+        let density = rho * vertex.cos_camera / distance_squared(edge);
         self.light[i].end(self.plan, Walk::Light, kind(vertex), &other, vertex.rho_camera, density)
     }
 
@@ -157,18 +160,24 @@ impl<'a, D: Densities, L: Lanes> Recursion<'a, D, L> {
     /// from where its lanes have `shares`; its density times `factor`.
     fn camera_end(&self, i: usize, shares: &L::Shares, factor: f64) -> D {
         let (vertex, edge) = (&self.path.vertices[i], &self.path.edges[i - 1]);
-        let other =
-            self.plan.other_walk(Walk::Light, in_medium(vertex), edge.pass_probability, edge.t_light, shares);
-        let density =
-            factor * self.path.vertices[i - 1].rho_light * vertex.cos_light / distance_squared(edge);
+        let (rho, shares) = self.path.vertices[i - 1].rho_light.step(shares);
+        let other = self.plan.other_walk(
+            Walk::Light,
+            in_medium(vertex),
+            edge.pass_probability,
+            edge.t_light,
+            &shares,
+        );
+        let density = factor * rho * vertex.cos_light / distance_squared(edge);
         self.camera[i].end(self.plan, Walk::Camera, kind(vertex), &other, vertex.rho_light, density)
     }
 
     /// `C_0`, given that vertex 1 scatters towards it.
     fn hit_density(&self) -> f64 {
         let (edge, v) = (&self.path.edges[0], &self.path.vertices);
-        let t = edge.t_camera.mean(&self.camera[1].shares);
-        v[1].rho_camera * v[0].cos_camera / distance_squared(edge) * t
+        let (rho, shares) = v[1].rho_camera.step(&self.camera[1].shares);
+        let t = edge.t_camera.mean(&shares);
+        rho * v[0].cos_camera / distance_squared(edge) * t
     }
 
     fn merge(&self, i: usize, factor: impl Fn(&VolumeMerges) -> f64) -> Weight<D> {
@@ -191,7 +200,7 @@ impl<'a, D: Densities, L: Lanes> Recursion<'a, D, L> {
     pub(crate) fn weight(&self, way: Way) -> Weight<D> {
         let Self { plan, path, .. } = *self;
         let k = path.length();
-        let rho_light = path.vertices[0].rho_light;
+        let rho_light = path.vertices[0].rho_light.get(0);
         let start = L::prior(&plan.lanes);
         match way {
             Way::Hit if k == 1 => Weight::alone(Technique::Hit),
