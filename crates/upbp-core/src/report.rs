@@ -149,7 +149,7 @@ impl fmt::Display for Report {
         if c.cut_walks > 0 {
             writeln!(
                 f,
-                "{} camera sub-paths were ended by the limit of the path length (max_length): light is missing",
+                "light is missing: {} camera sub-paths were ended by the limit of the path length; raise max_length",
                 c.cut_walks
             )?;
         }
@@ -163,12 +163,13 @@ impl fmt::Display for Report {
                 "{count} walks were lost: they left the scene inside of a body (is a mesh not closed?)"
             )?;
         }
-        if c.boundary_conflicts > 0 {
-            let edges = c.camera_edges as f64 + c.light_edges as f64;
+        let edges = c.camera_edges as f64 + c.light_edges as f64;
+        // Fewer are rounding, where surfaces cut each other or are only just touched.
+        if c.boundary_conflicts as f64 > 1e-4 * edges {
             writeln!(
                 f,
-                "{} boundaries on {edges:.1e} edges contradict the bodies around them and were ignored: a few, where \
-                 surfaces cut each other, are rounding; many are a mesh that is not closed",
+                "{} boundaries on {edges:.1e} edges contradict the bodies around them and were ignored: do surfaces of \
+                 bodies almost coincide?",
                 c.boundary_conflicts
             )?;
         }

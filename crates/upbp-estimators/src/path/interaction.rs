@@ -204,7 +204,7 @@ impl<B: Bsdf> Interaction<B> {
                 let turn = stream.decide();
                 let medium = &scene.media()[medium.0 as usize];
                 let albedo = continuation(medium, position, survival.roulette());
-                let probability = survival.probability(albedo);
+                let probability = survival.probability(albedo, true);
                 if ends(goes_on, probability) {
                     return None;
                 }
@@ -310,7 +310,7 @@ impl<B: Bsdf> SurfaceInteraction<B> {
         let cos_from = self.agreeing_cosine(from, local_from.z)?;
         let roulette = survival.roulette();
         let albedo = self.continuation(local_from, roulette);
-        let probability = survival.probability(albedo);
+        let probability = survival.probability(albedo, self.bsdf.is_connectible());
         if ends(goes_on, probability) {
             return None;
         }
