@@ -135,7 +135,9 @@ mod tests {
         assert_eq!(survival.probability(1.0, true), 1.0, "a smooth lobe lets it out");
         assert_eq!(survival.probability(1.0, false), 1.0);
         let mut camera = Survival::of_camera(Roulette::Below(0.5));
-        (0..70).for_each(|_| drop(camera.probability(1.0, false)));
+        for _ in 0..70 {
+            let _ = camera.probability(1.0, false);
+        }
         assert_eq!(camera.probability(0.8, true), 1.0, "albedos count alone");
     }
 }

@@ -30,7 +30,7 @@ struct Surface {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     normals: Option<Vec<Vec3>>,
-    closed: bool,
+    border: Border,
     dropped: usize,
 }
 
@@ -65,7 +65,7 @@ impl TriangleMesh {
         }
 
         // Before anything is dropped: a triangle without area may still join its neighbours.
-        let closed = is_closed(&positions, &indices);
+        let border = Border::of(&positions, &indices);
         let count = indices.len();
         let mut triangles = indices;
         let has_area =
@@ -75,7 +75,7 @@ impl TriangleMesh {
             return Err(GeometryError::Degenerate { what: "a mesh" });
         }
         let dropped = count - triangles.len();
-        let surface = Arc::new(Surface { positions, triangles, normals, closed, dropped });
+        let surface = Arc::new(Surface { positions, triangles, normals, border, dropped });
         Ok(Self::with_surface(surface, None))
     }
 
@@ -119,14 +119,14 @@ impl TriangleMesh {
     #[must_use]
     pub fn unshared(self) -> Self {
         let Some(placement) = self.placement else { return self };
-        let Surface { positions, triangles, normals, closed, dropped } = &*self.surface;
+        let Surface { positions, triangles, normals, border, dropped } = &*self.surface;
         let surface = Surface {
             positions: positions.iter().map(|position| placement.point(*position)).collect(),
             triangles: (0..triangles.len() as u32).map(|triangle| self.vertices(triangle)).collect(),
             normals: normals
                 .as_ref()
                 .map(|normals| normals.iter().map(|normal| placement.normal(*normal)).collect()),
-            closed: *closed,
+            border: *border,
             dropped: *dropped,
         };
         Self { surface: Arc::new(surface), placement: None, ..self }
@@ -241,7 +241,13 @@ impl TriangleMesh {
     /// Vertices at the same position count as one, so that seams of normals or textures do not matter.
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        self.surface.closed
+        self.surface.border == Border::Nowhere
+    }
+
+    /// Whether the mesh would be closed if some of its triangles were wound the other way.
+    #[must_use]
+    pub fn has_mixed_winding(&self) -> bool {
+        self.surface.border == Border::BetweenWindings
     }
 
     /// Whether `point` lies inside; `None` for a mesh that is not closed.
@@ -263,7 +269,7 @@ impl TriangleMesh {
     /// The intersection test decides edges and corners consistently, so that any direction gives the right
     /// parity.
     pub(super) fn contains_by(&self, point: Vec3, crossings: impl FnOnce(Ray) -> usize) -> Option<bool> {
-        if !self.surface.closed {
+        if !self.is_closed() {
             return None;
         }
         let (min, max) = self.bounds;
@@ -322,33 +328,51 @@ fn cross(corners: [Vec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Whether every edge joins exactly two triangles that are wound alike; equal positions count as one.
-fn is_closed(positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
-    // Adding zero turns −0 into +0, which is the same place.
-    let key = |vertex: u32| positions[vertex as usize].to_array().map(|x| (x + 0.0).to_bits());
-    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
-    order.sort_unstable_by_key(|&vertex| key(vertex));
-    let mut place = vec![0; positions.len()];
-    for pair in order.windows(2) {
-        let step = u32::from(key(pair[0]) != key(pair[1]));
-        place[pair[1] as usize] = place[pair[0] as usize] + step;
-    }
+/// Where a mesh ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Border {
+    /// Every edge joins exactly two triangles that are wound alike.
+    Nowhere,
+    /// Every edge joins exactly two triangles, but not all are wound alike.
+    BetweenWindings,
+    /// There are edges of one triangle, or of more than two.
+    Somewhere,
+}
 
-    let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * triangles.len());
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|vertex| place[vertex as usize]);
-        if a == b || b == c || c == a {
-            continue;
+impl Border {
+    /// The border of these triangles; equal positions count as one.
+    fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        // Adding zero turns −0 into +0, which is the same place.
+        let key = |vertex: u32| positions[vertex as usize].to_array().map(|x| (x + 0.0).to_bits());
+        let mut order: Vec<u32> = (0..positions.len() as u32).collect();
+        order.sort_unstable_by_key(|&vertex| key(vertex));
+        let mut place = vec![0; positions.len()];
+        for pair in order.windows(2) {
+            let step = u32::from(key(pair[0]) != key(pair[1]));
+            place[pair[1] as usize] = place[pair[0] as usize] + step;
         }
-        edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to)));
-    }
-    edges.sort_unstable();
-    let (pairs, rest) = edges.as_chunks::<2>();
-    !pairs.is_empty()
+
+        let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * triangles.len());
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|vertex| place[vertex as usize]);
+            if a == b || b == c || c == a {
+                continue;
+            }
+            edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to)));
+        }
+        edges.sort_unstable();
+        let (pairs, rest) = edges.as_chunks::<2>();
+        let joins_two = !pairs.is_empty()
         && rest.is_empty()
-        && pairs.iter().all(|[first, second]| {
-            (first.0, first.1) == (second.0, second.1) && first.2 != second.2
-        })
+        && pairs.iter().all(|[first, second]| (first.0, first.1) == (second.0, second.1))
         // The same edge in two pairs would join four triangles.
-        && pairs.windows(2).all(|two| (two[0][0].0, two[0][0].1) != (two[1][0].0, two[1][0].1))
+        && pairs.windows(2).all(|two| (two[0][0].0, two[0][0].1) != (two[1][0].0, two[1][0].1));
+        if !joins_two {
+            Self::Somewhere
+        } else if pairs.iter().all(|[first, second]| first.2 != second.2) {
+            Self::Nowhere
+        } else {
+            Self::BetweenWindings
+        }
+    }
 }

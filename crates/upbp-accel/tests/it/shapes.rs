@@ -203,6 +203,10 @@ fn only_meshes_without_a_border_are_closed() {
     let mut flipped = triangles.clone();
     flipped[3].swap(0, 1);
     assert!(!closed(&flipped), "a triangle wound the other way");
+    let mixed = |triangles: &[[u32; 3]]| {
+        TriangleMesh::new(positions.clone(), triangles.to_vec(), None).unwrap().has_mixed_winding()
+    };
+    assert!(mixed(&flipped) && !mixed(&triangles) && !mixed(&flipped[1..]));
 
     // Own vertices for every triangle, as files with flat normals have.
     let separate = triangles.iter().flatten().map(|&vertex| positions[vertex as usize]).collect();

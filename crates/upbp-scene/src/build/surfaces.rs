@@ -113,8 +113,13 @@ impl Builder<'_> {
         }
         let geometry = geometry.ok()?;
         if !geometry.is_closed() {
-            let message = format!("the material `{name}` bounds a body, but the shape is not closed");
-            self.problem(&item, message);
+            let wrong = match &geometry {
+                Shape::Mesh(mesh) if mesh.has_mixed_winding() => {
+                    "some triangles are wound the other way round than those next to them"
+                }
+                _ => "the shape is not closed",
+            };
+            self.problem(&item, format!("the material `{name}` bounds a body, but {wrong}"));
             return None;
         }
         if let Shape::Mesh(mesh) = &geometry

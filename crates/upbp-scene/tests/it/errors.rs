@@ -274,6 +274,11 @@ fn problems_of_meshes_name_the_triangle() {
             "glass",
             "the triangles are wound the wrong way round: normals must point out of the body",
         ),
+        (
+            "CORNERS, indices: [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 3, 2)]",
+            "glass",
+            "the material `glass` bounds a body, but some triangles are wound the other way round than those next to them",
+        ),
     ];
     for (mesh, material, expected) in cases {
         let mesh = mesh.replace("CORNERS", CORNERS);
