@@ -36,24 +36,24 @@ impl TextError {
         let (line, column) = (error.span.start.line, error.span.start.col);
         let message = match &error.code {
             Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) | Error::ExpectedIdentifier => {
-                "expected a word, such as `Auto` or `Count(1000)`".to_owned()
+                "expected a word, as `Auto` is one".to_owned()
             }
             Error::ExpectedInteger | Error::InvalidIntegerDigit { .. } => {
                 "expected a whole number".to_owned()
             }
             Error::IntegerOutOfBounds => "the whole number is too large or negative".to_owned(),
             // These name the field.
-            Error::MissingStructField { .. }
+            Error::Message(_)
+            | Error::MissingStructField { .. }
             | Error::NoSuchStructField { .. }
             | Error::DuplicateStructField { .. } => {
                 return Self { line, column, message: error.code.to_string() };
             }
             code => code.to_string(),
         };
-        let before = text.lines().take(line.saturating_sub(1)).map(|line| line.len() + 1).sum::<usize>();
-        let rest = text.get(before..).unwrap_or_default();
-        let length: usize = rest.chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
-        let message = match last_field(&text[..before.min(text.len()) + length]) {
+        let lines: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+        let length: usize = text[lines..].chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
+        let message = match last_field(&text[..lines + length]) {
             Some(field) => format!("`{field}`: {message}"),
             None => message,
         };

@@ -44,9 +44,9 @@ pub struct Plan {
     pub vertices_per_light_path: f64,
     /// First radii and how they shrink.
     pub radii: RadiusSchedule,
-    /// The probability of each lane to be the one that a sub-path draws all its distances from
-    /// (`docs/theory.md`, section 6.13); they sum to one. `None` if every segment draws from its medium's own
-    /// distribution.
+    /// The probability of each lane to be the one that a sub-path draws all its distances and directions from
+    /// (`docs/theory.md`, section 6.13); they sum to one. `None` if every step draws from its medium's own
+    /// distributions.
     pub lanes: Option<[f64; 3]>,
 }
 
@@ -168,7 +168,7 @@ impl fmt::Display for Plan {
             Roulette::Below(least) => write!(f, ", roulette below {least}")?,
         }
         if self.lanes.is_some() {
-            write!(f, ", distances by channel")?;
+            write!(f, ", lanes by channel")?;
         }
         for technique in self.techniques.iter().filter(|technique| self.periods.period(*technique) > 1) {
             write!(f, ", {} in one of {} pixels", technique.name(), self.periods.period(technique))?;
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(FrozenPlan::from_ron(&text), Ok(frozen));
         assert_eq!(
             plan().to_string(),
-            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, camera factor 4, roulette below 0.5, distances by channel, surf in one of 4 pixels"
+            "hit+nee+surf, 1000 light sub-paths, 2 next events per vertex, camera factor 4, roulette below 0.5, lanes by channel, surf in one of 4 pixels"
         );
     }
 
@@ -250,7 +250,10 @@ mod tests {
         assert!(wrong(|p| p.light_paths = 0).contains("light_paths"));
         assert!(wrong(|p| p.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|p| p.radii.pb2d = f32::NAN).contains("radii"));
-        assert!(wrong(|p| p.lanes = Some([0.5; 3])).contains("lanes"));
+        assert!(wrong(|p| p.lanes = Some([0.5; 3])).contains("lanes: expected None, or"));
+        let message = wrong(|p| p.connections = 1e9);
+        assert!(message.contains(": connections, next_events: expected 0.001"), "{message}");
+        assert!(!message.contains("lanes"), "{message}");
         // This one cannot even be spelled.
         let without = Plan { techniques: TechniqueSet::EMPTY, ..plan() };
         assert!(without.validate().unwrap_err().contains("techniques"));

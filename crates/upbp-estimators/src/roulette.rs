@@ -10,10 +10,11 @@ use serde::{Deserialize, Serialize};
 /// with certainty until the product of their albedos falls below a threshold, and hold it from then on.
 ///
 /// Walks of both kinds may be caught inside of clear glass, where total reflection never lets them out: after
-/// many vertices in a row that only reflect or refract, some in a hundred end at each more.
+/// many vertices in a row that only reflect or refract, two in a hundred end at each further one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Roulette {
-    /// Walks end where they leave the scene, or at the greatest length.
+    /// Walks end where they leave the scene, or at the greatest length, which those that total reflection
+    /// keeps inside of glass always reach.
     Off,
     /// A camera sub-path is cut so that no less of its throughput is left by albedos than this, in `(0, 1]`.
     Below(f32),
@@ -28,7 +29,7 @@ impl Roulette {
         matches!(self, Self::Below(_))
     }
 
-    /// The probability that a camera sub-path goes on past vertices with this product of albedos.
+    /// The probability by albedos that a camera sub-path goes on past vertices with this product of them.
     #[must_use]
     pub fn survival(self, albedos: f32) -> f32 {
         match self {

@@ -58,7 +58,7 @@ fn growth(channel: usize, alpha: &[f64; 3], sigma_s: Spectrum, sigma_t: Spectrum
 
 /// The largest second moment that any channel has after a segment of any length, on which walks pass or,
 /// with the probability `continuation`, go on from where they stop, in a direction that multiplies the second
-/// moment by `turn` (`docs/theory.md`, section 1.4). At least one, that of a segment without a length.
+/// moment by `turn` (`docs/theory.md`, section 6.13). At least one, that of a segment without a length.
 pub(crate) fn segment_growth(
     alpha: &[f64; 3],
     sigma_s: Spectrum,

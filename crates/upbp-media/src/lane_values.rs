@@ -10,7 +10,7 @@ pub trait LaneValues: Copy + Debug + PartialEq + Send + Sync + 'static {
     /// The probability of each lane to be the hero of a walk, given what the walk has done; nothing if there
     /// is one lane.
     type Shares: Copy + Debug + PartialEq + Send + Sync;
-    /// The lane that a walk draws its distances from.
+    /// The lane that a walk draws its distances and directions from.
     type Hero: Copy + Debug + Send + Sync;
 
     /// The number of lanes.

@@ -14,9 +14,7 @@
 //! Source: `docs/theory.md`, sections 1.4 and 6.13. Oracle:
 //! `tests::means_by_shares_are_the_mixture_of_products`.
 
-use glam::Vec3;
-
-use crate::{LaneValues, Medium, PhaseFunction, PhaseValue, RaySegment, SegmentDensity, Spectrum};
+use crate::{LaneValues, Medium, PhaseValue, RaySegment, SegmentDensity, Spectrum};
 
 /// The lanes of a walk through media: `f64` for one, `[f64; 3]` for a lane per channel.
 pub trait Lanes: LaneValues {
@@ -31,11 +29,11 @@ pub trait Lanes: LaneValues {
         u: [f32; 2],
     ) -> Option<f32>;
 
-    /// Draws the direction after a collision for a walk with this hero that came along `before`, from two
-    /// uniform numbers in `[0, 1)`.
-    fn sample_direction(phase: &PhaseFunction, before: Vec3, hero: Self::Hero, u: [f32; 2]) -> Vec3;
+    /// The channel whose phase function a walk with this hero draws its directions from, if it is only one.
+    #[must_use]
+    fn channel(hero: Self::Hero) -> Option<usize>;
 
-    /// The densities of a direction, per steradian, that a phase function has this value in.
+    /// The density per steradian, in each lane, of a direction in which a phase function has this value.
     #[must_use]
     fn of_phase(value: &PhaseValue) -> Self;
 }
@@ -52,8 +50,8 @@ impl Lanes for f64 {
     }
 
     #[inline]
-    fn sample_direction(phase: &PhaseFunction, before: Vec3, (): (), u: [f32; 2]) -> Vec3 {
-        phase.sample_direction(before, None, u)
+    fn channel((): ()) -> Option<usize> {
+        None
     }
 
     #[inline]
@@ -74,8 +72,8 @@ impl Lanes for [f64; 3] {
     }
 
     #[inline]
-    fn sample_direction(phase: &PhaseFunction, before: Vec3, hero: usize, u: [f32; 2]) -> Vec3 {
-        phase.sample_direction(before, Some(hero), u)
+    fn channel(hero: usize) -> Option<usize> {
+        Some(hero)
     }
 
     #[inline]
@@ -99,18 +97,18 @@ const LEAST_GROWTH: f64 = 1.01;
 pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
     let largest = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(0.0, f32::max);
     let least = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(f32::INFINITY, f32::min);
+    let turns_differ = |medium: &M, a: usize, b: usize| medium.scatters() && medium.phase().differs(a, b);
     let profits = |medium: &M| {
-        let differ = |lanes| largest(&lanes) >= LEAST_RATIO * least(&lanes);
-        let turns_differ = medium.scatters() && [1, 2].iter().any(|lane| medium.phase().differs(0, *lane));
-        (turns_differ || medium.lane_extinctions().is_some_and(differ))
-            && medium.mixture_growth() > LEAST_GROWTH
+        let far_apart = |lanes| largest(&lanes) >= LEAST_RATIO * least(&lanes);
+        let differ = medium.lane_extinctions().is_some_and(far_apart)
+            || [1, 2].into_iter().any(|lane| turns_differ(medium, 0, lane));
+        differ && medium.mixture_growth() > LEAST_GROWTH
     };
     if !media.iter().any(profits) {
         return None;
     }
-    let differ = |medium: &M, lane: usize, other: usize| {
-        medium.scatters() && medium.phase().differs(lane, other)
-            || medium.lane_extinctions().is_some_and(|lanes| lanes[lane] != lanes[other])
+    let differ = |medium: &M, a: usize, b: usize| {
+        turns_differ(medium, a, b) || medium.lane_extinctions().is_some_and(|lanes| lanes[a] != lanes[b])
     };
     let is_new = |lane: usize| (0..lane).all(|other| media.iter().any(|medium| differ(medium, lane, other)));
     let drawn = [0, 1, 2].map(is_new);
@@ -121,11 +119,15 @@ pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{EdgeDensity, Homogeneous, PhaseFunction};
+    use crate::{EdgeDensity, Homogeneous, PhaseFunction, PhaseSample};
     use glam::Vec3;
 
     fn medium(sigma_a: [f32; 3], sigma_s: [f32; 3]) -> Homogeneous {
         Homogeneous::new(sigma_a.into(), sigma_s.into(), PhaseFunction::Isotropic).expect("in range")
+    }
+
+    fn lobe(g: f32) -> PhaseFunction {
+        PhaseFunction::henyey_greenstein(g).expect("in range")
     }
 
     fn segment(length: f32) -> RaySegment {
@@ -177,37 +179,56 @@ mod tests {
 
     #[test]
     fn directions_are_drawn_with_the_densities_of_their_lanes() {
-        let lobe = |g| PhaseFunction::henyey_greenstein(g).expect("in range");
+        const DRAWS: u32 = 200_000;
         let colours = PhaseFunction::per_channel([lobe(0.9), lobe(0.2), PhaseFunction::Rayleigh]);
         let phase = PhaseFunction::blend(vec![(1.0, colours), (2.0, lobe(-0.4))]).expect("a blend");
-        const DRAWS: u32 = 200_000;
+        let shares = [0.2, 0.5, 0.3];
         for hero in 0..3 {
             // The mean of one lane's density over another's is one, and so is that of any other.
             let mut sums = [0.0; 3];
             for i in 0..DRAWS {
                 let u = [(i as f32 + 0.5) / DRAWS as f32, (i as f32 * 0.618_034).fract()];
-                let after = <[f64; 3]>::sample_direction(&phase, Vec3::Y, hero, u);
+                let PhaseSample { after, weight, pdf } = phase.sample::<[f64; 3]>(Vec3::Y, hero, &shares, u);
                 let value = phase.eval(Vec3::Y, after);
-                let lanes = <[f64; 3]>::of_phase(&value);
-                assert!((lanes.iter().sum::<f64>() / 3.0 / f64::of_phase(&value) - 1.0).abs() < 1e-5);
-                (0..3).for_each(|lane| sums[lane] += lanes[lane] / lanes[hero] / f64::from(DRAWS));
+                assert!((pdf.iter().sum::<f64>() / 3.0 / f64::of_phase(&value) - 1.0).abs() < 1e-5);
+                for lane in 0..3 {
+                    sums[lane] += pdf[lane] / pdf[hero] / f64::from(DRAWS);
+                    assert!(f64::from(weight[lane]) < 1.001 / shares[lane]);
+                }
             }
             assert!(sums.iter().all(|sum| (sum - 1.0).abs() < 0.02), "{hero}: {sums:?}");
         }
     }
 
+    /// `∫ ρ_c² / p dω` by the angle.
+    fn turn_growth(g: [f64; 3]) -> [f64; 3] {
+        const STEPS: u32 = 200_000;
+        let mut sums = [0.0; 3];
+        for i in 0..STEPS {
+            let theta = (f64::from(i) + 0.5) / f64::from(STEPS) * std::f64::consts::PI;
+            let lobes = g
+                .map(|g| 0.5 * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * theta.cos()).powf(1.5) * theta.sin());
+            let mean = lobes.iter().sum::<f64>() / 3.0;
+            for (sum, lobe) in sums.iter_mut().zip(lobes) {
+                *sum += lobe * lobe / mean * std::f64::consts::PI / f64::from(STEPS);
+            }
+        }
+        sums
+    }
+
     #[test]
     fn channels_that_scatter_into_other_directions_are_lanes() {
-        let lobe = |g| PhaseFunction::henyey_greenstein(g).expect("in range");
+        for g in [[0.9, 0.7, 0.5], [0.7, 0.3, -0.4], [0.99, 0.9, 0.9]] {
+            let growth = PhaseFunction::per_channel(g.map(|g| lobe(g as f32))).turn_growth();
+            for (found, expected) in growth.into_iter().zip(turn_growth(g)) {
+                assert!((found / expected - 1.0).abs() < 0.005, "{g:?}: {found}, {expected}");
+            }
+        }
         let of = |absorption: f32, g: [f32; 3]| {
             let phase = PhaseFunction::per_channel(g.map(lobe));
             let medium = Homogeneous::new([absorption; 3].into(), [1.0; 3].into(), phase).expect("in range");
             lane_probabilities(&[medium])
         };
-        let growth = PhaseFunction::per_channel([0.9, 0.7, 0.5].map(lobe)).turn_growth();
-        for (found, expected) in growth.into_iter().zip([1.61, 1.09, 1.36]) {
-            assert!((found - expected).abs() < 0.01, "{growth:?}");
-        }
         assert_eq!(of(0.0, [0.5; 3]), None);
         assert_eq!(of(0.0, [0.9, 0.7, 0.5]), Some([1.0 / 3.0; 3]));
         assert_eq!(of(0.0, [0.9, 0.5, 0.5]), Some([0.5, 0.5, 0.0]));

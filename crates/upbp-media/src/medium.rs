@@ -24,8 +24,8 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 ///
 /// # Path-level lanes
 ///
-/// A walk through strongly chromatic media draws all its distances and directions from the lane of one
-/// channel (`docs/theory.md`, section 6.13). A medium offers lanes by
+/// A walk through media whose channels differ, in extinction or phase function, draws all its distances and
+/// directions from the lane of one channel (`docs/theory.md`, section 6.13). A medium offers lanes by
 /// [`lane_extinctions`](Self::lane_extinctions), [`segment_lanes`](Self::segment_lanes) and
 /// [`sample_lane`](Self::sample_lane). The lane of channel `c` should pass at least the light that the
 /// channel passes, `S_c ≥ T_c`, and stop at least where it scatters, `p_c ≥ σ_s,c T_c`: with the exponential
@@ -144,7 +144,8 @@ pub trait Medium: Send + Sync {
     /// lane that always passes; where it varies in space, its largest value. `None` if the medium has no
     /// lanes of its own.
     ///
-    /// Tells which lanes are equal, and how much they differ: it steers the choice of lanes and nothing else.
+    /// Tells with the [phase function](Self::phase) which lanes are equal, and how much they differ: it
+    /// steers the choice of lanes and nothing else.
     fn lane_extinctions(&self) -> Option<Spectrum> {
         None
     }
@@ -152,9 +153,9 @@ pub trait Medium: Send + Sync {
     /// The largest factor, over the channels and over lengths, by which the second moment of a walk grows on
     /// a segment, which it passes or stops and scatters in, if distances are drawn by
     /// [`sample_distance`](Self::sample_distance) and directions by [`PhaseFunction::sample`], roulette by
-    /// [`continuation`](Self::continuation) included
-    /// (`docs/theory.md`, section 1.4). At least one, that of a segment without a length. If it is one, walks
-    /// need no lanes, however long they are. The default, infinity, is for media of which it is unknown.
+    /// [`continuation`](Self::continuation) included (`docs/theory.md`, section 6.13). At least one, that of
+    /// a segment without a length. If it is one, walks need no lanes, however long they are. The default,
+    /// infinity, is for media of which it is unknown.
     fn mixture_growth(&self) -> f64 {
         f64::INFINITY
     }

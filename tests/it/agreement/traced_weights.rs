@@ -245,7 +245,7 @@ fn sub_paths_in_lanes() {
         audit_scene("lanes, glowing bodies", &ClosedForm::glowing(camera, 64), &choices, 1000);
     }
     let choices = IterationChoices { lanes: Some([0.5, 0.5, 0.0]), roulette: Roulette::Off, ..choices() };
-    audit("two lanes", CAMERAS[1], 48, &choices, 500);
+    audit_scene("two lanes", &colourful(CAMERAS[1], 48), &choices, 500);
 }
 
 #[test]

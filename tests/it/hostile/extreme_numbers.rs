@@ -32,11 +32,12 @@ fn phase_functions() {
     for phase in &functions {
         for before in directions() {
             for u in pairs() {
-                let sample = phase.sample(before, u);
+                let sample = phase.sample::<f64>(before, (), &(), u);
                 assert!(sample.after.is_normalized(), "{phase:?} {before} {u:?}: {sample:?}");
                 assert!(sample.pdf.is_finite() && sample.pdf > 0.0, "{phase:?} {before} {u:?}: {sample:?}");
-                assert_eq!(sample.pdf, phase.eval(before, sample.after).pdf);
-                assert_eq!(sample.pdf, phase.eval(sample.after, before).pdf, "{phase:?}: not reciprocal");
+                let pdf = sample.pdf as f32;
+                assert_eq!(pdf, phase.eval(before, sample.after).pdf);
+                assert_eq!(pdf, phase.eval(sample.after, before).pdf, "{phase:?}: not reciprocal");
             }
         }
     }

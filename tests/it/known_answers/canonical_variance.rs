@@ -375,7 +375,7 @@ mod closed {
 
 const WIDTHS: [f64; 4] = [0.1, 1.0, 3.0, 10.0];
 
-/// Keeps rows that are more than 1 % off.
+/// Keeps rows that are more than 1 % off, or of which so much cannot be told.
 fn check(failures: &mut Vec<String>, name: &str, w: f64, a: f64, measured: Moment, expected: f64) {
     let difference = measured.value / expected - 1.0;
     let row = format!(
@@ -385,7 +385,7 @@ fn check(failures: &mut Vec<String>, name: &str, w: f64, a: f64, measured: Momen
         100.0 * difference
     );
     println!("{row}");
-    if !(difference.abs() < 0.01) {
+    if !(difference.abs() < 0.01 && measured.error < 0.006) {
         failures.push(row);
     }
 }

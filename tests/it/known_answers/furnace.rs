@@ -102,8 +102,9 @@ fn chromatic(ratio: f64, body: &str) -> String {
     )
 }
 
-/// Where directions are drawn from the mean of the channels' phase functions at each collision, the pixels of
-/// such a ball are up to 30 % too dark, but for a few that are many times too bright.
+/// Every channel is within four standard errors of one, and those are below two per cent, where channels
+/// scatter into other directions: with directions from the mean of their phase functions, drawn anew at each
+/// collision, the ball is up to 30 % too dark but for a few pixels that are many times too bright.
 #[test]
 fn channels_that_scatter_into_other_directions_are_white() {
     for g in [[0.9, 0.7, 0.5], [0.7, 0.3, -0.4]] {

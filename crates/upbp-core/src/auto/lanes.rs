@@ -1,5 +1,5 @@
-//! The choice of lanes: whether sub-paths draw all their distances by one channel (`docs/theory.md`, section
-//! 6.13).
+//! The choice of lanes: whether sub-paths draw all their distances and directions by one channel
+//! (`docs/theory.md`, section 6.13).
 
 use upbp_estimators::PreparedScene;
 use upbp_estimators::mis::Heuristic;

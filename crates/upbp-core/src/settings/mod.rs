@@ -274,9 +274,10 @@ mod tests {
         let error = Settings::from_ron("(\n  seed: 1,\n  radius: 2,\n)").unwrap_err();
         assert_eq!(error.line, 3, "{error}");
         for (text, message) in [
-            ("(light_paths: 5)", "1:15: `light_paths`: expected a word, such as `Auto` or `Count(1000)`"),
-            ("(radii: (surf: 3))", "1:16: `surf`: expected a word, such as `Auto` or `Count(1000)`"),
+            ("(light_paths: 5)", "1:15: `light_paths`: expected a word, as `Auto` is one"),
+            ("(radii: (surf: 3))", "1:16: `surf`: expected a word, as `Auto` is one"),
             ("(\n  memory: -1)", "2:12: `memory`: the whole number is too large or negative"),
+            ("(\r\n// a\r\n// é\r\n  seed: x)", "4:8: `seed`: expected a whole number"),
             ("(seed: 1e3)", "1:8: `seed`: expected a whole number"),
         ] {
             assert_eq!(Settings::from_ron(text).unwrap_err().to_string(), message);

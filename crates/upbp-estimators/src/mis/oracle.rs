@@ -48,11 +48,11 @@ pub struct PathVertex<L = f64> {
 }
 
 impl PathVertex {
-    /// The vertex with the densities of directions that `lanes` makes of its own.
+    /// The vertex with the densities of directions that `light` and `camera` make of those of the two walks.
     #[must_use]
-    pub fn with_lanes<L>(self, lanes: impl Fn(f64) -> L) -> PathVertex<L> {
+    pub fn with_lanes<L>(self, light: impl FnOnce(f64) -> L, camera: impl FnOnce(f64) -> L) -> PathVertex<L> {
         let Self { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta, scale } = self;
-        let (rho_light, rho_camera) = (lanes(rho_light), lanes(rho_camera));
+        let (rho_light, rho_camera) = (light(rho_light), camera(rho_camera));
         PathVertex { kind, rho_light, rho_camera, cos_light, cos_camera, sin_theta, scale }
     }
 }

@@ -36,8 +36,8 @@ impl<D: Densities, L: Lanes> VertexMis<D, L> {
     #[inline]
     #[must_use]
     pub fn before(&self, plan: &MisPlan, rho_opposite: L, opposite: &L::Shares) -> D {
-        let (rho_opposite, scattered) = rho_opposite.step(opposite);
-        with_below(plan, self.connect, rho_opposite, || L::blend(D::ZERO, &self.below, &scattered))
+        let (rho_opposite, shares) = rho_opposite.step(opposite);
+        with_below(plan, self.connect, rho_opposite, || L::blend(D::ZERO, &self.below, &shares))
     }
 
     /// `B_i` for each lane of the other walk.

@@ -208,23 +208,19 @@ impl<B: Bsdf> Interaction<B> {
                 if ends(goes_on, probability) {
                     return None;
                 }
-                let direction = L::sample_direction(medium.phase(), -from, hero, turn.pair());
-                // From the direction as it was rounded, as whoever evaluates the density later has it.
-                let phase = medium.phase().eval(-from, direction);
-                let pdf = L::of_phase(&phase);
-                let mean = pdf.mean(shares) as f32;
-                if !(mean > 0.0) {
+                let sample = medium.phase().sample::<L>(-from, hero, shares, turn.pair());
+                if !sample.pdf.is_positive() {
                     return None;
                 }
-                let rho = pdf.times(L::splat(f64::from(albedo)));
+                let rho = sample.pdf.times(L::splat(f64::from(albedo)));
                 Some(Scattered {
-                    direction,
-                    weight: medium.sigma_s(position) * (phase.value / mean) / probability,
+                    direction: sample.after,
+                    weight: medium.sigma_s(position) * sample.weight / probability,
                     albedo,
                     rho_own: rho,
                     rho_opposite: rho,
                     cos: 1.0,
-                    sin_theta: sine(from, direction),
+                    sin_theta: sine(from, sample.after),
                     delta: false,
                     transmitted: false,
                 })

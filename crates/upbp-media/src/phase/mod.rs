@@ -24,7 +24,7 @@ pub use self::draine::Draine;
 pub use self::henyey_greenstein::Asymmetry;
 pub use self::per_channel::PerChannel;
 pub use self::tabulated::Tabulated;
-use crate::{MediaError, Spectrum};
+use crate::{Lanes, MediaError, Spectrum};
 
 /// The largest single-precision number below one.
 const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
@@ -53,8 +53,8 @@ pub enum PhaseFunction {
 pub struct PhaseValue {
     /// Value per steradian, at most three times the density in each channel.
     pub value: Spectrum,
-    /// Density per steradian with which [`PhaseFunction::sample`] draws the direction; for one channel it is
-    /// drawn with the density that is the value there.
+    /// Density per steradian with which a walk without lanes draws the direction; one in lane `c` draws it
+    /// with `value[c]`.
     pub pdf: f32,
 }
 
@@ -66,16 +66,16 @@ impl PhaseValue {
     }
 }
 
-/// A direction drawn from a phase function.
+/// A direction drawn from a phase function, by a walk in the lanes `L`.
 #[derive(Copy, Clone, Debug, PartialEq)]
-pub struct PhaseSample {
+pub struct PhaseSample<L = f64> {
     /// Unit direction of propagation after the collision.
     pub after: Vec3,
-    /// Value over density, in `[0, 3]`; one if the channels do not differ.
+    /// Value over the mean density of the lanes with their shares; one if the channels do not differ.
     pub weight: Spectrum,
-    /// Density of the draw per steradian. Zero, and the weight with it, if the direction was rounded out of
-    /// what a table allows.
-    pub pdf: f32,
+    /// Density of the draw in each lane, per steradian. Zero, and the weight with it, if the direction was
+    /// rounded out of what a table allows.
+    pub pdf: L,
 }
 
 impl PhaseFunction {
@@ -177,15 +177,23 @@ impl PhaseFunction {
     }
 
     /// Draws the direction after a collision, for a unit direction `before` and two uniform numbers in `[0,
-    /// 1)`.
+    /// 1)`, by a walk with this hero whose lanes have `shares`.
     #[inline]
     #[must_use]
-    pub fn sample(&self, before: Vec3, u: [f32; 2]) -> PhaseSample {
-        let after = self.sample_direction(before, None, u);
+    pub fn sample<L: Lanes>(
+        &self,
+        before: Vec3,
+        hero: L::Hero,
+        shares: &L::Shares,
+        u: [f32; 2],
+    ) -> PhaseSample<L> {
+        let after = self.sample_direction(before, L::channel(hero), u);
         // From the direction as it was rounded, not from `u`: in a narrow peak the two differ by percents,
         // and whoever evaluates the density later only has the direction.
-        let PhaseValue { value, pdf } = self.eval(before, after);
-        let weight = if pdf > 0.0 { value / pdf } else { Spectrum::ZERO };
+        let value = self.eval(before, after);
+        let pdf = L::of_phase(&value);
+        let mean = pdf.mean(shares) as f32;
+        let weight = if mean > 0.0 { value.value / mean } else { Spectrum::ZERO };
         PhaseSample { after, weight, pdf }
     }
 
@@ -255,12 +263,7 @@ impl PhaseFunction {
 
     /// Draws the direction after a collision, for one channel or for any.
     #[inline]
-    pub(crate) fn sample_direction(
-        &self,
-        before: Vec3,
-        channel: Option<usize>,
-        [u_angle, u_azimuth]: [f32; 2],
-    ) -> Vec3 {
+    fn sample_direction(&self, before: Vec3, channel: Option<usize>, [u_angle, u_azimuth]: [f32; 2]) -> Vec3 {
         let deflection = match self {
             Self::Isotropic => isotropic(u_angle),
             Self::HenyeyGreenstein(g) => henyey_greenstein::sample(*g, f64::from(u_angle)),

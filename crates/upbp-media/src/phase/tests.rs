@@ -201,11 +201,11 @@ fn sample_reports_the_density_of_its_direction() {
     for phase in all() {
         for _ in 0..20_000 {
             let before = random.direction();
-            let sample = phase.sample(before, [random.uniform(), random.uniform()]);
+            let sample = phase.sample::<f64>(before, (), &(), [random.uniform(), random.uniform()]);
             assert!((sample.after.length() - 1.0).abs() < 2e-7);
-            assert_eq!(sample.pdf, phase.eval(before, sample.after).pdf);
+            assert_eq!(sample.pdf, f64::from(phase.eval(before, sample.after).pdf));
             let expected = reference(&phase, deflection(before, sample.after));
-            let error = (f64::from(sample.pdf) / expected - 1.0).abs();
+            let error = (sample.pdf / expected - 1.0).abs();
             assert!(error < tolerance(&phase), "{phase:?}: {error}");
         }
     }
@@ -217,7 +217,7 @@ fn sample_survives_the_ends_of_the_random_numbers() {
         for before in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_Z, Vec3::splat(-3.0_f32.sqrt().recip())] {
             for u_angle in [0.0, f32::EPSILON / 2.0, 0.5, LARGEST_BELOW_ONE] {
                 for u_azimuth in [0.0, 0.5, LARGEST_BELOW_ONE] {
-                    let sample = phase.sample(before, [u_angle, u_azimuth]);
+                    let sample = phase.sample::<f64>(before, (), &(), [u_angle, u_azimuth]);
                     assert!((sample.after.length() - 1.0).abs() < 2e-7, "{phase:?}: {sample:?}");
                     assert!(sample.pdf.is_finite() && sample.pdf > 0.0, "{phase:?}: {sample:?}");
                 }
@@ -233,8 +233,9 @@ fn forward_peak_goes_forward() {
         let before = random.direction();
         let u = [random.uniform(), random.uniform()];
         // Half of all angles of g = 0.999999 are below 1.7e-6; the fraction above 0.01 is 5e-5.
-        let forward = henyey_greenstein(0.999_999).sample(before, u).after;
-        let backward = henyey_greenstein(-0.999_999).sample(before, [1.0 - u[0].max(1e-3), u[1]]).after;
+        let forward = henyey_greenstein(0.999_999).sample::<f64>(before, (), &(), u).after;
+        let backward =
+            henyey_greenstein(-0.999_999).sample::<f64>(before, (), &(), [1.0 - u[0].max(1e-3), u[1]]).after;
         if u[0] > 1e-3 {
             assert!(forward.distance(before) < 2e-3, "{before} became {forward} at {u:?}");
         }
@@ -252,7 +253,7 @@ fn the_narrowest_peaks_stay_finite() {
         for _ in 0..1000 {
             let before = random.direction();
             for u in [0.0, random.uniform(), LARGEST_BELOW_ONE] {
-                let sample = phase.sample(before, [u, random.uniform()]);
+                let sample = phase.sample::<f64>(before, (), &(), [u, random.uniform()]);
                 assert!(sample.after.is_normalized());
                 assert!(sample.pdf.is_finite() && sample.pdf > 0.0, "{g}: {sample:?}");
             }
@@ -267,7 +268,7 @@ fn sampled_angles_follow_the_distribution() {
     for phase in all() {
         let levels = (0..200_000).map(|_| {
             let before = random.direction();
-            let after = phase.sample(before, [random.uniform(), random.uniform()]).after;
+            let after = phase.sample::<f64>(before, (), &(), [random.uniform(), random.uniform()]).after;
             distribution(&phase, deflection(before, after))
         });
         assert_uniform(levels, &format!("{phase:?}"));
@@ -281,7 +282,7 @@ fn sampled_sines_follow_the_distribution() {
     for phase in signed_asymmetries().map(henyey_greenstein) {
         let levels = (0..200_000).map(|_| {
             let before = random.direction();
-            let after = phase.sample(before, [random.uniform(), random.uniform()]).after;
+            let after = phase.sample::<f64>(before, (), &(), [random.uniform(), random.uniform()]).after;
             let sine = before.as_dvec3().cross(after.as_dvec3()).length().min(1.0);
             // Probability of a smaller sine: the caps around both poles. 1 − cos from the sine, stably.
             let small = sine * sine / (1.0 + (1.0 - sine * sine).sqrt());
@@ -299,7 +300,7 @@ fn sampled_azimuths_are_uniform_around_the_propagation() {
     for phase in [PhaseFunction::Rayleigh, haze(), henyey_greenstein(0.9)] {
         let levels = (0..100_000).map(|_| {
             let before = random.direction();
-            let after = phase.sample(before, [random.uniform(), random.uniform()]).after;
+            let after = phase.sample::<f64>(before, (), &(), [random.uniform(), random.uniform()]).after;
             let (tangent, bitangent) = orthonormal_basis(before);
             (f64::from(after.dot(bitangent)).atan2(f64::from(after.dot(tangent))) / TAU).rem_euclid(1.0)
         });
@@ -320,7 +321,7 @@ fn sampled_directions_fit_the_density() {
     {
         let mut observed = [0_u32; ROWS * COLUMNS];
         for _ in 0..SAMPLES {
-            let after = phase.sample(before, [random.uniform(), random.uniform()]).after;
+            let after = phase.sample::<f64>(before, (), &(), [random.uniform(), random.uniform()]).after;
             let row = (0.5 * (after.z + 1.0) * ROWS as f32) as usize;
             let turn = (after.y.atan2(after.x) / std::f32::consts::TAU).rem_euclid(1.0);
             let column = (turn * COLUMNS as f32) as usize;
@@ -386,7 +387,7 @@ fn blend_weights_of_any_size_are_scaled() {
         let PhaseFunction::Blend(parts) = &phase else { panic!("not a blend") };
         assert!(parts.parts().iter().all(|&(weight, _)| weight > 0.0), "{weights:?}");
         for u in [0.0, 0.3, 0.7, LARGEST_BELOW_ONE] {
-            let sample = phase.sample(Vec3::X, [u, u]);
+            let sample = phase.sample::<f64>(Vec3::X, (), &(), [u, u]);
             assert!(sample.after.is_normalized() && sample.pdf.is_finite(), "{weights:?}");
         }
     }

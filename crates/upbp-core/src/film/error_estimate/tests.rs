@@ -203,9 +203,13 @@ fn what_cannot_be_told_is_not_told() {
     assert_eq!(one.doubt, Some(Doubt::FewIterations));
     assert_eq!(estimate(&image, &other, [3, 3]).doubt, Some(Doubt::FewIterations));
     assert_eq!(estimate(&black, &black, [90, 90]).doubt, Some(Doubt::Black));
-    let damaged = vec![[f32::NAN; 3]; 12];
-    let halves = [&image, &damaged].map(|image| HalfImage { image, seen: None, iterations: 9 });
-    assert_eq!(ErrorMap::new(4, halves).estimate().doubt, Some(Doubt::NotANumber));
+    for damage in [f32::NAN, f32::INFINITY] {
+        let damaged: Vec<_> =
+            image.iter().enumerate().map(|(i, p)| if i == 5 { [damage; 3] } else { *p }).collect();
+        let halves = [&image, &damaged].map(|image| HalfImage { image, seen: None, iterations: 9 });
+        let doubt = ErrorMap::new(4, halves).estimate().doubt;
+        assert_eq!(doubt, Some(Doubt::NotANumber), "{damage}");
+    }
     let same = estimate(&image, &image, [4, 4]);
     assert_eq!((same.low, same.relative_mse, same.high, same.doubt), (0.0, 0.0, 0.0, None));
     let nothing = HalfImage { image: &[], seen: None, iterations: 9 };

@@ -190,8 +190,9 @@ pub(crate) fn modes() -> impl Iterator<Item = (Heuristic, BeamExtent, BeamExtent
 /// own in every lane, now and then of a lane that never stops, always passes or never scatters that way.
 /// Walks of the last lane can make the whole path: else no channel had any light.
 pub(crate) fn in_lanes(path: Path, spread: f64) -> impl Strategy<Value = Path<[f64; 3]>> {
-    let lane = move || (0.0..1.0_f64, density(spread), density(spread), density(spread));
-    let last = (0.0..1.0_f64, around_one(spread), around_one(spread), around_one(spread));
+    let lane = move || (0.0..1.0_f64, density(spread), density(spread), [density(spread), density(spread)]);
+    let last =
+        (0.0..1.0_f64, around_one(spread), around_one(spread), [around_one(spread), around_one(spread)]);
     vec((lane(), lane(), last), path.length()).prop_map(move |factors| {
         let edges = path.edges.iter().zip(&factors).enumerate().map(|(i, (edge, &(first, second, last)))| {
             let lanes = [first, second, last];
@@ -209,13 +210,13 @@ pub(crate) fn in_lanes(path: Path, spread: f64) -> impl Strategy<Value = Path<[f
             }
         });
         let vertices = path.vertices.iter().enumerate().map(|(i, vertex)| {
-            let turn = |rho: f64| match (vertex.kind, factors.get(i)) {
+            let turn = |side: usize, rho: f64| match (vertex.kind, factors.get(i)) {
                 (VertexKind::Medium(_), Some(&(first, second, last))) => {
-                    [first, second, last].map(|lane| rho * lane.3)
+                    [first, second, last].map(|lane| rho * lane.3[side])
                 }
                 _ => [rho; 3],
             };
-            vertex.with_lanes(turn)
+            vertex.with_lanes(|rho| turn(0, rho), |rho| turn(1, rho))
         });
         Path {
             edges: edges.collect(),

@@ -228,7 +228,8 @@ fn equal_lanes_are_one_lane() {
             pass_probability: [edge.pass_probability; 3],
         });
         let Path { ref vertices, pdf_position, pdf_incident, hittable, .. } = path;
-        let vertices = vertices.iter().map(|vertex| vertex.with_lanes(|rho| [rho; 3])).collect();
+        let vertices =
+            vertices.iter().map(|vertex| vertex.with_lanes(|rho| [rho; 3], |rho| [rho; 3])).collect();
         let three = Path { edges: edges.collect(), vertices, pdf_position, pdf_incident, hittable };
         for (way, weight) in path.weights(&plan) {
             let found = Recursion::<f64, [f64; 3]>::new(&plan, &three).weight(way).value();

@@ -31,7 +31,7 @@ fn weights_are_bounded_and_average_to_one() {
         let (mut sum, mut squares) = (Spectrum::ZERO, Spectrum::ZERO);
         for _ in 0..SAMPLES {
             let before = random.direction();
-            let sample = phase.sample(before, [random.uniform(), random.uniform()]);
+            let sample = phase.sample::<f64>(before, (), &(), [random.uniform(), random.uniform()]);
             assert!(sample.weight.is_non_negative() && sample.weight.max_component() <= 3.000_001);
             assert!((sample.weight.mean() - 1.0).abs() < 1e-5);
             sum += sample.weight;
@@ -44,7 +44,7 @@ fn weights_are_bounded_and_average_to_one() {
             assert!((mean - 1.0).abs() < 4.0 * error + 1e-4, "channel {channel}: {mean} ± {error}");
         }
     }
-    let grey = haze().sample(Vec3::X, [0.3, 0.7]);
+    let grey = haze().sample::<f64>(Vec3::X, (), &(), [0.3, 0.7]);
     assert_eq!(grey.weight, Spectrum::ONE);
 }
 

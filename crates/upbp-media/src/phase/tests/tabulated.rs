@@ -95,10 +95,10 @@ fn check(rows: &[(f32, f32)], random: &mut Random, samples: usize) {
     let levels: Vec<f64> = (0..samples)
         .map(|_| {
             let before = random.direction();
-            let sample = phase.sample(before, [random.uniform(), random.uniform()]);
+            let sample = phase.sample::<f64>(before, (), &(), [random.uniform(), random.uniform()]);
             let angle = deflection(before, sample.after);
             let (density, below) = oracle.at(angle);
-            let found = f64::from(sample.pdf);
+            let found = sample.pdf;
             // Directions and what is across them are off by roundings: the angle is by as much, its cosine by
             // that times the sine, and by the squared errors of lengths.
             let sine = (angle.0 * angle.1).sqrt();
@@ -178,7 +178,7 @@ fn tables_survive_the_ends_of_the_random_numbers() {
     for rows in tables() {
         let phase = tabulated(&rows).unwrap();
         for u in [0.0, f32::EPSILON / 2.0, 0.5, LARGEST_BELOW_ONE] {
-            let sample = phase.sample(Vec3::Z, [u, u]);
+            let sample = phase.sample::<f64>(Vec3::Z, (), &(), [u, u]);
             assert!((sample.after.length() - 1.0).abs() < 2e-7, "{rows:?}: {sample:?}");
             assert!(sample.pdf.is_finite() && sample.pdf >= 0.0, "{rows:?}: {sample:?}");
             assert!(sample.weight == Spectrum::ONE || sample.pdf == 0.0, "{rows:?}: {sample:?}");
