@@ -176,7 +176,7 @@ fn what_does_not_belong_together_is_refused_by_name() {
             b"room",
             "light_paths is 100 in one and 101 in the other",
         ),
-        (|s| s.max_length = 9, b"room", "max_length is 65536 in one and 9 in the other"),
+        (|s| s.max_length = 9, b"room", "max_length is 16384 in one and 9 in the other"),
         (|s| s.progressive = false, b"room", "progressive is true"),
         (|s| s.radii.surf = upbp_core::Radius::Absolute(0.5), b"room", "radii.surf is"),
     ] {

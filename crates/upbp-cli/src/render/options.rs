@@ -92,7 +92,7 @@ pub(crate) struct Method {
     /// Save the plan: techniques, sample counts and first radii; `.ron` or `.plan`
     #[arg(long, value_name = "FILE.ron", value_parser = files::path(files::plan), value_hint = ValueHint::FilePath)]
     pub(crate) save_plan: Option<PathBuf>,
-    /// Most edges of a path between light and camera [default: 65536]
+    /// Most edges of a path between light and camera [default: 16384]
     #[arg(long, value_name = "K")]
     max_length: Option<u32>,
     /// Light sub-paths per iteration [default: one per pixel, fewer or more where that pays, fewer where

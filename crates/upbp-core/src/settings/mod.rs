@@ -82,7 +82,7 @@ impl Default for Settings {
             connections: None,
             next_events: None,
             min_length: 1,
-            max_length: 65_536,
+            max_length: 16_384,
             roulette: None,
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,
