@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// with certainty until the product of their albedos falls below a threshold, and hold it from then on.
 ///
 /// Walks of both kinds may be caught inside of clear glass, where total reflection never lets them out: after
-/// many vertices in a row that only reflect or refract, two in a hundred end at each further one.
+/// many vertices in a row that only reflect or refract, two in a thousand end at each further one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Roulette {
     /// Walks end where they leave the scene, or at the greatest length, which those that total reflection
@@ -40,10 +40,10 @@ impl Roulette {
 }
 
 /// Vertices in a row without a smooth lobe from which on a walk may be caught.
-const FREE_REFLECTIONS: u32 = 64;
-/// The probability to go on at each more: a walk that is caught has fifty more on average, and one that gets
-/// out after as many has 2.7 times the throughput.
-const REFLECTS_ON: f32 = 0.98;
+const FREE_REFLECTIONS: u32 = 256;
+/// The probability to go on at each more: a walk that is caught has five hundred more on average, and one
+/// that gets out of the wall of a vessel after as many has 2.7 times the throughput.
+const REFLECTS_ON: f32 = 0.998;
 
 /// The roulette of one walk.
 #[derive(Clone, Copy, Debug)]
@@ -130,13 +130,13 @@ mod tests {
     #[test]
     fn a_walk_that_is_caught_ends() {
         let mut survival = Survival::of_light(Roulette::Below(0.5));
-        let mut probabilities = (0..200).map(|_| survival.probability(1.0, false));
-        assert!(probabilities.by_ref().take(64).all(|probability| probability == 1.0));
-        assert!(probabilities.all(|probability| probability == 0.98));
+        let mut probabilities = (0..400).map(|_| survival.probability(1.0, false));
+        assert!(probabilities.by_ref().take(256).all(|probability| probability == 1.0));
+        assert!(probabilities.all(|probability| probability == 0.998));
         assert_eq!(survival.probability(1.0, true), 1.0, "a smooth lobe lets it out");
         assert_eq!(survival.probability(1.0, false), 1.0);
         let mut camera = Survival::of_camera(Roulette::Below(0.5));
-        for _ in 0..70 {
+        for _ in 0..300 {
             let _ = camera.probability(1.0, false);
         }
         assert_eq!(camera.probability(0.8, true), 1.0, "albedos count alone");

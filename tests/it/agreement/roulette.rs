@@ -37,7 +37,7 @@ fn means_do_not_depend_on_the_roulette() {
     }
 }
 
-/// Inside of a block of glass, of which most light does not get out: of paths of more than 66 edges, which
+/// Inside of a block of glass, of which most light does not get out: of paths of more than 300 edges, which
 /// roulette thins out, there is as much as without it.
 #[test]
 fn reflections_without_end_keep_their_mean() {
@@ -54,8 +54,8 @@ fn reflections_without_end_keep_their_mean() {
             let settings = Settings {
                 seed,
                 techniques: "hit".parse::<Techniques>().expect("a technique"),
-                min_length: 67,
-                max_length: 200,
+                min_length: 301,
+                max_length: 800,
                 roulette: Some(roulette),
                 ..Settings::default()
             };

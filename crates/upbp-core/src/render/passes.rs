@@ -18,8 +18,11 @@ use crate::deadline::Halt;
 use crate::film::Pixel;
 use crate::film::pixel_sets::set_of;
 
-/// Light sub-paths per piece of work.
+/// Most light sub-paths per piece of work.
 const LIGHT_CHUNK: u32 = 64;
+/// Vertices or beams that a piece of work is expected to leave at most, unless one sub-path leaves more: few
+/// long sub-paths are work for all threads, too.
+const LIGHT_CHUNK_ITEMS: f64 = 4096.0;
 /// Pixels per piece of work.
 const CAMERA_CHUNK: usize = 64;
 
@@ -58,7 +61,9 @@ pub(crate) fn light_pass<S: Scene, L: Lanes>(
     mut take_splats: impl FnMut(&[Splat]),
 ) -> Option<Counters> {
     let paths = if context.plan.needs_light_paths() { context.plan.light_paths } else { 0 };
-    let chunks = paths.div_ceil(LIGHT_CHUNK);
+    let items = expected.vertices.max(expected.beams) / f64::from(paths.max(1));
+    let chunk = ((LIGHT_CHUNK_ITEMS / items) as u32).clamp(1, LIGHT_CHUNK);
+    let chunks = paths.div_ceil(chunk);
     // Enough for each thread that none waits long for the last one.
     let threads = rayon::current_num_threads() as u32;
     let wave = (chunks / 32).clamp(16 * threads, 256 * threads);
@@ -74,8 +79,8 @@ pub(crate) fn light_pass<S: Scene, L: Lanes>(
         let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
         let trace = |scratch: &mut Scratch<S::Bsdf, L>,
                      (i, out): (usize, &mut LightChunk<S::Bsdf, f64, L>)| {
-            let first = (start + i as u32) * LIGHT_CHUNK;
-            for index in first..first.saturating_add(LIGHT_CHUNK).min(paths) {
+            let first = (start + i as u32) * chunk;
+            for index in first..first.saturating_add(chunk).min(paths) {
                 if halt.now() {
                     return None;
                 }
