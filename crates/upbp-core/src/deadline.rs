@@ -42,8 +42,8 @@ impl Halt<'_> {
 
 /// Rules by which a render stops: as soon as one holds. Without rules a render goes on until it is
 /// cancelled. Limits are numbers of at least 0:
-/// [`Renderer::start`](crate::Renderer::start) refuses others; [`Renderer::render`](crate::Renderer::render)
-/// takes seconds that are no number for none, and never reaches an error that is none.
+/// [`Renderer::start`](crate::Renderer::start) refuses others. [`Renderer::render`](crate::Renderer::render)
+/// stops after the first iteration if seconds are no number, and never reaches an error that is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
     /// Number of iterations on the film.

@@ -25,16 +25,15 @@ pub struct TextError {
     pub line: usize,
     /// Column of that place, from 1.
     pub column: usize,
-    /// What is wrong, or was expected, with the name of the field.
+    /// Description of the mistake, or of what was expected.
     pub message: String,
 }
 
-impl TextError {
-    /// The message of the parser, in the words of whoever wrote the text.
-    pub(crate) fn new(text: &str, error: &ron::error::SpannedError) -> Self {
+impl From<ron::error::SpannedError> for TextError {
+    fn from(error: ron::error::SpannedError) -> Self {
         use ron::Error;
-        let (line, column) = (error.span.start.line, error.span.start.col);
         let message = match &error.code {
+            // Those of the parser speak of its own language.
             Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) | Error::ExpectedIdentifier => {
                 "expected a word, as `Auto` is one".to_owned()
             }
@@ -42,30 +41,10 @@ impl TextError {
                 "expected a whole number".to_owned()
             }
             Error::IntegerOutOfBounds => "the whole number is too large or negative".to_owned(),
-            // These name the field.
-            Error::Message(_)
-            | Error::MissingStructField { .. }
-            | Error::NoSuchStructField { .. }
-            | Error::DuplicateStructField { .. } => {
-                return Self { line, column, message: error.code.to_string() };
-            }
             code => code.to_string(),
         };
-        let lines: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
-        let length: usize = text[lines..].chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
-        let message = match last_field(&text[..lines + length]) {
-            Some(field) => format!("`{field}`: {message}"),
-            None => message,
-        };
-        Self { line, column, message }
+        Self { line: error.span.start.line, column: error.span.start.col, message }
     }
-}
-
-/// The word before the last colon.
-fn last_field(text: &str) -> Option<&str> {
-    let before = text.rsplit_once(':')?.0.trim_end();
-    let start = before.rfind(|c: char| !(c.is_alphanumeric() || c == '_')).map_or(0, |at| at + 1);
-    before.get(start..).filter(|word| !word.is_empty())
 }
 
 /// A render that does not start.

@@ -328,7 +328,7 @@ fn cross(corners: [Vec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Where a mesh ends.
+/// The edges at which a mesh ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Border {
     /// Every edge joins exactly two triangles that are wound alike.
@@ -362,11 +362,11 @@ impl Border {
         }
         edges.sort_unstable();
         let (pairs, rest) = edges.as_chunks::<2>();
-        let joins_two = !pairs.is_empty()
-        && rest.is_empty()
-        && pairs.iter().all(|[first, second]| (first.0, first.1) == (second.0, second.1))
         // The same edge in two pairs would join four triangles.
-        && pairs.windows(2).all(|two| (two[0][0].0, two[0][0].1) != (two[1][0].0, two[1][0].1));
+        let joins_two = !pairs.is_empty()
+            && rest.is_empty()
+            && pairs.iter().all(|[first, second]| (first.0, first.1) == (second.0, second.1))
+            && pairs.windows(2).all(|two| (two[0][0].0, two[0][0].1) != (two[1][0].0, two[1][0].1));
         if !joins_two {
             Self::Somewhere
         } else if pairs.iter().all(|[first, second]| first.2 != second.2) {
