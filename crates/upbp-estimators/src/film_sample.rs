@@ -1,5 +1,6 @@
 //! Radiance that one camera sub-path brings to its pixel.
 
+use glam::Vec2;
 use upbp_media::Spectrum;
 
 use crate::counters::Counters;
@@ -21,6 +22,8 @@ pub struct CameraWalk {
 
 /// Receiver of a camera sub-path's samples: layers, counters of the pass, and an observer.
 pub(crate) struct Output<'a, O: ?Sized> {
+    /// Place on the film, in pixels.
+    pub(crate) film: Vec2,
     pub(crate) layers: &'a mut [Spectrum; Layer::COUNT],
     pub(crate) counters: &'a mut Counters,
     pub(crate) observer: &'a mut O,

@@ -11,6 +11,7 @@ mod features;
 mod film_sample;
 mod iteration;
 mod kernel;
+mod lens_emitters;
 mod light_map;
 mod merge_periods;
 pub mod mis;

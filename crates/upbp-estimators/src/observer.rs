@@ -1,11 +1,11 @@
 //! A view into the walks: every vertex, every accepted sample with its weight, and the calls of techniques.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use upbp_media::Spectrum;
 
 use crate::mis::{Densities, Weight};
 use crate::path::Interaction;
-use crate::scene::{EmitterId, EmitterPoint};
+use crate::scene::{CameraRay, EmitterId, EmitterPoint};
 use crate::technique::Technique;
 
 /// The light end of a path.
@@ -47,6 +47,15 @@ pub enum Completion<B> {
         light: LightEnd,
         /// The camera vertex.
         camera: (Vec3, Interaction<B>),
+    },
+    /// A point on a light and the lens.
+    Lens {
+        /// The light's point.
+        light: LightEnd,
+        /// The point of the lens.
+        lens: Vec3,
+        /// Place on the film, in pixels.
+        film: Vec2,
     },
     /// A light vertex and a camera vertex.
     Connect {
@@ -110,9 +119,9 @@ pub trait Observer<B> {
         let _ = (path, vertex);
     }
 
-    /// A camera sub-path starts; `pdf` is the density of its ray.
-    fn camera_end(&mut self, lens: Vec3, direction: Vec3, pdf: f32) {
-        let _ = (lens, direction, pdf);
+    /// A camera sub-path starts at a place of the film, in pixels.
+    fn camera_end(&mut self, film: Vec2, ray: &CameraRay) {
+        let _ = (film, ray);
     }
 
     /// A camera sub-path's vertex has scattered.

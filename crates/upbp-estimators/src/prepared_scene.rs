@@ -10,6 +10,7 @@ use crate::emitter_choice::EmitterChoice;
 use crate::emitter_selection::{EmitterSample, EmitterShares, Selection};
 use crate::emitter_tree::EmitterTree;
 use crate::emitters_by_receiver::{ClusterSample, ReceiverShares};
+use crate::lens_emitters::LensEmitters;
 use crate::random::Decision;
 use crate::scene::{
     BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, PixelRect, Scene,
@@ -32,6 +33,8 @@ pub struct PreparedScene<'a, S: Scene> {
     /// Bodies whose volume emits and where sub-paths begin, in order.
     volumes: Vec<(BodyId, EmitterId)>,
     camera_stack: Option<MediumStack>,
+    /// Emitters that the lens shows out of focus.
+    lens_emitters: Option<LensEmitters>,
     emitting_media: bool,
     dense_media: bool,
 }
@@ -107,6 +110,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             environments,
             volumes,
             camera_stack,
+            lens_emitters: LensEmitters::new(scene, &bounds, &powers),
             emitting_media,
             dense_media,
         })
@@ -372,6 +376,49 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     #[must_use]
     pub const fn has_dense_media(&self) -> bool {
         self.dense_media
+    }
+
+    /// The emitters that may be seen out of focus at a place of the film, with the probabilities of
+    /// [`choose_through_lens`](Self::choose_through_lens).
+    #[must_use]
+    pub fn lens_emitters(&self, film: Vec2) -> &[(EmitterId, f32)] {
+        self.lens_emitters.as_ref().map_or(&[], |emitters| emitters.at(film))
+    }
+
+    /// Whether any place of the film may see an emitter out of focus.
+    #[must_use]
+    pub const fn has_lens_emitters(&self) -> bool {
+        self.lens_emitters.is_some()
+    }
+
+    /// Chooses a point of an emitter that may be seen at a place of the film through some point of the lens.
+    #[must_use]
+    pub fn choose_through_lens(
+        &self,
+        film: Vec2,
+        u: f32,
+        u_point: [f32; 2],
+    ) -> Option<(EmitterId, EmitterPoint)> {
+        let emitters = self.lens_emitters.as_ref()?;
+        let (emitter, _) = emitters.choose(film, u)?;
+        let light = &self.scene.emitters()[emitter.0 as usize];
+        let incident = light.sample_incident(&self.emission_bounds, emitters.viewpoint, u_point)?;
+        Some((emitter, incident.point))
+    }
+
+    /// The density of paths of one edge that [`choose_through_lens`](Self::choose_through_lens) makes at a
+    /// place of the film, relative to the density of lens points: the probability of the emitter, times the
+    /// density of the point per area, times the [area of its image](crate::scene::LensConnection). `None` if
+    /// the point is not chosen there.
+    #[must_use]
+    pub fn pdf_through_lens(&self, emitter: EmitterId, point: &EmitterPoint, film: Vec2) -> Option<f64> {
+        let emitters = self.lens_emitters.as_ref()?;
+        let (_, probability) = emitters.at(film).iter().find(|(other, _)| *other == emitter)?;
+        let image_area = self.scene.camera().connect_at(point.position, film)?.image_area;
+        let direction = (emitters.viewpoint - point.position).try_normalize()?;
+        let light = &self.scene.emitters()[emitter.0 as usize];
+        let seen = light.hit(&self.emission_bounds, point, direction, emitters.viewpoint)?;
+        Some(f64::from(*probability) * f64::from(seen.pdf_incident) * f64::from(image_area))
     }
 
     /// The bodies around a point of the lens.

@@ -8,9 +8,12 @@
 //! density `(D / cos θ)² / cos θ` (`docs/theory.md`, section 1.2). With a lens the film is mapped onto the
 //! plane of focus at distance f, where a pixel has the area `(f/D)²` and is `f / cos θ` away from the lens
 //! point: the same formula, with the angle of the actual ray.
+//!
+//! A point at depth z, as far off the axis as x, is seen along the chief ray z c through the lens point o if
+//! `x = o (1 − z/f) + z c`. Over the lens its image moves by `D |1 − z/f| / z` per length.
 
-use glam::{Vec2, Vec3};
-use upbp_estimators::scene::{Camera, CameraConnection, CameraRay, PixelRect};
+use glam::{DVec2, Vec2, Vec3};
+use upbp_estimators::scene::{Camera, CameraConnection, CameraRay, LensConnection, PixelRect};
 
 use crate::sampling;
 
@@ -116,6 +119,17 @@ impl PerspectiveCamera {
         p.x * self.right + p.y * self.up
     }
 
+    /// What a film point adds to `forward` in the direction of its chief ray, along `right` and `up`.
+    fn across(&self, film: Vec2) -> Vec2 {
+        // From −1 to 1, y upwards.
+        (film / self.film_size() * 2.0 - Vec2::ONE) * Vec2::new(1.0, -1.0) * self.half_size
+    }
+
+    /// Distance of a film on which a pixel has unit area.
+    fn film_distance(&self) -> f32 {
+        self.width as f32 / (2.0 * self.half_size.x)
+    }
+
     fn film_size(&self) -> Vec2 {
         Vec2::new(self.width as f32, self.height as f32)
     }
@@ -123,8 +137,7 @@ impl PerspectiveCamera {
     /// Density of a unit direction, per steradian and pixel.
     fn pdf(&self, direction: Vec3) -> f32 {
         let cosine = direction.dot(self.forward);
-        let film_distance = self.width as f32 / (2.0 * self.half_size.x);
-        (film_distance / cosine).powi(2) / cosine
+        (self.film_distance() / cosine).powi(2) / cosine
     }
 }
 
@@ -138,9 +151,8 @@ impl Camera for PerspectiveCamera {
     }
 
     fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Option<CameraRay> {
-        // From −1 to 1, y upwards.
-        let centred = (film / self.film_size() * 2.0 - Vec2::ONE) * Vec2::new(1.0, -1.0) * self.half_size;
-        let chief = self.forward + centred.x * self.right + centred.y * self.up;
+        let across = self.across(film);
+        let chief = self.forward + across.x * self.right + across.y * self.up;
         let offset = self.lens_offset(u_lens);
         // Relative to the centre of the lens: far from the origin of the scene, absolute points lose digits.
         let direction = (chief * self.focus_distance - offset).try_normalize()?;
@@ -162,6 +174,26 @@ impl Camera for PerspectiveCamera {
         let inside = film.cmpge(Vec2::ZERO).all() && film.cmplt(self.film_size()).all();
         let pdf = self.pdf(direction);
         (inside && pdf.is_finite()).then(|| CameraConnection { lens: self.origin + offset, film, pdf })
+    }
+
+    fn connect_at(&self, point: Vec3, film: Vec2) -> Option<LensConnection> {
+        let relative = (point - self.origin).as_dvec3();
+        let [x, y, depth] = [self.right, self.up, self.forward].map(|axis| relative.dot(axis.as_dvec3()));
+        // Near the plane of focus this is a difference of almost equal numbers.
+        let defocus = 1.0 - depth / f64::from(self.focus_distance);
+        let on_lens = (DVec2::new(x, y) - self.across(film).as_dvec2() * depth) / defocus;
+        let radius = f64::from(self.lens_radius);
+        // A pinhole has no other points, nor what is in focus another image.
+        if !(depth > 0.0 && on_lens.length_squared() < radius * radius) {
+            return None;
+        }
+        let offset = on_lens.x as f32 * self.right + on_lens.y as f32 * self.up;
+        let direction = (relative - offset.as_dvec3()).try_normalize()?.as_vec3();
+        let image_radius = radius * f64::from(self.film_distance()) * defocus / depth;
+        let image_area = (std::f64::consts::PI * image_radius * image_radius) as f32;
+        let pdf = self.pdf(direction);
+        let is_density = image_area > 0.0 && image_area.is_finite() && pdf.is_finite();
+        is_density.then(|| LensConnection { lens: self.origin + offset, pdf, image_area })
     }
 
     fn is_pinhole(&self) -> bool {

@@ -1,10 +1,11 @@
 //! Every accepted sample, rebuilt from its vertices and weighed by enumeration.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use upbp_estimators::mis::oracle::{Path, Strategy};
 use upbp_estimators::mis::{Heuristic, MisPlan};
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, Interaction, LightChunk, Scratch};
+use upbp_estimators::scene::CameraRay;
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, LightMap, PreparedScene, StreamKind, Technique,
@@ -45,6 +46,8 @@ struct Auditor<'a> {
     light_ends: Vec<Option<LightEnd>>,
     light_vertices: Vec<Vec<Vertex>>,
     lens: Vec3,
+    /// Place on the film of the camera sub-path at hand.
+    film: Vec2,
     camera_vertices: Vec<Vertex>,
     comparisons: [Comparison; 9],
 }
@@ -77,6 +80,7 @@ impl<'a> Auditor<'a> {
             light_ends: vec![None; paths],
             light_vertices: vec![Vec::new(); paths],
             lens: Vec3::ZERO,
+            film: Vec2::ZERO,
             camera_vertices: Vec::new(),
             comparisons: Default::default(),
         }
@@ -97,6 +101,10 @@ impl<'a> Auditor<'a> {
             Completion::Nee { light, camera: (position, interaction) } => {
                 let interior = [joint(position, position, &interaction)].into_iter().chain(suffix(depth - 1));
                 (light, interior.collect(), self.lens, Strategy::Nee)
+            }
+            Completion::Lens { light, lens, film } => {
+                assert_eq!((film, depth), (self.film, 0));
+                (light, Vec::new(), lens, Strategy::Nee)
             }
             Completion::Connect { path, light: (from, from_site, from_depth), camera: (to, to_site) } => {
                 let (light, mut interior) = prefix(path, from_depth - 1);
@@ -127,7 +135,7 @@ impl<'a> Auditor<'a> {
                 (light, interior, self.lens, strategy)
             }
         };
-        (Trace { light, interior, lens }, strategy)
+        (Trace { light, interior, lens, film: self.film }, strategy)
     }
 
     fn audit(&mut self, sample: &ObservedSample<Material>) {
@@ -189,8 +197,8 @@ impl Observer<Material> for Auditor<'_> {
         assert_eq!(vertices.len(), observed.depth as usize);
     }
 
-    fn camera_end(&mut self, lens: Vec3, _: Vec3, _: f32) {
-        self.lens = lens;
+    fn camera_end(&mut self, film: Vec2, ray: &CameraRay) {
+        (self.film, self.lens) = (film, ray.origin);
         self.camera_vertices.clear();
     }
 

@@ -4,6 +4,7 @@ mod audit;
 mod boundaries;
 mod channels;
 mod far_away;
+mod lens;
 mod rebuild;
 mod roulette;
 mod shared_faces;

@@ -2,9 +2,10 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
 use upbp_estimators::observer::LightEnd;
+use upbp_estimators::scene::Camera;
 use upbp_estimators::{Interior, IterationPlan, MediumId, PreparedScene, Roulette};
 
 use upbp_testing::closed_form::fog::Fog;
@@ -44,6 +45,8 @@ pub(crate) struct Trace {
     pub(crate) light: LightEnd,
     pub(crate) interior: Vec<Vertex>,
     pub(crate) lens: Vec3,
+    /// Place on the film, in pixels.
+    pub(crate) film: Vec2,
 }
 
 /// A reason why a path cannot be rebuilt.
@@ -264,6 +267,19 @@ impl Trace {
         })
     }
 
+    /// The density of the path of one edge by next events at the lens, relative to that of lens points.
+    fn pdf_through_lens(&self, scene: &ClosedForm, start: DVec3, outwards: DVec3) -> f64 {
+        let world = PreparedScene::new(scene).expect("the scene is in order");
+        let emitter = self.light.emitter;
+        let choices = world.lens_emitters(self.film).iter();
+        let probability: f32 = choices.filter(|choice| choice.0 == emitter).map(|choice| choice.1).sum();
+        let middle = Vec2::splat(0.5 * scene.camera.size as f32);
+        let viewpoint = scene.camera.ray(middle, [0.5; 2]).expect("a ray").origin.as_dvec3();
+        let point = scene.lights[emitter.0 as usize].source.pdf_incident(start, outwards, viewpoint);
+        let image_area = scene.camera.image_area((viewpoint.z - start.z) as f32);
+        f64::from(probability) * point * f64::from(image_area)
+    }
+
     /// The probability that next events at a receiver choose the light, if it depends on the receiver.
     fn next_event_probability(&self, scene: &ClosedForm, receiver: DVec3) -> Option<f64> {
         let choice = scene.choice.as_ref()?;
@@ -358,12 +374,17 @@ impl Trace {
             },
             pass_probability: passed.pass_probability,
         });
-        let incident = light.source.pdf_incident(start, outwards, receiver);
+        let pdf_incident = if k == 1 {
+            self.pdf_through_lens(scene, start, outwards)
+        } else {
+            self.next_event_probability(scene, receiver).unwrap_or(probability)
+                * light.source.pdf_incident(start, outwards, receiver)
+        };
         Ok(Path {
             edges: edges.collect(),
             vertices,
             pdf_position: probability * pdf_position,
-            pdf_incident: self.next_event_probability(scene, receiver).unwrap_or(probability) * incident,
+            pdf_incident,
             hittable: matches!(light.source, Source::Area(_) | Source::Environment | Source::Volume(..)),
         })
     }

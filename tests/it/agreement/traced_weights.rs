@@ -73,6 +73,26 @@ fn all_techniques_with_the_balance_heuristic() {
 }
 
 #[test]
+fn emitters_out_of_focus() {
+    for (i, camera) in CAMERAS.into_iter().enumerate() {
+        let mut scene = ClosedForm::new(camera, 96);
+        (scene.camera.radius, scene.camera.focus) = (0.15, 0.6);
+        let choices = IterationChoices {
+            techniques: TechniqueSet::BPT,
+            light_paths: 1000,
+            next_events: 1.5,
+            camera_factor: 2.0,
+            ..choices()
+        };
+        let lanes = IterationChoices { lanes: Some([0.2, 0.3, 0.5]), ..choices.clone() };
+        let power = IterationChoices { heuristic: Heuristic::Power, ..choices.clone() };
+        for (name, choices) in [("balance", choices), ("lanes", lanes), ("power", power)] {
+            audit_scene(&format!("lens, {name}, camera {i}"), &scene, &choices, 100);
+        }
+    }
+}
+
+#[test]
 fn volumes_that_emit() {
     for (i, camera) in CAMERAS.into_iter().enumerate() {
         let mut scene = ClosedForm::glowing(camera, 64);

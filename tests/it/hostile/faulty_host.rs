@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use upbp_core::media::{Homogeneous, Medium, PhaseFunction, RaySegment, SegmentDensity};
 use upbp_core::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterId,
-    EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
+    EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, LensConnection, Scene, Walk,
 };
 use upbp_core::{BodyId, Canceller, Interior, MediumId, Ray, Spectrum};
 use upbp_scene::{Light, Material, PerspectiveCamera, ReadyScene};
@@ -62,6 +62,7 @@ pub(super) enum Fault {
     CameraDirection,
     CameraFilm,
     CameraLens,
+    CameraImage(f32),
     Bounds(f32),
     Power(f32),
 }
@@ -396,8 +397,13 @@ impl Camera for HostileCamera {
         Some(connection)
     }
 
+    fn connect_at(&self, _: Vec3, _: Vec2) -> Option<LensConnection> {
+        let F::CameraImage(image_area) = self.1 else { return None };
+        Some(LensConnection { lens: self.0.origin(), pdf: 1.0, image_area })
+    }
+
     fn is_pinhole(&self) -> bool {
-        true
+        !matches!(self.1, F::CameraImage(_))
     }
 }
 
@@ -447,6 +453,7 @@ pub(super) fn faults() -> Vec<Fault> {
         faults.extend([F::BsdfPdf(bad), F::BsdfRoulette(bad), F::Reach(bad.into()), F::Stop(bad.into())]);
         faults.push(F::RefractiveIndex(bad));
         faults.extend([F::Distance(bad), F::Continuation(bad), F::LightPdf(bad), F::CameraPdf(bad)]);
+        faults.push(F::CameraImage(bad));
         // Black, opaque and clear are possible.
         if bad != 0.0 {
             faults.extend([F::BsdfWeight(bad), F::Transmittance(bad), F::Scattering(bad), F::Radiance(bad)]);

@@ -1,11 +1,11 @@
 //! Statistics of light and camera sub-paths, from which radii, counts and memory follow.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::observer::{DynObserver, NoObserver, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, Interaction, LightChunk, LightVertex, PhotonBeam};
-use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::scene::{Camera, CameraRay, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
@@ -314,10 +314,10 @@ struct Queries {
 impl<B> Observer<B> for Queries {
     type Densities = f64;
 
-    fn camera_end(&mut self, lens: Vec3, _: Vec3, pdf: f32) {
-        self.last = lens;
+    fn camera_end(&mut self, _: Vec2, ray: &CameraRay) {
+        self.last = ray.origin;
         self.travelled = 0.0;
-        self.pixel = Some(pdf.sqrt().recip());
+        self.pixel = Some(ray.pdf.sqrt().recip());
     }
 
     fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {

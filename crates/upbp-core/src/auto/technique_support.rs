@@ -65,6 +65,13 @@ impl TechniqueSupport {
             emitting_media: emits_without_emitter(prepared),
             reasons: Vec::new(),
         };
+        let hit = TechniqueSet::EMPTY.with(Technique::Hit);
+        // Without vertices to connect.
+        let (at_camera, remain) = if prepared.has_lens_emitters() {
+            (hit.with(Technique::Nee), "only emission hits and next events at the lens remain")
+        } else {
+            (hit, "only emission hits remain")
+        };
         let scattering = scene.media().iter().any(Medium::scatters);
         if !scattering {
             support
@@ -74,29 +81,23 @@ impl TechniqueSupport {
             let surf = TechniqueSet::EMPTY.with(Technique::Surf);
             support.drop("all surfaces are specular: surface merging is off", surf);
             if !scattering {
-                let connections = [Technique::Nee, Technique::Connect, Technique::LightTracing];
-                support.drop(
-                    "nothing but specular surfaces: only emission hits remain",
-                    connections.into_iter().collect(),
-                );
+                let reason = format!("nothing but specular surfaces: {remain}");
+                support.drop(&reason, TechniqueSet::BPT.without(at_camera));
             }
         }
         if !prepared.has_emitters() && !prepared.has_emitting_media() {
             support.drop("nothing shines that reaches the scene", TechniqueSet::ALL);
         } else if !prepared.has_emitters() {
-            let emission_only = chosen.without(TechniqueSet::EMPTY.with(Technique::Hit));
-            support.drop("no light but emitting media: only emission hits remain", emission_only);
+            support.drop("no light but emitting media: only emission hits remain", chosen.without(hit));
         }
         let is_hit = |(index, emitter): (usize, &S::Emitter)| {
             emitter.kind().is_hittable() && prepared.emission_probability(EmitterId(index as u32)) > 0.0
         };
         if !prepared.has_emitting_media() && !scene.emitters().iter().enumerate().any(is_hit) {
-            support
-                .drop("no light can be hit: emission hits are off", TechniqueSet::EMPTY.with(Technique::Hit));
+            support.drop("no light can be hit: emission hits are off", hit);
         }
         if max_length < 2 {
-            let all_but_hit = TechniqueSet::ALL.without(TechniqueSet::EMPTY.with(Technique::Hit));
-            support.drop("paths of one edge: only emission hits remain", all_but_hit);
+            support.drop(&format!("paths of one edge: {remain}"), TechniqueSet::ALL.without(at_camera));
         } else if max_length < 3 {
             support.drop(
                 "paths of up to two edges: vertices are not connected",

@@ -6,7 +6,9 @@ use super::{Check, Random, is_density, is_unit, require, same};
 use crate::scene::Camera;
 
 /// Checks the contract of [`Camera`]: that `connect` inverts `ray`, and that the density of a pixel's
-/// directions is one over its solid angle on average; and that the rays of a pinhole start in one point.
+/// directions is one over its solid angle on average; that the rays of a pinhole start in one point; and,
+/// where there is a [`connect_at`](Camera::connect_at), that it inverts `ray` and knows how densely the lens
+/// puts images of a point.
 pub fn check_camera(camera: &impl Camera) -> Check {
     let (width, height) = camera.resolution();
     require(width > 0 && height > 0, "the film is not empty", (width, height))?;
@@ -46,7 +48,65 @@ pub fn check_camera(camera: &impl Camera) -> Check {
         let corner = (Vec2::from(random.pair()) * (size - Vec2::ONE)).floor();
         check_pixel(camera, corner, random.pair())?;
     }
+    for _ in 0..20 {
+        let film = Vec2::from(random.pair()) * size;
+        check_images(camera, film, random.pair(), 0.1 + 10.0 * random.next())?;
+    }
     Ok(())
+}
+
+/// The images that all of the lens makes of a point that is seen at `film`.
+fn check_images(camera: &impl Camera, film: Vec2, u_lens: [f32; 2], distance: f32) -> Check {
+    const STEPS: u32 = 128;
+    let grid = |i: u32| [i % STEPS, i / STEPS].map(|k| (k as f32 + 0.5) / STEPS as f32);
+    let Some(ray) = camera.ray(film, u_lens) else { return Ok(()) };
+    let point = ray.origin + ray.direction * distance;
+    let Some(connection) = camera.connect_at(point, film) else { return Ok(()) };
+    let case = (film, u_lens, ray, connection);
+    let is_density = is_density(connection.image_area) && connection.image_area > 0.0;
+    require(is_density, "an image out of focus has an area", case)?;
+    let images: Vec<_> =
+        (0..STEPS * STEPS).filter_map(|i| camera.connect(point, grid(i))).map(|seen| seen.film).collect();
+    let least = images.iter().fold(Vec2::INFINITY, |least, image| least.min(*image));
+    let most = images.iter().fold(Vec2::NEG_INFINITY, |most, image| most.max(*image));
+    // Narrower discs are lost in the rounding of places on the film.
+    if (most - least).min_element() < 1e-3 * camera_size(camera) {
+        return Ok(());
+    }
+    let at_lens = camera.connect(point, u_lens).map_or(connection.lens, |seen| seen.lens);
+    let near = connection.lens.distance(at_lens) <= 0.01 * lens_size(camera) + 1e-4 * at_lens.length();
+    require(near, "connect_at finds the lens point of the ray", (case, at_lens))?;
+    require(same(connection.pdf, ray.pdf), "connect_at gives the density of ray", case)?;
+
+    let (start, sides) = (0.75 * least + 0.25 * most, 0.5 * (most - least));
+    let is_inside = |image: &&Vec2| {
+        let offset = **image - start;
+        offset.cmpge(Vec2::ZERO).all() && offset.cmplt(sides).all()
+    };
+    let share = images.iter().filter(is_inside).count() as f64 / f64::from(STEPS * STEPS);
+    let density = |i: u32| {
+        let seen = camera.connect_at(point, start + Vec2::from(grid(i)) * sides);
+        seen.map_or(0.0, |seen| 1.0 / f64::from(seen.image_area))
+    };
+    let mean = (0..STEPS * STEPS).map(density).sum::<f64>() / f64::from(STEPS * STEPS);
+    let expected = mean * f64::from(sides.x) * f64::from(sides.y);
+    // Places of two grids: what lies on the rim of the window is counted or not.
+    let within = (share - expected).abs() <= 0.02 * expected.max(share) + 0.005;
+    require(within, "images of a point have the density of connect_at", (case, share, expected))
+}
+
+/// The longer side of the film.
+fn camera_size(camera: &impl Camera) -> f32 {
+    let (width, height) = camera.resolution();
+    width.max(height) as f32
+}
+
+/// The distance between two far points of the lens.
+fn lens_size(camera: &impl Camera) -> f32 {
+    let (width, height) = camera.resolution();
+    let middle = 0.5 * Vec2::new(width as f32, height as f32);
+    let [a, b] = [[0.0, 0.5], [0.999, 0.5]].map(|u_lens| camera.ray(middle, u_lens));
+    a.zip(b).map_or(0.0, |(a, b)| a.origin.distance(b.origin))
 }
 
 /// `E[1 / pdf]` over a pixel is its solid angle.

@@ -79,7 +79,8 @@ pub struct Path<L = f64> {
     pub edges: Vec<PathEdge<L>>,
     /// `L_0`, with the choice of the emitter.
     pub pdf_position: f64,
-    /// `p_nee(x_0 | x_1)`, with the choice of the emitter.
+    /// `p_nee(x_0 | x_1)`, with the choice of the emitter; with one edge, at the lens, times the area of the
+    /// image of `x_0`.
     pub pdf_incident: f64,
     /// Whether the emitter can be hit.
     pub hittable: bool,
@@ -90,7 +91,7 @@ pub struct Path<L = f64> {
 pub enum Strategy {
     /// The camera sub-path makes all vertices.
     Hit,
-    /// Next event at vertex 1.
+    /// Next event at vertex 1, which may be the lens.
     Nee,
     /// A connection of vertices `s − 1` and `s`.
     Connect(usize),
@@ -164,10 +165,10 @@ impl<L: Lanes> Path<L> {
         if self.hittable {
             push(Strategy::Hit, plan.hit, camera[0]);
         }
+        if k == 1 || ok(1) {
+            push(Strategy::Nee, plan.nee, log(self.pdf_incident) + camera[1]);
+        }
         if k >= 2 {
-            if ok(1) {
-                push(Strategy::Nee, plan.nee, log(self.pdf_incident) + camera[1]);
-            }
             for s in 2..k {
                 if ok(s - 1) && ok(s) {
                     push(Strategy::Connect(s), plan.connect, light[s] + camera[s]);

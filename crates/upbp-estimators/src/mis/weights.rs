@@ -45,6 +45,16 @@ impl MisPlan {
         Weight { own, all: D::of(Technique::Nee, own) + D::of(Technique::Hit, hit) + camera }
     }
 
+    /// A camera sub-path hit an emitter by its first edge: next events at the lens make the path with the
+    /// density `pdf`, the hit itself with `hit_density`, `C_0`.
+    #[inline]
+    #[must_use]
+    pub fn direct_hit_weight<D: Densities>(&self, pdf: f64, hit_density: f64) -> Weight<D> {
+        let own = self.pow(self.hit);
+        let nee = self.pow(self.nee * pdf / hit_density);
+        Weight { own, all: D::of(Technique::Hit, own) + D::of(Technique::Nee, nee) }
+    }
+
     /// A camera sub-path hit an emitter: `connect` and `below` are those on arrival at the light, with next
     /// events as connections; `pdf_incident` is `p_nee`, the others `L_0` and `ρL_0`.
     #[inline]

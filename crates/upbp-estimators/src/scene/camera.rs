@@ -27,6 +27,18 @@ pub struct CameraConnection {
     pub pdf: f32,
 }
 
+/// The lens point through which the camera sees a point of the scene at a given place of the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensConnection {
+    /// The point on the lens.
+    pub lens: Vec3,
+    /// [`CameraRay::pdf`] of the direction from the lens point to the point.
+    pub pdf: f32,
+    /// One over the density, per pixel's area, with which a uniform `u_lens` puts the image of the point
+    /// there: the area of the disc that a thin lens makes of a point out of focus, in pixels.
+    pub image_area: f32,
+}
+
 /// A rectangle of pixels, `[x, x + width) × [y, y + height)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelRect {
@@ -57,6 +69,17 @@ pub trait Camera: Send + Sync {
     /// The connection of `point` with the camera through the lens point that `u_lens` stands for; `None` if
     /// it is not on the film. The inverse of [`ray`](Self::ray): the same `u_lens` gives the same lens point.
     fn connect(&self, point: Vec3, u_lens: [f32; 2]) -> Option<CameraConnection>;
+
+    /// The connection of `point` with the camera through the lens point from which it is seen at `film`;
+    /// `None` if there is none. The inverse of [`ray`](Self::ray) where the place on the film is given
+    /// instead of the lens point.
+    ///
+    /// With it small lamps out of focus are even discs, which else only the rays of the few lens points that
+    /// meet them would show (`docs/theory.md`, section 2.8). The default leaves them to these rays.
+    fn connect_at(&self, point: Vec3, film: Vec2) -> Option<LensConnection> {
+        let _ = (point, film);
+        None
+    }
 
     /// Whether all rays start in one point, so that the bodies around the camera are looked up only once.
     fn is_pinhole(&self) -> bool;

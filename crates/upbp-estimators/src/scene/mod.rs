@@ -19,7 +19,7 @@ mod emitter;
 mod hit;
 
 pub use bsdf::{Bsdf, BsdfEvaluation, BsdfSample, Interface, Walk};
-pub use camera::{Camera, CameraConnection, CameraRay, PixelRect};
+pub use camera::{Camera, CameraConnection, CameraRay, LensConnection, PixelRect};
 pub use emitter::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
     HitDensities, Incident,

@@ -204,8 +204,12 @@ fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Some(densities) = light.hit(prepared.emission_bounds(), point, direction, receiver) else { return };
     let end = LightEnd { emitter, point: *point, direction };
     let weight = if edge.depth == 1 {
-        // Nothing else makes a path of one edge.
-        Weight::alone(Technique::Hit)
+        let pdf_ray = edge.mis.rho * mis_edge.cos_in / mis_edge.distance_squared;
+        let passes = mis_edge.pass_probability.mean(&edge.mis.shares);
+        match prepared.pdf_through_lens(emitter, point, out.film) {
+            Some(pdf) => plan.mis.direct_hit_weight(pdf, pdf_ray * passes),
+            None => Weight::alone(Technique::Hit),
+        }
     } else {
         weight_of_hit(context, &end, &densities, receiver, mis_edge, edge)
     };

@@ -44,8 +44,8 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         counters.lost_walks += 1;
         return walk;
     }
-    observer.camera_end(ray.origin, ray.direction, ray.pdf);
-    let mut out = Output { layers: &mut walk.layers, counters, observer };
+    observer.camera_end(film, &ray);
+    let mut out = Output { film, layers: &mut walk.layers, counters, observer };
     let emission = plan.mis.hit > 0.0 && prepared.has_emitting_media();
     let own = plan.techniques_at(pixel);
     let [pb2d, bb1d] = [Technique::Pb2d, Technique::Bb1d].map(|one| own.has(one) && plan.merges_by(one));
@@ -71,6 +71,10 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         edge.depth = depth;
         scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, hero, &mut stream);
         out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
+        if depth == 1 {
+            let crossings = &mut scratch.crossings;
+            techniques::next_events_at_lens::<_, L, O>(context, &mut stream, crossings, &mut out);
+        }
         let edge_trace = &scratch.edge_trace;
         if emission {
             techniques::emission_along(context, edge_trace, &edge, &mut stream, &mut out);

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use upbp_estimators::check::{check_bsdf, check_camera, check_emitter, check_medium};
 use upbp_estimators::scene::{
     BoundingSphere, Bsdf, BsdfEvaluation, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter,
-    EmitterKind, EmitterPoint, HitDensities, Incident, Interface, PixelRect, Walk,
+    EmitterKind, EmitterPoint, HitDensities, Incident, Interface, LensConnection, PixelRect, Walk,
 };
 use upbp_media::{Homogeneous, Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 use upbp_scene::light::ConstantEnvironment;
@@ -174,23 +174,32 @@ fn a_light_with_a_wrong_density_is_found() {
     assert_eq!(violation.what, "hit agrees with sample_emission");
 }
 
-/// A camera whose density is off, or whose connections are.
-struct WrongCamera(PerspectiveCamera, f32, Vec2);
+/// A camera whose densities are off by factors, or whose connections are by a shift.
+struct WrongCamera {
+    camera: PerspectiveCamera,
+    pdf: f32,
+    image_area: f32,
+    shift: Vec2,
+}
 
 impl Camera for WrongCamera {
     fn resolution(&self) -> (u32, u32) {
-        self.0.resolution()
+        self.camera.resolution()
     }
     fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Option<CameraRay> {
-        let ray = self.0.ray(film, u_lens)?;
-        Some(CameraRay { pdf: ray.pdf * self.1, ..ray })
+        let ray = self.camera.ray(film, u_lens)?;
+        Some(CameraRay { pdf: ray.pdf * self.pdf, ..ray })
     }
     fn connect(&self, point: Vec3, u_lens: [f32; 2]) -> Option<CameraConnection> {
-        let connection = self.0.connect(point, u_lens)?;
-        Some(CameraConnection { film: connection.film + self.2, pdf: connection.pdf * self.1, ..connection })
+        let seen = self.camera.connect(point, u_lens)?;
+        Some(CameraConnection { film: seen.film + self.shift, pdf: seen.pdf * self.pdf, ..seen })
+    }
+    fn connect_at(&self, point: Vec3, film: Vec2) -> Option<LensConnection> {
+        let seen = self.camera.connect_at(point, film)?;
+        Some(LensConnection { image_area: seen.image_area * self.image_area, ..seen })
     }
     fn is_pinhole(&self) -> bool {
-        true
+        self.camera.is_pinhole()
     }
 }
 
@@ -201,15 +210,17 @@ fn faults_of_a_camera_are_found() {
         target: Vec3::ZERO,
         up: Vec3::Y,
         horizontal_fov: 1.0,
-        lens_radius: 0.0,
+        lens_radius: 0.3,
         focus_distance: 1.0,
     };
     let camera =
         PerspectiveCamera::new(&view, 32, 32, PixelRect { x: 0, y: 0, width: 32, height: 32 }).unwrap();
-    let check = |factor, shift| check_camera(&WrongCamera(camera, factor, shift));
-    check(1.0, Vec2::ZERO).unwrap();
-    assert_eq!(check(1.02, Vec2::ZERO).unwrap_err().what, "a pixel's density is one over its solid angle");
-    assert_eq!(check(1.0, Vec2::splat(0.5)).unwrap_err().what, "connect inverts ray");
+    let check = |pdf, image_area, shift| check_camera(&WrongCamera { camera, pdf, image_area, shift });
+    check(1.0, 1.0, Vec2::ZERO).unwrap();
+    let fault = |pdf, image_area, shift| check(pdf, image_area, shift).unwrap_err().what;
+    assert_eq!(fault(1.02, 1.0, Vec2::ZERO), "a pixel's density is one over its solid angle");
+    assert_eq!(fault(1.0, 1.0, Vec2::splat(0.5)), "connect inverts ray");
+    assert_eq!(fault(1.0, 1.1, Vec2::ZERO), "images of a point have the density of connect_at");
 }
 
 /// A medium that errs in what `.1` says.

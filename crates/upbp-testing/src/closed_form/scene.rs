@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use upbp_estimators::scene::{BoundingSphere, EmitterId, Hit, Scene};
 use upbp_estimators::{BodyId, EmissionGuide, EmitterChoice, Interior, MediumId, Ray};
 
-use super::camera::Pinhole;
+use super::camera::ThinLens;
 use super::fog::Fog;
 use super::light::{Light, Source};
 use super::material::Material;
@@ -59,7 +59,7 @@ pub struct ClosedForm {
     /// Media, at the positions of their [`MediumId`].
     pub media: Vec<Fog>,
     /// Camera.
-    pub camera: Pinhole,
+    pub camera: ThinLens,
     /// Guides of light sub-paths, at the positions of their [`EmitterId`], for oracles; none at first.
     pub guides: Vec<Option<EmissionGuide>>,
     /// Point that light from infinity starts on discs around, for oracles of guided starts; none at first.
@@ -69,7 +69,7 @@ pub struct ClosedForm {
 }
 
 impl ClosedForm {
-    /// The scene, with a film of `size` pixels a side, the camera at `centre`.
+    /// The scene, with a film of `size` pixels a side, a pinhole at `centre`.
     pub fn new(centre: Vec3, size: u32) -> Self {
         let media = vec![
             // Chromatic and forward.
@@ -121,7 +121,7 @@ impl ClosedForm {
             light(Source::Directional(DVec3::new(0.3, -1.0, -0.4).normalize()), 1.0),
             light(Source::Environment, 2.0),
         ];
-        let camera = Pinhole { centre, size, film_distance: size as f32 };
+        let camera = ThinLens { centre, size, film_distance: size as f32, radius: 0.0, focus: 1.0 };
         Self { objects, lights, media, camera, guides: Vec::new(), focus: None, choice: None }
     }
 
@@ -169,7 +169,7 @@ impl Scene for ClosedForm {
     type Bsdf = Material;
     type Emitter = Light;
     type Medium = Fog;
-    type Camera = Pinhole;
+    type Camera = ThinLens;
 
     fn intersect(&self, ray: &Ray) -> Option<Hit<Material>> {
         let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
@@ -210,7 +210,7 @@ impl Scene for ClosedForm {
         &self.media
     }
 
-    fn camera(&self) -> &Pinhole {
+    fn camera(&self) -> &ThinLens {
         &self.camera
     }
 }

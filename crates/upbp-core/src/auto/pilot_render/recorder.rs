@@ -4,11 +4,12 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use upbp_estimators::Technique;
 use upbp_estimators::mis;
 use upbp_estimators::mis::Densities;
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
+use upbp_estimators::scene::CameraRay;
 
 use crate::auto::roulette;
 
@@ -63,7 +64,7 @@ impl<B> Observer<B> for Recorder {
         self.passed = [1.0; roulette::COUNT];
     }
 
-    fn camera_end(&mut self, _: Vec3, _: Vec3, _: f32) {
+    fn camera_end(&mut self, _: Vec2, _: &CameraRay) {
         self.albedos = 1.0;
         self.edge();
     }

@@ -175,7 +175,9 @@ impl<'a, D: Densities, L: Lanes> Recursion<'a, D, L> {
     /// `C_0`, given that vertex 1 scatters towards it.
     fn hit_density(&self) -> f64 {
         let (edge, v) = (&self.path.edges[0], &self.path.vertices);
-        let (rho, shares) = v[1].rho_camera.step(&self.camera[1].shares);
+        let at_camera = L::prior(&self.plan.lanes);
+        let before = if self.path.length() == 1 { &at_camera } else { &self.camera[1].shares };
+        let (rho, shares) = v[1].rho_camera.step(before);
         let t = edge.t_camera.mean(&shares);
         rho * v[0].cos_camera / distance_squared(edge) * t
     }
@@ -203,7 +205,11 @@ impl<'a, D: Densities, L: Lanes> Recursion<'a, D, L> {
         let rho_light = path.vertices[0].rho_light.get(0);
         let start = L::prior(&plan.lanes);
         match way {
-            Way::Hit if k == 1 => Weight::alone(Technique::Hit),
+            Way::Hit if k == 1 => plan.direct_hit_weight(path.pdf_incident, self.hit_density()),
+            Way::Nee if k == 1 => {
+                let hit_density = if path.hittable { self.hit_density() } else { 0.0 };
+                plan.nee_weight(path.pdf_incident, hit_density, D::ZERO)
+            }
             Way::Hit => plan.hit_weight(&self.at_light, path.pdf_incident, path.pdf_position, rho_light),
             Way::Nee => plan.nee_weight(
                 path.pdf_incident,
