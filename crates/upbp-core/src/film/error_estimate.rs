@@ -26,6 +26,8 @@ const REACH: usize = 2;
 const BLOCK: usize = 8;
 /// Part of the pixels that are the tail.
 const TAIL: f64 = 0.01;
+/// Part of the errors by pixels that one half alone has seen, from which on light is rare.
+const RARE: f64 = 0.1;
 /// Tail index from which on a mean of errors does not converge.
 const HEAVY: f64 = 1.0;
 /// Uncertainty that remains with any number of pixels, that of the converged values: nine tenths of the
@@ -85,6 +87,8 @@ pub struct ErrorMap {
     pub relative: Vec<[f32; 3]>,
     /// Mean over the channels, if light that one half only has seen was there by luck.
     upper: Vec<f32>,
+    /// Whether both halves have seen light there.
+    seen_twice: Vec<bool>,
     iterations: u64,
     black: bool,
 }
@@ -108,17 +112,18 @@ impl ErrorMap {
             let rows = relative.par_chunks_mut(BLOCK * width).zip(upper.par_chunks_mut(BLOCK * width));
             rows.enumerate().for_each(|(row, (relative, upper))| pair.errors(&blocks, row, relative, upper));
         }
-        Self { relative, upper, iterations, black }
+        let lit = |half: &HalfImage<'_>, i: usize| half.image[i] != [0.0; 3];
+        let seen_twice = (0..pixels).map(|i| halves.iter().all(|half| lit(half, i))).collect();
+        Self { relative, upper, seen_twice, iterations, black }
     }
 
     /// The estimate for the whole image.
     #[must_use]
     pub fn estimate(&self) -> ErrorEstimate {
         let mean = |[r, g, b]: &[f32; 3]| to_f32((f64::from(*r) + f64::from(*g) + f64::from(*b)) / 3.0);
-        let mut upper = self.upper.clone();
         let (relative_mse, below) = mean_and_factor(&self.relative.par_iter().map(mean).collect::<Vec<_>>());
-        let (most, above) = mean_and_factor(&upper);
-        let tail_index = tail_index(&mut upper);
+        let (most, above) = mean_and_factor(&self.upper);
+        let tail_index = tail_index(&mut self.noisy());
         let doubt = if self.iterations < FEW_ITERATIONS || relative_mse == f64::INFINITY {
             Some(Doubt::FewIterations)
         } else if !relative_mse.is_finite() {
@@ -133,6 +138,21 @@ impl ErrorMap {
         let low = if relative_mse.is_finite() { relative_mse / below } else { 0.0 };
         let high = if doubt.is_some() { f64::INFINITY } else { most * above };
         ErrorEstimate { relative_mse, low, high, doubt, tail_index }
+    }
+}
+
+impl ErrorMap {
+    /// Errors of the pixels of which the tail is a part: those that both halves have seen, so that the size
+    /// of what is in the picture does not matter beside its black background. Where light is rare, black
+    /// pixels are some that it has not met yet.
+    fn noisy(&self) -> Vec<f32> {
+        let pixels = || self.upper.iter().zip(&self.seen_twice);
+        let sum = |errors: &mut dyn Iterator<Item = &f32>| errors.map(|t| f64::from(*t)).sum::<f64>();
+        let seen_once = sum(&mut pixels().filter(|(_, twice)| !**twice).map(|(t, _)| t));
+        if seen_once > RARE * sum(&mut self.upper.iter()) {
+            return self.upper.clone();
+        }
+        pixels().filter(|(_, twice)| **twice).map(|(t, _)| *t).collect()
     }
 }
 

@@ -123,6 +123,39 @@ fn tails_without_a_mean_of_errors_are_told_from_others() {
 }
 
 #[test]
+fn the_size_of_what_is_in_the_picture_says_nothing_about_the_tail() {
+    const WIDTH: usize = 200;
+    let estimate = |seed, part: f64, fireflies: usize| {
+        let mut random = Uniform::new(seed);
+        let radius = part.sqrt() * 0.5 * WIDTH as f64 / std::f64::consts::FRAC_PI_4.sqrt();
+        let mut images = [0, 1].map(|_| vec![[0.0; 3]; WIDTH * WIDTH]);
+        for image in &mut images {
+            for (i, pixel) in image.iter_mut().enumerate() {
+                let place = [i % WIDTH, i / WIDTH].map(|k| k as f64 - 0.5 * WIDTH as f64);
+                if place[0].hypot(place[1]) < radius {
+                    *pixel = [(1.0 + 0.01 * random.normal()) as f32; 3];
+                }
+            }
+        }
+        for n in 0..fireflies {
+            let place = (random.next() * (WIDTH * WIDTH - 1) as f64) as usize;
+            images[n % 2][place] = [3.0; 3];
+        }
+        ErrorMap::new(WIDTH, halves(&images)).estimate()
+    };
+    for seed in 0..SEEDS {
+        for part in [0.001, 0.005, 0.01, 0.02, 0.5] {
+            let alone = estimate(seed, part, 0);
+            assert!(alone.doubt.is_none() && alone.high < 2.0 * alone.relative_mse, "{part}: {alone:?}");
+        }
+        for part in [0.0, 0.01] {
+            let rare = estimate(seed, part, 20);
+            assert_eq!(rare.doubt, Some(Doubt::HeavyTail), "{part}: {rare:?}");
+        }
+    }
+}
+
+#[test]
 fn hill_finds_the_index() {
     for index in [0.25, 0.5, 1.0, 2.0_f64] {
         let mut random = Uniform::new(3);
