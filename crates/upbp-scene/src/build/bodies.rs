@@ -6,6 +6,7 @@
 
 use std::cmp::Reverse;
 
+use glam::Vec3;
 use upbp_accel::{Shape, ShapeId, offset_origin};
 use upbp_media::{BodyId, Interior};
 
@@ -37,6 +38,18 @@ pub(super) fn rank(drafts: &[ShapeDraft]) -> Vec<Body> {
 }
 
 impl Builder<'_> {
+    /// Reports surfaces that shine all inside of an opaque shape, where they would light nothing.
+    pub(super) fn check_lamps_are_free(&mut self, drafts: &[ShapeDraft]) {
+        for (index, lamp) in drafts.iter().enumerate().filter(|(_, draft)| !draft.emission.is_black()) {
+            let mut opaque = drafts.iter().enumerate().filter(|(_, draft)| draft.body.is_none());
+            if let Some((outer, _)) = opaque.find(|(_, draft)| is_buried(&lamp.shape, &draft.shape)) {
+                let message =
+                    format!("lies inside of the opaque {} (a room is made of quads)", self.shape_item(outer));
+                self.problem(self.shape_item(index), message);
+            }
+        }
+    }
+
     /// Reports bodies that lie all inside of an opaque shape, or of a body with a higher priority: they would
     /// be nowhere.
     pub(super) fn check_bodies_count(&mut self, drafts: &[ShapeDraft]) {
@@ -87,21 +100,31 @@ fn is_inside(shape: &Shape, other: &Shape) -> bool {
     }
 }
 
+/// Points all over a shape.
+fn points_on(shape: &Shape) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
+    (0..16_u8).map(|i| shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]))
+}
+
+/// Whether a surface is all inside of another closed shape and does not touch it, as far as points on it
+/// tell.
+fn is_buried(shape: &Shape, other: &Shape) -> bool {
+    let [(min, max), (outer_min, outer_max)] = [shape, other].map(Shape::aabb);
+    let boxed = outer_min.cmplt(min).all() && max.cmplt(outer_max).all();
+    boxed && points_on(shape).all(|(point, _)| other.contains(point) == Some(true))
+}
+
 /// The index of refraction around an index-matched body: that of the highest body below it that contains
 /// points all over its surface. A cloud in a glass block has the index of the glass, or a bubble in the
 /// cloud would refract wrongly.
 fn surrounding_ior(shape: &Shape, lower: &[BodyDraft<'_>], placed: &[Body]) -> f32 {
-    // Just inside of it, so that a body that fills another is surrounded by it.
-    let surface = |i: u8| {
-        let (point, normal) =
-            shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]);
-        offset_origin(point, normal, -normal)
-    };
     let (min, max) = shape.aabb();
+    // By points just inside of it, so that a body that fills another is surrounded by it.
     let contains = |other: &Shape| {
         let (outer_min, outer_max) = other.aabb();
         let boxed = outer_min.cmple(min).all() && max.cmple(outer_max).all();
-        boxed && (0..16).all(|i| other.contains(surface(i)) == Some(true))
+        boxed
+            && points_on(shape)
+                .all(|(point, normal)| other.contains(offset_origin(point, normal, -normal)) == Some(true))
     };
     lower
         .iter()

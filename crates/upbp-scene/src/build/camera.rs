@@ -51,7 +51,8 @@ impl Builder<'_> {
         for (index, draft) in drafts.iter().enumerate() {
             let Some(draft) = draft else { continue };
             if draft.body.is_none() && draft.shape.contains(position) == Some(true) {
-                let message = format!("lies inside of the opaque {}", self.shape_item(index));
+                let message =
+                    format!("lies inside of the opaque {} (a room is made of quads)", self.shape_item(index));
                 self.problem(item, message);
             }
         }

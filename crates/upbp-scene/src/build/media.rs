@@ -32,6 +32,11 @@ impl Builder<'_> {
 
     fn homogeneous(&mut self, medium: &Medium) -> Result<Homogeneous, String> {
         let Medium::Homogeneous { sigma_a, sigma_s, phase, emission, glow } = medium;
+        if !emission.get().is_black() && (emission.get() * sigma_a.get()).is_black() {
+            return Err(
+                "`emission` is that of what absorbs, and `sigma_a` is 0 there; a `glow` needs none".into()
+            );
+        }
         let phase = self.phase_function(phase)?;
         Homogeneous::new(sigma_a.get(), sigma_s.get(), phase)
             .and_then(|medium| medium.with_emission(emission.get()))

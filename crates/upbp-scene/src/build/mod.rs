@@ -113,6 +113,7 @@ impl Builder<'_> {
         let (media, mut camera) = (media?, camera?);
         let mut drafts: Vec<_> = drafts.into_iter().collect::<Option<_>>()?;
         self.check_bodies_count(&drafts);
+        self.check_lamps_are_free(&drafts);
         let origin = extent::move_near_origin(&mut drafts, &mut lights, &mut camera);
         let bounds = extent::bounds(&drafts, &lights, &camera);
         let bodies = bodies::rank(&drafts);

@@ -139,6 +139,10 @@ fn scenes_without_light_are_refused() {
     let nothing = "scene: nothing in it shines: no light, no shape with an emission, no medium that emits";
     assert_eq!(problem(""), nothing);
     assert_eq!(problem("lights: [Point(position: (0, 2, 0), intensity: 0)]"), nothing);
+    assert_eq!(
+        problem("media: { \"a\": Homogeneous(sigma_s: 1, emission: 1) }, lights: [Constant(1)]"),
+        "medium `a`: `emission` is that of what absorbs, and `sigma_a` is 0 there; a `glow` needs none"
+    );
     let unused = "media: { \"a\": Homogeneous(sigma_a: 1, emission: 1) }";
     assert_eq!(problem(unused), nothing);
     assert_eq!(
@@ -189,13 +193,18 @@ fn problems_of_shapes_name_the_shape() {
         (
             r#"name: "a", geometry: Box(min: (-5, -5, -5), max: (5, 5, 5)), material: "white""#,
             "2 problems in the scene
-  camera: lies inside of the opaque shape `a`
-  light 1 (Point): lies inside of the opaque shape `a`",
+  camera: lies inside of the opaque shape `a` (a room is made of quads)
+  light 1 (Point): lies inside of the opaque shape `a` (a room is made of quads)",
         ),
         (
             r#"name: "a", geometry: BALL, material: "glass"),
                (name: "basin", geometry: Box(min: (-1.5, -1.5, -1.5), max: (1.5, 1.5, 1.5)), material: "white""#,
             "shape `a`: lies inside of the opaque shape `basin`: it would be nowhere (a basin is made of quads)",
+        ),
+        (
+            r#"name: "lamp", geometry: BALL, material: "white", emission: 1),
+               (name: "a", geometry: Box(min: (-1.5, -1.5, -1.5), max: (1.5, 1.5, 1.5)), material: "white""#,
+            "shape `lamp`: lies inside of the opaque shape `a` (a room is made of quads)",
         ),
     ];
     for (shape, expected) in cases {
