@@ -181,14 +181,21 @@ impl<'a> Allowance<'a> {
     /// for. The result of the last one that has ended; `None` only if it was cancelled.
     ///
     /// Without a limit it is the full work, at once.
-    pub(crate) fn largest<T>(&self, mut run: impl FnMut(f64, &Halt<'_>) -> Option<T>) -> Option<T> {
-        /// The first part.
-        const FIRST: f64 = 1.0 / 128.0;
+    pub(crate) fn largest<T>(&self, run: impl FnMut(f64, &Halt<'_>) -> Option<T>) -> Option<T> {
+        self.largest_from(1.0 / 128.0, run)
+    }
+
+    /// As [`largest`](Self::largest), but no smaller than a part of the full work.
+    pub(crate) fn largest_from<T>(
+        &self,
+        first: f64,
+        mut run: impl FnMut(f64, &Halt<'_>) -> Option<T>,
+    ) -> Option<T> {
         let unlimited = Halt { canceller: self.canceller, deadline: None };
         if !self.is_limited() {
             return run(1.0, &unlimited);
         }
-        let (mut part, mut best) = (FIRST, None);
+        let (mut part, mut best) = (first, None);
         loop {
             let halt = if best.is_none() { unlimited } else { self.halt() };
             let began = Instant::now();

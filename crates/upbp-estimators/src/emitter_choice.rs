@@ -32,7 +32,9 @@ pub struct EmitterChoice {
 }
 
 impl EmitterChoice {
-    pub(crate) fn guide(&self, emitter: EmitterId) -> Option<&EmissionGuide> {
+    /// The guide of an emitter's light sub-paths, if it has one.
+    #[must_use]
+    pub fn guide(&self, emitter: EmitterId) -> Option<&EmissionGuide> {
         self.guides.get(emitter.0 as usize)?.as_ref()
     }
 

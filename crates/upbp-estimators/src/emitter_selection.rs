@@ -31,7 +31,20 @@ impl EmitterShares {
     /// proportion to just that: contributions times the square of their weights. The `probabilities` of
     /// emitters are where the search for these begins.
     #[must_use]
-    pub fn of(mut probabilities: Vec<f64>, samples: &[EmitterSample]) -> Self {
+    pub fn of(probabilities: Vec<f64>, samples: &[EmitterSample]) -> Self {
+        Self::reproduced(probabilities, samples, |light| light)
+    }
+
+    /// Roots of the second moments that are left of each emitter, if emitters were chosen in proportion to
+    /// them: then the sum of the variances is least. Here the light of samples is the square of a
+    /// contribution, divided by the probability that the emitter was chosen with.
+    #[must_use]
+    pub fn of_squares(probabilities: Vec<f64>, samples: &[EmitterSample]) -> Self {
+        Self::reproduced(probabilities, samples, f64::sqrt)
+    }
+
+    /// Probabilities that reproduce themselves, as a function of the weighted light by emitter.
+    fn reproduced(mut probabilities: Vec<f64>, samples: &[EmitterSample], share: fn(f64) -> f64) -> Self {
         let mut light = vec![0.0; probabilities.len()];
         let mut each = vec![0.0; samples.len()];
         for _ in 0..ROUNDS {
@@ -41,6 +54,9 @@ impl EmitterShares {
                 let weight = probabilities[emitter] / (probabilities[emitter] + sample.others);
                 *each = if weight > 0.0 { sample.light * weight * weight } else { 0.0 };
                 light[emitter] += *each;
+            }
+            for light in &mut light {
+                *light = share(*light);
             }
             let sum: f64 = light.iter().sum();
             if !(sum > 0.0 && sum.is_finite()) {

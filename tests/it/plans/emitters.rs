@@ -1,6 +1,6 @@
 //! The choice of emitters for light sub-paths.
 
-use upbp_core::Settings;
+use upbp_core::{FrozenPlan, LightPaths, Settings, Start};
 use upbp_scene::ReadyScene;
 use upbp_testing::renderer;
 
@@ -43,7 +43,11 @@ fn opal_lamps() -> ReadyScene {
 /// Shares of light sub-paths, by emitter.
 fn shares(scene: &ReadyScene, seed: u64) -> Vec<f64> {
     let settings = Settings { seed, deterministic: true, ..Settings::default() };
-    let text = renderer(scene, settings).state().identity().frozen_plan().to_ron();
+    shares_of(&renderer(scene, settings).state().identity().frozen_plan())
+}
+
+fn shares_of(plan: &FrozenPlan) -> Vec<f64> {
+    let text = plan.to_ron();
     let (_, rest) = text.split_once("emission: [").expect("the choice of emitters");
     let (ends, _) = rest.split_once(']').expect("the end of a list");
     let ends: Vec<f64> = ends.split(',').map(|end| end.trim().parse().expect("a number")).collect();
@@ -61,4 +65,79 @@ fn of_lamps_that_are_alike_none_is_left_to_chance() {
         assert_eq!(lamps.len(), 3);
         assert!(lamps.iter().all(|&share| share > 0.1), "{seed}: {shares:?}");
     }
+}
+
+/// Two lamps, each in a ball of glass, on either side of a wall: the light of one falls on stone, which is
+/// seen through a pane, that of the other into fog. Photons of the first are few in each kernel, and bright.
+fn stone_and_fog() -> ReadyScene {
+    let text = r#"(
+  version: 1,
+  camera: Perspective(origin: (0, 0, 6), target: (0, 0, 0), fov_degrees: 40),
+  film: (width: 64, height: 36),
+  media: { "fog": Homogeneous(sigma_s: 1.5) },
+  materials: {
+    "stone": Lambert(0.6), "black": Lambert(0), "glass": Dielectric(1.5), "gas": Null,
+  },
+  shapes: [
+    (material: "stone", geometry: Quad(origin: (-3, -2, -1), edge_u: (2.98, 0, 0), edge_v: (0, 4, 0))),
+    (material: "black", geometry: Quad(origin: (0.02, -2, -1), edge_u: (2.98, 0, 0), edge_v: (0, 4, 0))),
+    (material: "black", geometry: Box(min: (-0.02, -3, -1), max: (0.02, 3, 3))),
+    (material: "glass", geometry: Box(min: (-4, -3, 2), max: (-0.021, 3, 2.1))),
+    (material: "gas", interior: "fog", geometry: Box(min: (0.03, -2, -0.99), max: (3, 2, 1.5))),
+    (material: "glass", geometry: Sphere(centre: (-1.2, 0, 0.2), radius: 0.1)),
+    (material: "glass", geometry: Sphere(centre: (1.2, 0, 0.2), radius: 0.1)),
+  ],
+  lights: [Point(position: (-1.2, 0, 0.2), intensity: 1), Point(position: (1.2, 0, 0.2), intensity: 1)],
+)"#;
+    ReadyScene::from_ron_str(text, ".").expect("a valid scene")
+}
+
+fn by_photons() -> Settings {
+    Settings {
+        techniques: "hit+nee+lt+surf+pb2d".parse().expect("a set"),
+        light_paths: LightPaths::Count(30_000),
+        ..Settings::default()
+    }
+}
+
+/// Variance of renders with a plan, relative to the light of a pixel and of the picture.
+fn relative_variance(scene: &ReadyScene, plan: &FrozenPlan) -> f64 {
+    const SEEDS: u32 = 6;
+    let image = |seed| -> Vec<f64> {
+        let settings = Settings { seed, ..by_photons() }.validate().expect("valid settings");
+        let start = Start { plan: Some(plan.clone()), ..Start::default() };
+        let mut renderer = scene.start_renderer(settings, start).expect("a plan for it");
+        (0..4).for_each(|_| assert!(renderer.iterate()));
+        renderer.film().image().pixels.iter().map(|[r, g, b]| f64::from(r + g + b)).collect()
+    };
+    let images: Vec<_> = (0..u64::from(SEEDS)).map(image).collect();
+    let pixels = images[0].len();
+    let mean = images.iter().flatten().sum::<f64>() / (f64::from(SEEDS) * pixels as f64);
+    let of_pixel = |i: usize| {
+        let light = images.iter().map(|image| image[i]).sum::<f64>() / f64::from(SEEDS);
+        images.iter().map(|image| ((image[i] - light) / (light + mean)).powi(2)).sum::<f64>()
+    };
+    (0..pixels).map(of_pixel).sum()
+}
+
+#[test]
+fn light_sub_paths_are_shared_so_that_the_error_is_least() {
+    let scene = stone_and_fog();
+    let renderer = renderer(&scene, Settings { deterministic: true, ..by_photons() });
+    let chosen = renderer.state().identity().frozen_plan();
+    let own = shares_of(&chosen)[0];
+    let with = |share: f64| {
+        let text = chosen.to_ron();
+        let (before, rest) = text.split_once("emission: [").expect("the choice of emitters");
+        let (_, after) = rest.split_once(']').expect("the end of a list");
+        let (end, all) = ((share * f64::from(1 << 24)) as u32, 1 << 24);
+        FrozenPlan::from_ron(&format!("{before}emission: [{end}, {all}]{after}")).expect("a plan")
+    };
+    let found = relative_variance(&scene, &chosen);
+    let others = [0.2, 0.5, 0.8, 0.95].map(|share| (share, relative_variance(&scene, &with(share))));
+    println!("share {own}: {found}, others {others:?}");
+    let least = others.iter().map(|&(_, variance)| variance).fold(f64::INFINITY, f64::min);
+    assert!(found < 1.3 * least, "share {own}: {found}, others {others:?}");
+    // In proportion to light it would be less than this.
+    assert!(others[0].1 > 2.0 * least, "the share matters: {others:?}");
 }

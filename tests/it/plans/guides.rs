@@ -1,7 +1,7 @@
 //! Small things in large places: light sub-paths are guided to them.
 
 use glam::Vec3;
-use upbp_core::{Settings, TechniqueSet, Techniques};
+use upbp_core::{Settings, Start, Stop, TechniqueSet, Techniques};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::scene::{Emitter, EmitterId, Scene};
 use upbp_estimators::{
@@ -81,6 +81,21 @@ fn the_caustic_of_a_sun_in_a_sky_does_not_depend_on_the_size_of_the_ground() {
     std::fs::remove_file(&path).expect("it was there");
     let [small, large] = [small, large].map(|scene| shadow(&scene, Techniques::Auto));
     assert!(large.spread < 2.0 * small.spread, "{} and {}", small.spread, large.spread);
+}
+
+/// However short a preparation has to be, it looks at enough to meet what is a twentieth of the picture, and
+/// what it found stays as long as nothing speaks against it.
+#[test]
+fn small_glass_is_found_without_time() {
+    let scene = ball(300.0, "Directional(direction: (0.5, -1, 0.3), irradiance: 6)");
+    for seed in 0..24 {
+        let settings = Settings { seed, ..Settings::default() }.validate().expect("valid settings");
+        let stop = Stop { seconds: Some(1e-6), ..Stop::default() };
+        let start = Start { stop, ..Start::default() };
+        let renderer = scene.start_renderer(settings, start).expect("a valid render");
+        let emitters = renderer.state().identity().frozen_plan().emitters;
+        assert!(emitters.guide(EmitterId(0)).is_some(), "seed {seed}");
+    }
 }
 
 /// The sun through three windows, one of which the camera hardly sees, into a large dusty room.

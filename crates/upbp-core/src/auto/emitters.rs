@@ -3,12 +3,13 @@
 //! By power, a sky takes most of the light sub-paths and next events of a room with a window, and most of
 //! them are lost: the light goes past the scene, or emission hits find it anyway. So a small run counts the
 //! weighted contributions that come from each emitter, by next events and by light sub-paths, as far as no
-//! other technique would find them, and emitters are then chosen in proportion (`docs/theory.md`, section
-//! 6.6). Weights are exact for any choice, and the choice is fixed before any sample of the image. Next
-//! events choose by the place of the receiver where that pays. Further rounds learn where on the emitters
-//! light sub-paths should start ([`guides`]).
+//! other technique would find them. Next events then choose emitters in proportion, light sub-paths for the
+//! least variance (`docs/theory.md`, section 6.6). Weights are exact for any choice, and the choice is fixed
+//! before any sample of the image. Next events choose by the place of the receiver where that pays. Further
+//! rounds learn where on the emitters light sub-paths should start ([`guides`]).
 
 use glam::Vec3;
+use upbp_estimators::mis::{ByTechnique, Densities};
 use upbp_estimators::observer::{
     Completion, DynObserver, LightEnd, ObservedSample, ObservedVertex, Observer,
 };
@@ -16,8 +17,8 @@ use upbp_estimators::path::{Context, LightChunk, LightVertex};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, StreamKind, TechniqueSet,
-    effective_samples,
+    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, StreamKind, Technique,
+    TechniqueSet, effective_samples,
 };
 use upbp_media::Lanes;
 
@@ -40,7 +41,8 @@ const GUIDED_LIGHT_PATHS: u32 = 16384;
 const MANY: usize = 8;
 /// Contributions that are enough.
 const CONTRIBUTIONS: f64 = 1e6;
-/// The part of the sub-paths that tells how many contributions there are going to be.
+/// The part of the sub-paths that tells how many contributions there are going to be, and that a run has
+/// without time: fewer see nothing of what is small in the picture.
 const FEW: f64 = 1.0 / 16.0;
 /// Light vertices that are enough.
 const LIGHT_VERTICES: f64 = 2e5;
@@ -85,7 +87,8 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         statistics::measure::<S, L>(scene, settings, techniques, lanes, statistics::FEW_LIGHT_PATHS, &quick)?;
     let rounds: &[_] = if is_guided { &GUIDED_ROUNDS } else { &[(1.0, 1)] };
     let most_times = f64::from(rounds.iter().map(|(_, times)| *times).max().unwrap_or(1));
-    let vertices = LIGHT_VERTICES.min(room.items::<LightVertex<S::Bsdf, f64, L>>() as f64 / most_times);
+    let vertices =
+        LIGHT_VERTICES.min(room.items::<LightVertex<S::Bsdf, ByTechnique, L>>() as f64 / most_times);
     let most = if is_guided { GUIDED_LIGHT_PATHS } else { LIGHT_PATHS };
     let light_paths = (vertices / statistics.vertices_per_path.max(1.0)).clamp(1.0, f64::from(most));
     let enough = CONTRIBUTIONS.min(room.items::<NextEvent>() as f64);
@@ -107,7 +110,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         let paths = paths.map(|count| times.min(most) * count);
         let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, enough, halt);
         let allowance = budget.part((1.0 - QUICK_LOOK) * PART * part);
-        let seen = allowance.largest(run).ok_or(RenderError::Cancelled)?;
+        let seen = allowance.largest_from(FEW / f64::from(times), run).ok_or(RenderError::Cancelled)?;
         if emitters > 1 {
             scene.choose_emitters_by(&seen.emission, &shares(&seen.next_events, emitters));
             choose_by_receiver(scene, &seen.next_events);
@@ -215,7 +218,9 @@ fn measure<S: Scene, L: Lanes>(
 ) -> Option<Measured> {
     let [light_paths, camera_paths] = paths.map(|count| (part * f64::from(count)).ceil() as u32);
     let beam_paths = light_paths.div_ceil(PATHS_PER_BEAM_PATH).min(plan.beam_paths);
-    let plan = &plan.blurred(light_paths, beam_paths);
+    let (full, plan) = (plan, &plan.blurred(light_paths, beam_paths));
+    let area = |plan: &IterationPlan| f64::from(plan.kernels.surf.radius()).powi(2);
+    let blur = if area(full) > 0.0 { area(plan) / area(full) } else { 1.0 };
     let context = Context { prepared: scene, plan };
     // The whole film: a crop shows the same camera samples.
     let (width, height) = scene.scene.camera().resolution();
@@ -238,7 +243,7 @@ fn measure<S: Scene, L: Lanes>(
     let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
         let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
         let before = (seen.light, seen.emission.len(), seen.next_event.len());
-        let observer: &mut DynObserver<'_, S::Bsdf> = seen;
+        let observer: &mut DynObserver<'_, S::Bsdf, ByTechnique> = seen;
         let counters = &mut Counters::default();
         trace_camera_path(&context, &map, kind, pixel(film, index), index, scratch, counters, observer);
         let pixel = seen.light - before.0;
@@ -258,9 +263,11 @@ fn measure<S: Scene, L: Lanes>(
     let mut by_path = |seen: &[(u32, Contribution)], scale: f64| {
         for &(path, contribution) in seen {
             if let Some((end, light)) = &mut starts[path as usize] {
-                let scale = scale * relative(contribution);
-                emission.push(contribution.of(end.emitter, emission_probability(end.emitter), scale));
-                *light += scale * contribution.value * contribution.weight;
+                let (chosen, relative) = (emission_probability(end.emitter), relative(contribution));
+                // In an iteration it would be as much brighter, and rarer, as its kernel is narrower.
+                let blur = if contribution.blurred { blur } else { 1.0 };
+                emission.push(contribution.square_of(end.emitter, chosen, blur * scale, relative));
+                *light += scale * relative * contribution.value * contribution.weight;
             }
         }
     };
@@ -282,7 +289,7 @@ fn measure<S: Scene, L: Lanes>(
     let light_paths = effective_samples(guides.starts.iter().map(|&(_, light)| light));
     let probabilities = (0..emitters).map(|i| emission_probability(EmitterId(i as u32))).collect();
     let contributions = emission.len() + next_events.iter().map(Vec::len).sum::<usize>();
-    let mut emission = EmitterShares::of(probabilities, &emission);
+    let mut emission = EmitterShares::of_squares(probabilities, &emission);
     emission.samples = emission.samples.min(light_paths);
     Some(Measured { emission, next_events, guides, contributions })
 }
@@ -292,13 +299,13 @@ fn light_sub_paths<S: Scene, L: Lanes>(
     context: &Context<'_, S>,
     seen: &mut Seen,
     halt: &Halt<'_>,
-) -> Option<LightMap<S::Bsdf, f64, L>> {
+) -> Option<LightMap<S::Bsdf, ByTechnique, L>> {
     let plan = context.plan;
     let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
     let kind = StreamKind::PilotLight;
     let pieces =
-        in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_, f64, L>, Seen)| {
-            let observer: &mut DynObserver<'_, S::Bsdf> = seen;
+        in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_, ByTechnique, L>, Seen)| {
+            let observer: &mut DynObserver<'_, S::Bsdf, ByTechnique> = seen;
             trace_light_path(context, kind, index, scratch, out, observer);
             true
         })?;
@@ -343,20 +350,45 @@ struct Contribution {
     /// Before weighting.
     value: f64,
     weight: f64,
+    /// Weight of all techniques that the choice of the emitter makes likelier together.
+    together: f64,
+    /// Whether its kernel is wider than in an iteration.
+    blurred: bool,
     /// Light of its pixel, this included.
     pixel: f64,
 }
 
 impl Contribution {
-    /// Turns the sample into one of its emitter, which was chosen with a probability.
+    /// Turns the sample into one of its emitter, which was chosen with a probability; `scale` is what it
+    /// stands for.
     fn of(self, emitter: EmitterId, chosen: f64, scale: f64) -> EmitterSample {
         let others = chosen * (1.0 - self.weight) / self.weight;
         EmitterSample { emitter, light: scale * self.value, others }
     }
+
+    /// The square of the sample, but for the weight of all techniques that the choice of its emitter makes
+    /// likelier together with it, as a sample of that emitter; `scale` is what it stands for, relative to
+    /// the light of its pixel.
+    fn square_of(self, emitter: EmitterId, chosen: f64, scale: f64, relative: f64) -> EmitterSample {
+        let others = chosen * (1.0 - self.together) / self.together;
+        let value = relative * self.value * self.weight / self.together;
+        EmitterSample { emitter, light: scale * chosen * value * value, others }
+    }
 }
 
+/// Techniques whose paths begin with a light sub-path.
+const OF_LIGHT: [Technique; 7] = [
+    Technique::Connect,
+    Technique::LightTracing,
+    Technique::Surf,
+    Technique::Pp3d,
+    Technique::Pb2d,
+    Technique::Bp2d,
+    Technique::Bb1d,
+];
+
 impl<B> Observer<B> for Seen {
-    type Densities = f64;
+    type Densities = ByTechnique;
 
     fn light_end(&mut self, path: u32, end: &LightEnd) {
         self.starts.push((path, *end));
@@ -368,17 +400,22 @@ impl<B> Observer<B> for Seen {
         }
     }
 
-    fn sample(&mut self, sample: &ObservedSample<B>) {
+    fn sample(&mut self, sample: &ObservedSample<B, ByTechnique>) {
         let (value, weight) = (f64::from(sample.value.mean()), sample.weight.value());
-        let seen = Contribution { value, weight, pixel: value * weight };
-        self.light += seen.pixel;
+        let all = sample.weight.all;
+        let of_light: f64 = OF_LIGHT.iter().map(|technique| all.of[*technique as usize]).sum();
+        let blurred = matches!(sample.technique, Technique::Surf | Technique::Pp3d | Technique::Pb2d);
+        let seen = |together| Contribution { value, weight, together, blurred, pixel: value * weight };
+        self.light += value * weight;
         match sample.completion {
-            Completion::Emission | Completion::Hit(_) => {}
-            Completion::Nee { light, camera: (receiver, _) } => self.next_event.push((light, receiver, seen)),
+            Completion::Emission | Completion::Hit(_) | Completion::Lens { .. } => {}
+            Completion::Nee { light, camera: (receiver, _) } => {
+                self.next_event.push((light, receiver, seen(weight)));
+            }
             Completion::Connect { path, .. }
             | Completion::LightTracing { path, .. }
             | Completion::Merge { path, .. } => {
-                self.emission.push((path, seen));
+                self.emission.push((path, seen(of_light / all.total())));
             }
         }
     }
@@ -388,11 +425,18 @@ impl<B> Observer<B> for Seen {
 mod tests {
     use super::*;
 
+    /// Techniques of one light sub-path do not compete: what is left beside them does not depend on how many
+    /// they are, and each contributes its part of the light.
     #[test]
-    fn pixels_lie_on_the_film_and_are_spread() {
-        let film = PixelRect { x: 3, y: 5, width: 40, height: 30 };
-        let pixels: std::collections::BTreeSet<_> = (0..1200).map(|index| pixel(film, index)).collect();
-        assert_eq!(pixels.len(), 1200);
-        assert!(pixels.iter().all(|[x, y]| (3..43).contains(x) && (5..35).contains(y)));
+    fn techniques_with_a_light_sub_path_count_together() {
+        for (count, together) in [(1.0, 1.0), (4.0, 1.0), (1.0, 0.01), (4.0, 0.01)] {
+            let contribution =
+                Contribution { value: 2.0, weight: together / count, together, blurred: false, pixel: 0.0 };
+            let sample = contribution.square_of(EmitterId(0), 0.3, 10.0, 0.5);
+            let expected = 10.0 * 0.3 * (0.5 * 2.0 / count).powi(2);
+            assert!((sample.light / expected - 1.0).abs() < 1e-12, "{sample:?}, {expected}");
+            let others = 0.3 * (1.0 - together) / together;
+            assert!((sample.others - others).abs() <= 1e-12 * others, "{sample:?}, {others}");
+        }
     }
 }

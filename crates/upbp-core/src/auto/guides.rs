@@ -24,6 +24,9 @@ const MOST_POINTS: usize = 4096;
 /// light. Half of the starts stay where they are, so that other light loses up to a factor of two, of which a
 /// small run may see nothing.
 const WORTH: f64 = 2.0;
+/// Starts that brought light from which on they tell whether a guide is worth it. Fewer say that there was no
+/// time to find out.
+const FEW: usize = 8;
 /// The most that one start may count of the light of all: one that is bright because it is rare would draw
 /// most of the guided starts to its own cell.
 const BRIGHTEST: f64 = 0.03;
@@ -153,7 +156,8 @@ pub(super) fn first<S: Scene>(
 
 /// Guides to the starts that brought light to the picture, at emitters where they are worth it: where a guide
 /// that was made of one half of these starts leads to the other half. Logarithms are compared, for second
-/// moments of so few starts are those of the brightest.
+/// moments of so few starts are those of the brightest. Where hardly any have brought light, the scene keeps
+/// the guide that it has, unless they lie elsewhere.
 pub(super) fn next<S: Scene>(
     scene: &PreparedScene<'_, S>,
     seen: &Evidence,
@@ -167,7 +171,11 @@ pub(super) fn next<S: Scene>(
         starts.axes = axes;
         starts.samples.push(EmissionSample { at, light: *light });
     }
-    let guide = |(starts, first): (Starts, &Starts)| {
+    let guide = |(emitter, (starts, first)): (usize, (Starts, &Starts))| {
+        if starts.samples.iter().filter(|start| start.light > 0.0).count() < FEW {
+            let guide = scene.emitter_choice().guide(EmitterId(emitter as u32));
+            return guide.filter(|guide| starts.light() == 0.0 || starts.gain(guide) > WORTH).cloned();
+        }
         let with_first = |mut starts: Starts| {
             starts.clip(BRIGHTEST);
             starts.add(first, FIRST);
@@ -177,5 +185,5 @@ pub(super) fn next<S: Scene>(
         let is_worth = with_first(some).is_some_and(|guide| others.gain(&guide) > WORTH);
         if is_worth { with_first(starts) } else { None }
     };
-    starts.into_iter().zip(first).map(guide).collect()
+    starts.into_iter().zip(first).enumerate().map(guide).collect()
 }

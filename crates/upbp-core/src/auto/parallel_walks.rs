@@ -60,9 +60,34 @@ pub(super) fn in_pieces<B: Copy, L: Lanes, O: Default + Send>(
     pieces.into_par_iter().map_init(Scratch::default, piece).collect()
 }
 
-/// A pixel of a sequence that is spread over the picture by a step that is prime to almost every width.
+/// Steps of a sequence that fills the unit square evenly, from its beginning on (Roberts's R2).
+pub(super) const EVEN_STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+
+/// A pixel of a sequence of which each first part, however short, is spread over the picture.
 pub(super) fn pixel(crop: PixelRect, index: u64) -> [u32; 2] {
-    let width = u64::from(crop.width);
-    let place = (index * 7919) % (width * u64::from(crop.height));
-    [crop.x + (place % width) as u32, crop.y + (place / width) as u32]
+    let [u, v] = EVEN_STEPS.map(|step| (0.5 + index as f64 * step).fract());
+    let place = |u: f64, size: u32| ((u * f64::from(size)) as u32).min(size - 1);
+    [crop.x + place(u, crop.width), crop.y + place(v, crop.height)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_first_part_of_the_pixels_is_spread_over_the_picture() {
+        for (width, height) in [(640, 360), (7680, 4320), (7919, 100), (1, 4000)] {
+            let crop = PixelRect { x: 3, y: 5, width, height };
+            for (pixels, cells) in [(16, 2), (128, 6), (2048, 24)] {
+                let mut found = std::collections::BTreeSet::new();
+                for index in 0..pixels {
+                    let [x, y] = pixel(crop, index);
+                    assert!((3..3 + width).contains(&x) && (5..5 + height).contains(&y));
+                    found.insert([(x - 3) * cells / width, (y - 5) * cells / height]);
+                }
+                let expected = width.min(cells) * height.min(cells);
+                assert_eq!(found.len(), expected as usize, "{pixels} of {width} x {height}");
+            }
+        }
+    }
 }

@@ -5,10 +5,8 @@
 //! mean is the variance of a pixel and a sum over the other pixels near it, of covariances times
 //! [weights](weight) that depend on their offset.
 
+use crate::auto::parallel_walks::EVEN_STEPS;
 use crate::film::BLOCK_SIDES;
-
-/// Steps of a sequence that fills the unit square evenly (Roberts's R2).
-const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// The farthest that pixels of a block are apart in a row.
 const FARTHEST: u32 = 15;
@@ -25,14 +23,14 @@ pub(super) fn weight([x, y]: [i32; 2]) -> f64 {
 /// Another of `count` elements than the one at `index`, the n-th one that is drawn: all others are as likely.
 pub(super) fn another(n: usize, index: usize, count: usize) -> usize {
     let others = count - 1;
-    let drawn = (n as f64 * STEPS[0]).fract() * others as f64;
+    let drawn = (n as f64 * EVEN_STEPS[0]).fract() * others as f64;
     (index + 1 + (drawn as usize).min(others - 1)) % count
 }
 
 /// The offset of the n-th pair of pixels, and its weight over its probability. A ring at half the
 /// distance is twice as likely: there is more in common the nearer pixels are.
 pub(super) fn offset(n: u32) -> ([i32; 2], f64) {
-    let [u, v] = STEPS.map(|step| (f64::from(n) * step).fract());
+    let [u, v] = EVEN_STEPS.map(|step| (f64::from(n) * step).fract());
     let all: f64 = (1..=FARTHEST).map(|ring| f64::from(ring).recip()).sum();
     let mut rest = u * all;
     let mut ring = 1;
