@@ -185,7 +185,7 @@ impl<'a> Allowance<'a> {
         self.largest_from(1.0 / 128.0, run)
     }
 
-    /// As [`largest`](Self::largest), but no smaller than a part of the full work.
+    /// As [`largest`](Self::largest), with the part of the first run, which is the least that is done.
     pub(crate) fn largest_from<T>(
         &self,
         first: f64,

@@ -26,8 +26,8 @@ const POINTS: u32 = 4;
 /// Values of each number of `u_lens` that stand for the lens, from its middle to its rim.
 const LENS_POINTS: u32 = 5;
 
-/// Where the image of a point is smaller, relative to the sharp image of the emitter, lens points that meet
-/// the emitter are not rare, and connections would not pay.
+/// Least area of the image of a point, relative to the sharp image of the emitter: with a smaller one lens
+/// points that meet the emitter are not rare, and connections would not pay.
 const LEAST_BLUR: f32 = 0.25;
 
 /// Even share of the choice within a cell: what is bright may be hidden.
@@ -51,7 +51,7 @@ struct Disc {
     emitter: EmitterId,
     /// Corners of the pixels around the discs of all of its points.
     corners: [Vec2; 2],
-    /// What a connection contributes to a pixel, but for what is in between.
+    /// Contribution of a connection to a pixel, but for what is in between.
     brightness: f32,
 }
 
@@ -68,7 +68,9 @@ impl Disc {
             let Some(incident) = light.sample_incident(bounds, viewpoint, u) else { continue };
             let Incident { point, towards_light, distance, radiance, pdf, .. } = incident;
             for j in 0..LENS_POINTS * LENS_POINTS {
-                let at = [j % LENS_POINTS, j / LENS_POINTS].map(|k| k as f32 / LENS_POINTS as f32 * 1.249);
+                // Below one.
+                let at =
+                    [j % LENS_POINTS, j / LENS_POINTS].map(|k| 0.999 * k as f32 / (LENS_POINTS - 1) as f32);
                 let Some(view) = camera.connect(point.position, at) else { continue };
                 let Some(connection) = camera.connect_at(point.position, view.film) else { continue };
                 corners = [corners[0].min(view.film), corners[1].max(view.film)];
@@ -136,8 +138,10 @@ impl LensEmitters {
 
     /// The emitters that may be seen out of focus at a place of the film, with their probabilities.
     pub(crate) fn at(&self, film: Vec2) -> &[(EmitterId, f32)] {
-        let [column, row] = [film.x, film.y].map(|place| place as u32 / self.cell);
-        self.cells.get((row * self.columns + column) as usize).map_or(&[], Vec::as_slice)
+        let [column, row] = [film.x, film.y].map(|place| place as usize / self.cell as usize);
+        let columns = self.columns as usize;
+        let cell = (column < columns).then(|| row.checked_mul(columns)).flatten();
+        cell.and_then(|first| self.cells.get(first.checked_add(column)?)).map_or(&[], Vec::as_slice)
     }
 
     /// Chooses one of them; returns its probability.

@@ -13,7 +13,8 @@ use crate::emitters_by_receiver::{ClusterSample, ReceiverShares};
 use crate::lens_emitters::LensEmitters;
 use crate::random::Decision;
 use crate::scene::{
-    BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, PixelRect, Scene,
+    BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, LensConnection,
+    PixelRect, Scene,
 };
 
 /// A [`Scene`] with all that is derived from it once.
@@ -406,19 +407,25 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         Some((emitter, incident.point))
     }
 
-    /// The density of paths of one edge that [`choose_through_lens`](Self::choose_through_lens) makes at a
-    /// place of the film, relative to the density of lens points: the probability of the emitter, times the
-    /// density of the point per area, times the [area of its image](crate::scene::LensConnection). `None` if
-    /// the point is not chosen there.
+    /// The connection of a point that [`choose_through_lens`](Self::choose_through_lens) may choose at a
+    /// place of the film, and the density of the path of one edge, relative to the density of lens points:
+    /// the probability of the emitter, times the density of the point per area, times the
+    /// [area of its image](LensConnection::image_area). `None` if the point is not chosen there.
     #[must_use]
-    pub fn pdf_through_lens(&self, emitter: EmitterId, point: &EmitterPoint, film: Vec2) -> Option<f64> {
+    pub fn connect_through_lens(
+        &self,
+        emitter: EmitterId,
+        point: &EmitterPoint,
+        film: Vec2,
+    ) -> Option<(LensConnection, f64)> {
         let emitters = self.lens_emitters.as_ref()?;
         let (_, probability) = emitters.at(film).iter().find(|(other, _)| *other == emitter)?;
-        let image_area = self.scene.camera().connect_at(point.position, film)?.image_area;
+        let connection = self.scene.camera().connect_at(point.position, film)?;
         let direction = (emitters.viewpoint - point.position).try_normalize()?;
         let light = &self.scene.emitters()[emitter.0 as usize];
         let seen = light.hit(&self.emission_bounds, point, direction, emitters.viewpoint)?;
-        Some(f64::from(*probability) * f64::from(seen.pdf_incident) * f64::from(image_area))
+        let pdf_point = f64::from(*probability) * f64::from(seen.pdf_incident);
+        Some((connection, pdf_point * f64::from(connection.image_area)))
     }
 
     /// The bodies around a point of the lens.

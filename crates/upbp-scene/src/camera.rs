@@ -119,7 +119,7 @@ impl PerspectiveCamera {
         p.x * self.right + p.y * self.up
     }
 
-    /// What a film point adds to `forward` in the direction of its chief ray, along `right` and `up`.
+    /// The chief ray of a film point at unit depth: its coordinates along `right` and `up`.
     fn across(&self, film: Vec2) -> Vec2 {
         // From −1 to 1, y upwards.
         (film / self.film_size() * 2.0 - Vec2::ONE) * Vec2::new(1.0, -1.0) * self.half_size

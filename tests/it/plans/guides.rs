@@ -83,8 +83,8 @@ fn the_caustic_of_a_sun_in_a_sky_does_not_depend_on_the_size_of_the_ground() {
     assert!(large.spread < 2.0 * small.spread, "{} and {}", small.spread, large.spread);
 }
 
-/// However short a preparation has to be, it looks at enough to meet what is a twentieth of the picture, and
-/// what it found stays as long as nothing speaks against it.
+/// A preparation without any time still looks at enough to meet what is a twentieth of the picture, and what
+/// it found stays as long as nothing speaks against it.
 #[test]
 fn small_glass_is_found_without_time() {
     let scene = ball(300.0, "Directional(direction: (0.5, -1, 0.3), irradiance: 6)");

@@ -107,7 +107,8 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     for (round, &(part, times)) in rounds.iter().enumerate() {
         let run = PilotRun::Emitters { round: round as u32 };
         let plan = IterationPlan { iteration: run.iteration(), ..plan.clone() };
-        let paths = paths.map(|count| times.min(most) * count);
+        let times = times.min(most);
+        let paths = paths.map(|count| times * count);
         let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, enough, halt);
         let allowance = budget.part((1.0 - QUICK_LOOK) * PART * part);
         let seen = allowance.largest_from(FEW / f64::from(times), run).ok_or(RenderError::Cancelled)?;
@@ -219,8 +220,12 @@ fn measure<S: Scene, L: Lanes>(
     let [light_paths, camera_paths] = paths.map(|count| (part * f64::from(count)).ceil() as u32);
     let beam_paths = light_paths.div_ceil(PATHS_PER_BEAM_PATH).min(plan.beam_paths);
     let (full, plan) = (plan, &plan.blurred(light_paths, beam_paths));
-    let area = |plan: &IterationPlan| f64::from(plan.kernels.surf.radius()).powi(2);
-    let blur = if area(full) > 0.0 { area(plan) / area(full) } else { 1.0 };
+    let blur = |technique| match [plan, full].map(|plan| plan.kernels.get(technique)) {
+        [Some(wide), Some(narrow)] if narrow.effective_volume() > 0.0 => {
+            wide.effective_volume() / narrow.effective_volume()
+        }
+        _ => 1.0,
+    };
     let context = Context { prepared: scene, plan };
     // The whole film: a crop shows the same camera samples.
     let (width, height) = scene.scene.camera().resolution();
@@ -265,8 +270,8 @@ fn measure<S: Scene, L: Lanes>(
             if let Some((end, light)) = &mut starts[path as usize] {
                 let (chosen, relative) = (emission_probability(end.emitter), relative(contribution));
                 // In an iteration it would be as much brighter, and rarer, as its kernel is narrower.
-                let blur = if contribution.blurred { blur } else { 1.0 };
-                emission.push(contribution.square_of(end.emitter, chosen, blur * scale, relative));
+                let scale_of_squares = scale * blur(contribution.technique);
+                emission.push(contribution.square_of(end.emitter, chosen, scale_of_squares, relative));
                 *light += scale * relative * contribution.value * contribution.weight;
             }
         }
@@ -347,13 +352,12 @@ impl Seen {
 
 #[derive(Clone, Copy)]
 struct Contribution {
+    technique: Technique,
     /// Before weighting.
     value: f64,
     weight: f64,
     /// Weight of all techniques that the choice of the emitter makes likelier together.
     together: f64,
-    /// Whether its kernel is wider than in an iteration.
-    blurred: bool,
     /// Light of its pixel, this included.
     pixel: f64,
 }
@@ -377,15 +381,7 @@ impl Contribution {
 }
 
 /// Techniques whose paths begin with a light sub-path.
-const OF_LIGHT: [Technique; 7] = [
-    Technique::Connect,
-    Technique::LightTracing,
-    Technique::Surf,
-    Technique::Pp3d,
-    Technique::Pb2d,
-    Technique::Bp2d,
-    Technique::Bb1d,
-];
+const OF_LIGHT: TechniqueSet = TechniqueSet::ALL.without(TechniqueSet::PT);
 
 impl<B> Observer<B> for Seen {
     type Densities = ByTechnique;
@@ -403,10 +399,10 @@ impl<B> Observer<B> for Seen {
     fn sample(&mut self, sample: &ObservedSample<B, ByTechnique>) {
         let (value, weight) = (f64::from(sample.value.mean()), sample.weight.value());
         let all = sample.weight.all;
-        let of_light: f64 = OF_LIGHT.iter().map(|technique| all.of[*technique as usize]).sum();
-        let blurred = matches!(sample.technique, Technique::Surf | Technique::Pp3d | Technique::Pb2d);
-        let seen = |together| Contribution { value, weight, together, blurred, pixel: value * weight };
-        self.light += value * weight;
+        let of_light: f64 = OF_LIGHT.iter().map(|technique| all.of[technique as usize]).sum();
+        let (technique, pixel) = (sample.technique, value * weight);
+        let seen = |together| Contribution { technique, value, weight, together, pixel };
+        self.light += pixel;
         match sample.completion {
             Completion::Emission | Completion::Hit(_) | Completion::Lens { .. } => {}
             Completion::Nee { light, camera: (receiver, _) } => {
@@ -430,8 +426,8 @@ mod tests {
     #[test]
     fn techniques_with_a_light_sub_path_count_together() {
         for (count, together) in [(1.0, 1.0), (4.0, 1.0), (1.0, 0.01), (4.0, 0.01)] {
-            let contribution =
-                Contribution { value: 2.0, weight: together / count, together, blurred: false, pixel: 0.0 };
+            let (technique, weight) = (Technique::Surf, together / count);
+            let contribution = Contribution { technique, value: 2.0, weight, together, pixel: 0.0 };
             let sample = contribution.square_of(EmitterId(0), 0.3, 10.0, 0.5);
             let expected = 10.0 * 0.3 * (0.5 * 2.0 / count).powi(2);
             assert!((sample.light / expected - 1.0).abs() < 1e-12, "{sample:?}, {expected}");

@@ -146,13 +146,11 @@ impl ErrorMap {
     /// of what is in the picture does not matter beside its black background. Where light is rare, black
     /// pixels are some that it has not met yet.
     fn noisy(&self) -> Vec<f32> {
-        let pixels = || self.upper.iter().zip(&self.seen_twice);
-        let sum = |errors: &mut dyn Iterator<Item = &f32>| errors.map(|t| f64::from(*t)).sum::<f64>();
-        let seen_once = sum(&mut pixels().filter(|(_, twice)| !**twice).map(|(t, _)| t));
-        if seen_once > RARE * sum(&mut self.upper.iter()) {
-            return self.upper.clone();
-        }
-        pixels().filter(|(_, twice)| **twice).map(|(t, _)| *t).collect()
+        let pixels = self.upper.iter().zip(&self.seen_twice);
+        let noisy: Vec<f32> = pixels.filter_map(|(error, twice)| twice.then_some(*error)).collect();
+        let sum = |errors: &[f32]| errors.iter().map(|t| f64::from(*t)).sum::<f64>();
+        let (seen_twice, all) = (sum(&noisy), sum(&self.upper));
+        if all - seen_twice > RARE * all { self.upper.clone() } else { noisy }
     }
 }
 

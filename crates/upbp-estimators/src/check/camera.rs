@@ -70,7 +70,7 @@ fn check_images(camera: &impl Camera, film: Vec2, u_lens: [f32; 2], distance: f3
     let least = images.iter().fold(Vec2::INFINITY, |least, image| least.min(*image));
     let most = images.iter().fold(Vec2::NEG_INFINITY, |most, image| most.max(*image));
     // Narrower discs are lost in the rounding of places on the film.
-    if (most - least).min_element() < 1e-3 * camera_size(camera) {
+    if (most - least).min_element() < 1e-3 * longer_side(camera) {
         return Ok(());
     }
     let at_lens = camera.connect(point, u_lens).map_or(connection.lens, |seen| seen.lens);
@@ -96,7 +96,7 @@ fn check_images(camera: &impl Camera, film: Vec2, u_lens: [f32; 2], distance: f3
 }
 
 /// The longer side of the film.
-fn camera_size(camera: &impl Camera) -> f32 {
+fn longer_side(camera: &impl Camera) -> f32 {
     let (width, height) = camera.resolution();
     width.max(height) as f32
 }

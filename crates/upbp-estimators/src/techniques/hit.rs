@@ -206,8 +206,8 @@ fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let weight = if edge.depth == 1 {
         let pdf_ray = edge.mis.rho * mis_edge.cos_in / mis_edge.distance_squared;
         let passes = mis_edge.pass_probability.mean(&edge.mis.shares);
-        match prepared.pdf_through_lens(emitter, point, out.film) {
-            Some(pdf) => plan.mis.direct_hit_weight(pdf, pdf_ray * passes),
+        match prepared.connect_through_lens(emitter, point, out.film) {
+            Some((_, pdf)) => plan.mis.direct_hit_weight(pdf, pdf_ray * passes),
             None => Weight::alone(Technique::Hit),
         }
     } else {

@@ -8,7 +8,7 @@ use crate::mis::Densities;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{Context, Target, clear_edge};
 use crate::random::Stream;
-use crate::scene::{Camera, Crossing, Emitter, LensConnection, Scene};
+use crate::scene::{Crossing, Emitter, LensConnection, Scene};
 use crate::technique::Technique;
 
 /// Connects points on emitters with the lens, as many as the plan says.
@@ -39,7 +39,9 @@ fn next_event_at_lens<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Some((emitter, point)) = prepared.choose_through_lens(film, stream.uniform(), stream.pair()) else {
         return;
     };
-    let Some(LensConnection { lens, pdf, .. }) = scene.camera().connect_at(point.position, film) else {
+    let Some((LensConnection { lens, pdf, .. }, pdf_point)) =
+        prepared.connect_through_lens(emitter, &point, film)
+    else {
         return;
     };
     let between = point.position - lens;
@@ -47,7 +49,6 @@ fn next_event_at_lens<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let direction = between / distance;
     let light = &scene.emitters()[emitter.0 as usize];
     let Some(seen) = light.hit(prepared.emission_bounds(), &point, -direction, lens) else { return };
-    let Some(pdf_point) = prepared.pdf_through_lens(emitter, &point, film) else { return };
     out.counters.shadow_rays += 1;
     let target = Target { direction, distance, surface: Some((point.position, point.normal)) };
     let stack = prepared.stack_at_camera(lens);

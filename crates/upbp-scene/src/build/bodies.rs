@@ -100,7 +100,7 @@ fn is_inside(shape: &Shape, other: &Shape) -> bool {
     }
 }
 
-/// Points all over a shape.
+/// Points all over a shape, with their outward normals.
 fn points_on(shape: &Shape) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
     (0..16_u8).map(|i| shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]))
 }
