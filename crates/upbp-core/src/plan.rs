@@ -193,14 +193,15 @@ impl<'de> Deserialize<'de> for Plan {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::num::NonZeroU32;
 
     use upbp_estimators::RadiusField;
 
     use super::*;
 
-    fn plan() -> Plan {
+    /// A plan in which everything has a value that is not the usual one.
+    pub(crate) fn plan() -> Plan {
         Plan {
             techniques: TechniqueSet::PT.with(Technique::Surf),
             light_paths: 1000,

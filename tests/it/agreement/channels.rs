@@ -1,6 +1,6 @@
 //! Colours are three numbers and no more: which of them is called red makes no difference.
 
-use upbp_core::{LightPaths, Settings, TechniqueSet};
+use upbp_core::{FrozenPlan, Heuristic, LightPaths, RenderError, Renderer, Settings, Start, TechniqueSet};
 use upbp_scene::ReadyScene;
 use upbp_testing::{render, render_channels};
 
@@ -61,4 +61,21 @@ fn exchanged_channels_of_a_chromatic_medium_exchange_the_means() {
         println!("channel {c}: {:.5} and {:.5}, {sigmas:.2} standard errors", a.mean, b.mean);
         assert!(sigmas.abs() < 4.0, "channel {c}: {} and {}, {sigmas} standard errors", a.mean, b.mean);
     }
+}
+
+/// Lanes are weighted by the balance heuristic: a plan has none with the other one, and is refused if it has.
+#[test]
+fn lanes_have_no_power_heuristic() {
+    let scene = scene([0.5, 1.5, 1.0], [0.5; 3]);
+    let plan_with = |heuristic, plan: Option<FrozenPlan>| {
+        let settings = Settings { heuristic, ..settings() }.validate().expect("settings");
+        let start = Start { plan, ..Start::default() };
+        Ok::<_, RenderError>(Renderer::start(&scene, settings, start)?.state().identity().frozen_plan())
+    };
+    let in_lanes = plan_with(Heuristic::Balance, None).expect("a plan");
+    assert!(in_lanes.plan.lanes.is_some());
+    assert_eq!(plan_with(Heuristic::Power, None).expect("a plan").plan.lanes, None);
+    let refused = plan_with(Heuristic::Power, Some(in_lanes.clone())).expect_err("lanes").to_string();
+    assert!(refused.contains("`heuristic`: expected Balance, since the plan has lanes"), "{refused}");
+    assert_eq!(plan_with(Heuristic::Balance, Some(in_lanes.clone())).expect("the same"), in_lanes);
 }

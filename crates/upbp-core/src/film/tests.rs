@@ -99,6 +99,32 @@ fn parts_add_up_to_the_whole() {
     assert_eq!(parted.overlap(&whole), Some(4..5));
 }
 
+/// What is there of an iteration in part stays that in a merged film, and belongs to the iteration's half.
+#[test]
+fn parts_are_merged_into_their_halves() {
+    let rect = PixelRect { x: 0, y: 0, width: 16, height: 16 };
+    let iteration = |value: f32| vec![pixel(value, 0.0); 256];
+    let mut film = Film::new(rect, TechniqueSet::BPT);
+    // Two of four are in the odd half; a part of a fifth is, too.
+    for (index, value) in [(1, 2.0), (3, 4.0), (5, 9.0), (6, 1.0)] {
+        film.add(index, &iteration(value));
+    }
+    let mut part = Film::new(rect, TechniqueSet::BPT);
+    part.add_part(9, 0..64, &iteration(25.0), &[]);
+    film.merge(&part);
+    assert_eq!(film.parts().iter().collect::<Vec<_>>(), [(&9, &64)]);
+    assert_eq!((film.iterations(), film.missing(9)), (4, 64..SETS));
+    let [even, odd] = film.halves().unwrap();
+    let (x, y) = (0..256).map(|i| (i % 16, i / 16)).find(|(x, y)| set_of(*x, *y) == 64).unwrap();
+    // A pixel of the part, and one that the part has not reached.
+    assert_eq!([even.pixels[0], odd.pixels[0]], [[1.0; 3], [10.0; 3]]);
+    assert_eq!([even.pixels[16 * y + x], odd.pixels[16 * y + x]], [[1.0; 3], [5.0; 3]]);
+    assert_eq!(film.sample_counts()[16 * y + x], 4.0);
+    assert_eq!(film.sample_counts()[0], 5.0);
+    film.add_part(9, 64..SETS, &iteration(25.0), &[]);
+    assert_eq!(film.halves().unwrap()[1].pixels, vec![[10.0; 3]; 256]);
+}
+
 #[test]
 fn merged_films_have_the_layers_of_both() {
     let (mut a, mut b) = (Film::new(RECT, TechniqueSet::BPT), Film::new(RECT, TechniqueSet::VOLUME_MERGES));

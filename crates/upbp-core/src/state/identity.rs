@@ -70,7 +70,26 @@ impl Identity {
     /// Names and values of whatever counts beside the plan, as text: the shortest decimals of two different
     /// numbers differ.
     fn fields(&self) -> [(&'static str, String); 12] {
-        let s = &self.settings;
+        let Settings {
+            seed,
+            min_length,
+            max_length,
+            heuristic,
+            photon_beams,
+            query_beams,
+            features,
+            // These count by the plan that they lead to.
+            techniques: _,
+            deterministic: _,
+            light_paths: _,
+            beams: _,
+            connections: _,
+            next_events: _,
+            roulette: _,
+            radii: _,
+            progressive: _,
+            memory: _,
+        } = &self.settings;
         let (width, height) = self.film;
         let (x, y, columns, rows) = self.part;
         [
@@ -78,13 +97,13 @@ impl Identity {
             ("scene", if self.fingerprint.is_empty() { "unnamed".into() } else { self.fingerprint.clone() }),
             ("film", format!("{width} x {height}")),
             ("crop", format!("{columns} x {rows} at ({x}, {y})")),
-            ("seed", s.seed.to_string()),
-            ("min_length", s.min_length.to_string()),
-            ("max_length", s.max_length.to_string()),
-            ("heuristic", format!("{:?}", s.heuristic)),
-            ("photon_beams", format!("{:?}", s.photon_beams)),
-            ("query_beams", format!("{:?}", s.query_beams)),
-            ("features", s.features.to_string()),
+            ("seed", seed.to_string()),
+            ("min_length", min_length.to_string()),
+            ("max_length", max_length.to_string()),
+            ("heuristic", format!("{heuristic:?}")),
+            ("photon_beams", format!("{photon_beams:?}")),
+            ("query_beams", format!("{query_beams:?}")),
+            ("features", features.to_string()),
             ("choice of emitters", fingerprint(format!("{:?}", self.emitters).as_bytes())),
         ]
     }
@@ -125,4 +144,97 @@ fn plan_fields(plan: &Plan) -> [(&'static str, String); 18] {
         ("progressive", progressive.to_string()),
         ("lanes", format!("{lanes:?}")),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroU32;
+
+    use upbp_estimators::mis::{BeamExtent, Heuristic};
+    use upbp_estimators::{FootprintField, MergePeriods, RadiusField, Roulette, TechniqueSet};
+
+    use super::*;
+    use crate::plan::tests::plan;
+
+    fn identity() -> Identity {
+        Identity {
+            version: "1.2.3".into(),
+            scene: "room".into(),
+            fingerprint: "ab".into(),
+            film: (40, 30),
+            part: (0, 0, 40, 30),
+            settings: Settings::default(),
+            support: TechniqueSupport {
+                techniques: TechniqueSet::STANDARD,
+                needs_merges: false,
+                emitting_media: false,
+                reasons: Vec::new(),
+            },
+            plan: plan(),
+            emitters: Arc::default(),
+        }
+    }
+
+    /// Whatever changes iterations is compared: such a change is named, and it alone.
+    #[test]
+    fn each_difference_is_named() {
+        let focus = |i: &mut Identity| {
+            let text = ron::to_string(&*i.emitters).unwrap();
+            let text = text.replace("(emission", "(focus:Some((0.0,0.0,1.0)),emission");
+            i.emitters = ron::from_str(&text).unwrap();
+        };
+        let field = FootprintField { eye: [0.0; 3], offset: 1.0, slope: 0.01, least: 0.5, most: 2.0 };
+        let changes: [(&str, &dyn Fn(&mut Identity)); 30] = [
+            ("version", &|i| i.version = "1.2.4".into()),
+            ("scene", &|i| i.fingerprint = "cd".into()),
+            ("film", &|i| i.film.0 = 41),
+            ("crop", &|i| i.part.1 = 1),
+            ("seed", &|i| i.settings.seed = 1),
+            ("min_length", &|i| i.settings.min_length = 2),
+            ("max_length", &|i| i.settings.max_length = 100),
+            ("heuristic", &|i| i.settings.heuristic = Heuristic::Power),
+            ("photon_beams", &|i| i.settings.photon_beams = BeamExtent::Long),
+            ("query_beams", &|i| i.settings.query_beams = BeamExtent::Short),
+            ("features", &|i| i.settings.features = true),
+            ("choice of emitters", &focus),
+            ("techniques", &|i| i.plan.techniques = TechniqueSet::BPT),
+            ("light_paths", &|i| i.plan.light_paths += 1),
+            ("beams", &|i| i.plan.beam_paths += 1),
+            ("connections", &|i| i.plan.connections = 0.3),
+            ("next_events", &|i| i.plan.next_events = 0.3),
+            ("camera_factor", &|i| i.plan.camera_factor = 2.0),
+            ("roulette", &|i| i.plan.roulette = Roulette::Off),
+            ("periods", &|i| {
+                i.plan.periods = MergePeriods { pb2d: NonZeroU32::new(9).unwrap(), ..i.plan.periods }
+            }),
+            ("vertices per light sub-path", &|i| i.plan.vertices_per_light_path = 3.2),
+            ("radii.surf", &|i| i.plan.radii.surf = 0.2),
+            ("radii.pp3d", &|i| i.plan.radii.pp3d = 0.2),
+            ("radii.pb2d", &|i| i.plan.radii.pb2d = 0.2),
+            ("radii.bp2d", &|i| i.plan.radii.bp2d = 0.2),
+            ("radii.bb1d", &|i| i.plan.radii.bb1d = 0.2),
+            ("radii.field", &|i| i.plan.radii.field = RadiusField::Footprint(field)),
+            ("least radius", &|i| i.plan.radii.floor = 0.2),
+            ("progressive", &|i| i.plan.radii.progressive = false),
+            ("lanes", &|i| i.plan.lanes = None),
+        ];
+        for (name, change) in changes {
+            let mut other = identity();
+            change(&mut other);
+            let found = identity().check_same(&other);
+            let is_named = |differences: &[String]| {
+                differences.len() == 1 && differences[0].starts_with(&format!("{name} is "))
+            };
+            assert!(
+                matches!(&found, Err(StateError::Different { differences }) if is_named(differences)),
+                "{name}: {found:?}"
+            );
+        }
+        assert_eq!(identity().fields().len() + plan_fields(&plan()).len(), changes.len(), "none is left out");
+        // A name is for people, and settings count by the plan that they lead to.
+        let mut other = identity();
+        other.scene = "hall".into();
+        other.settings = Settings { memory: Some(100), beams: Some(3), ..other.settings };
+        assert!(identity().check_same(&other).is_ok());
+    }
 }
