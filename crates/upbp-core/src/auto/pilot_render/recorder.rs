@@ -13,6 +13,11 @@ use upbp_estimators::scene::CameraRay;
 
 use crate::auto::roulette;
 
+/// The least part of a technique that can find a path. A connection through a hundred mean free paths has next
+/// to no value, and no other technique has a part of it that single precision could divide by: that must not
+/// look as if only connections found this light.
+const LEAST_SHARE: f64 = 1e-30;
+
 /// The number of techniques.
 pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
 
@@ -28,7 +33,7 @@ pub(crate) struct Sample {
     pub(crate) value: Vec3,
     /// Product of the albedos of the camera vertices that scattered before.
     pub(crate) albedos: f32,
-    /// Parts of all techniques in the weights of its path; they sum to one.
+    /// [Parts](shares) of all techniques in the weights of its path; they sum to one.
     pub(crate) shares: [f32; TECHNIQUES],
 }
 
@@ -86,16 +91,21 @@ impl<B> Observer<B> for Recorder {
         if self.seen > self.most {
             return;
         }
-        let total = weight.all.total();
         let merged = if let Completion::Merge { path, .. } = completion { Some(*path) } else { None };
         self.samples.push(Sample {
             technique,
             merged,
             albedos: self.albedos,
             value: Vec3::from((value * weight.value() as f32).to_array()),
-            shares: weight.all.of.map(|density| (density / total) as f32),
+            shares: shares(&weight.all),
         });
     }
+}
+
+/// Parts of all techniques in the sum of their densities.
+pub(crate) fn shares(densities: &mis::ByTechnique) -> ByTechnique<f32> {
+    let total = densities.total();
+    densities.of.map(|density| if density > 0.0 { (density / total).max(LEAST_SHARE) as f32 } else { 0.0 })
 }
 
 impl Recorder {

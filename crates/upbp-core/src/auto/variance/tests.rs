@@ -8,6 +8,7 @@ use upbp_estimators::{MergePeriods, RadiusField, Technique};
 use super::limits::{DARKNESS, LARGEST_PART, largest};
 use super::*;
 use crate::auto::pilot_render::grid::Grid;
+use crate::auto::pilot_render::recorder::shares;
 use crate::auto::pilot_render::{PASSES, Work};
 use crate::auto::roulette::{self, COUNT, OF_PILOT, PILOT, relative_pass_probability};
 use crate::radius_schedule::RadiusSchedule;
@@ -109,6 +110,30 @@ pub(in crate::auto) fn pilot() -> PilotRender {
 fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
     let n = 100_000;
     (0..n).map(|i| f((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)
+}
+
+/// A connection through a hundred mean free paths has no value worth mentioning, and no other technique has a
+/// part in its weight that could be told from none: plans without connections are as good as before.
+#[test]
+fn light_that_is_hardly_there_excludes_no_plan() {
+    let (mut faint, mut unique) = (pilot(), pilot());
+    let connection = |of_hits| {
+        let mut densities = upbp_estimators::mis::ByTechnique { of: [0.0; TECHNIQUES] };
+        densities.of[Technique::Connect as usize] = 1.0;
+        densities.of[Technique::Hit as usize] = of_hits;
+        let (technique, value) = (Technique::Connect, Vec3::splat(1e-41));
+        Sample { technique, merged: None, albedos: 1.0, value, shares: shares(&densities) }
+    };
+    for (pilot, of_hits) in [(&mut faint, 1e-41), (&mut unique, 0.0)] {
+        pilot.samples.push(connection(of_hits));
+        *pilot.ends.last_mut().unwrap() += 1;
+        pilot.splats = vec![(0, Sample { technique: Technique::LightTracing, ..connection(of_hits) })];
+    }
+    let hits = counts([(Technique::Hit, 1.0)], 1.0);
+    let variance = |pilot| Variance::of(pilot).with(&hits).iter().sum::<f64>();
+    let (found, expected) = (variance(faint), variance(pilot()));
+    assert!((found / expected - 1.0).abs() < 1e-6, "{found}, expected {expected}");
+    assert!(variance(unique).is_infinite());
 }
 
 /// A number for each place of the unit interval.
