@@ -22,7 +22,7 @@ use upbp_testing::closed_form::scene::ClosedForm;
 
 pub(crate) const SIZE: u32 = 48;
 
-const ITERATIONS: u64 = 60;
+const ITERATIONS: u64 = 42;
 
 fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoices {
     let radius = 0.02;

@@ -65,8 +65,8 @@ fn beams(techniques: &str, extent: BeamExtent, max_length: u32) -> Settings {
         progressive: false,
         min_length: 2,
         max_length,
-        light_paths: LightPaths::Count(20_000),
-        beams: Some(20_000),
+        light_paths: LightPaths::Count(10_000),
+        beams: Some(10_000),
         ..Settings::default()
     }
 }
@@ -142,7 +142,7 @@ fn light_from_infinity_arrives_in_the_channels_that_let_it_through() {
         [("hit", 600), ("nee", 200), ("lt", 100), ("surf", 150), ("pt", 200), ("all", 60)]
     {
         let settings = Settings {
-            light_paths: LightPaths::Count(20_000),
+            light_paths: LightPaths::Count(10_000),
             beams: Some(2_000),
             radii: fixed_radii(0.05),
             ..sky_settings(techniques)

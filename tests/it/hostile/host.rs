@@ -22,7 +22,7 @@ fn render(fault: Fault, techniques: &str) -> Result<Counters, String> {
     };
     let settings = settings.validate().expect("valid settings");
     let mut renderer = Renderer::new(&scene, settings).map_err(|error| error.to_string())?;
-    for _ in 0..4 {
+    for _ in 0..2 {
         renderer.iterate();
     }
     let film = renderer.film();
