@@ -75,3 +75,31 @@ impl Counters {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_counts_add_up_to_the_largest_number() {
+        // Every field, each by a factor of its own.
+        let counters = |n: u64| Counters {
+            light_edges: n,
+            camera_edges: 2 * n,
+            shadow_rays: 3 * n,
+            light_vertices: 4 * n,
+            photon_beams: 5 * n,
+            contributions: [6, 7, 8, 9, 10, 11, 12, 13, 14].map(|factor| factor * n),
+            dropped: 15 * n,
+            cut_walks: 16 * n,
+            lost_walks: 17 * n,
+            boundary_conflicts: 18 * n,
+        };
+        let mut sum = counters(1);
+        sum.add(&counters(10));
+        assert_eq!(sum, counters(11));
+        sum.lost_walks = u64::MAX;
+        sum.add(&counters(1));
+        assert_eq!(sum, Counters { lost_walks: u64::MAX, ..counters(12) });
+    }
+}

@@ -446,6 +446,11 @@ mod tests {
         assert_eq!(EmissionGuide::fit(&[], [true; 4]), None);
         let dark = EmissionSample { at: [0.1; 4], light: f64::NAN };
         assert_eq!(EmissionGuide::fit(&[dark; 100], [true; 4]), None);
+        // What is infinite tells nothing, and leaves the rest as it is.
+        let mut uneven = spot(3, [0.5; 4], 1e-3, [true; 4]);
+        let guide = EmissionGuide::fit(&uneven, [true; 4]);
+        uneven.push(EmissionSample { at: [0.1; 4], light: f64::INFINITY });
+        assert!(guide.is_some() && EmissionGuide::fit(&uneven, [true; 4]) == guide);
     }
 
     #[test]

@@ -289,3 +289,51 @@ fn costs<'a>(items: impl Iterator<Item = &'a Item>) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean of `cos / d²` over points all over a box, as these bounds have them shine.
+    fn irradiance(bounds: &EmitterBounds, receiver: Vec3) -> f64 {
+        const STEPS: u32 = 24;
+        let points = (0..STEPS.pow(3)).map(|i| {
+            let cell = [i % STEPS, i / STEPS % STEPS, i / STEPS / STEPS];
+            let place = Vec3::from(cell.map(|k| (k as f32 + 0.5) / STEPS as f32));
+            bounds.min + (bounds.max - bounds.min) * place
+        });
+        let brings = |point: Vec3| {
+            let away = (receiver - point).as_dvec3();
+            let cos = away.normalize().dot(bounds.axis.as_dvec3()).max(0.0);
+            (if bounds.cos_normals > 0.0 { cos } else { 1.0 }) / away.length_squared()
+        };
+        points.map(brings).sum::<f64>() / f64::from(STEPS.pow(3))
+    }
+
+    /// Far away the estimate is exact. Near, beside and inside it is right up to a small factor wherever any
+    /// light comes to.
+    #[test]
+    fn the_intensity_is_the_irradiance_up_to_a_small_factor() {
+        let down = EmitterBounds {
+            axis: Vec3::NEG_Y,
+            cos_normals: 1.0,
+            ..EmitterBounds::all_around(Vec3::NEG_ONE, Vec3::ONE)
+        };
+        let panel = EmitterBounds { min: Vec3::new(-1.0, 0.0, -1.0), max: Vec3::new(1.0, 0.0, 1.0), ..down };
+        let near =
+            [(0.03, 0.02, 0.01), (0.0, 0.3, 0.0), (0.0, -0.3, 0.0), (0.9, -0.2, 0.9), (2.0, -0.5, 1.0)]
+                .map(Vec3::from);
+        for bounds in [down, panel, EmitterBounds::all_around(down.min, down.max)] {
+            let cone = Cone::new(&bounds);
+            let ratio = |receiver| cone.intensity(receiver) / irradiance(&bounds, receiver);
+            // Above the panel there is no light.
+            for receiver in near.into_iter().filter(|&receiver| irradiance(&bounds, receiver) > 0.0) {
+                let ratio = ratio(receiver);
+                assert!((0.3..4.0).contains(&ratio), "{bounds:?}, {receiver}: {ratio}");
+            }
+            for receiver in [Vec3::Y * -20.0, Vec3::new(15.0, -15.0, 3.0)] {
+                assert!((ratio(receiver) - 1.0).abs() < 0.1, "{bounds:?}, {receiver}: {}", ratio(receiver));
+            }
+        }
+    }
+}

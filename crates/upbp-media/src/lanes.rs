@@ -232,8 +232,12 @@ mod tests {
         assert_eq!(of(0.0, [0.5; 3]), None);
         assert_eq!(of(0.0, [0.9, 0.7, 0.5]), Some([1.0 / 3.0; 3]));
         assert_eq!(of(0.0, [0.9, 0.5, 0.5]), Some([0.5, 0.5, 0.0]));
+        assert_eq!(of(0.0, [0.5, 0.5, 0.9]), Some([0.5, 0.0, 0.5]));
         assert_eq!(of(0.0, [0.52, 0.5, 0.5]), None, "hardly any difference");
         assert_eq!(of(1.0, [0.9, 0.7, 0.5]), None, "roulette ends walks sooner");
+        // Lobes apart triple the second moment of what scatters, the square of an albedo of one half, and
+        // roulette doubles it.
+        assert_eq!(of(1.0, [0.99, 0.0, -0.99]), Some([1.0 / 3.0; 3]));
     }
 
     #[test]
@@ -243,6 +247,9 @@ mod tests {
         assert_eq!(of(&[medium([0.0; 3], [2.0; 3])]), None);
         assert_eq!(of(&[medium([1.0, 2.0, 3.0], [0.0; 3])]), None, "nothing scatters");
         assert_eq!(of(&[medium([0.0; 3], [1.0, 1.1, 1.2])]), None, "hardly any difference");
+        let small = medium([0.0; 3], [1.0, 1.24, 1.24]);
+        assert!(small.mixture_growth() > LEAST_GROWTH);
+        assert_eq!(of(&[small]), None, "a small factor only");
         assert_eq!(of(&[medium([0.0; 3], [1.0, 4.0, 15.0])]), Some([third; 3]));
         assert_eq!(of(&[medium([0.0; 3], [1.0, 4.0, 1.0])]), Some([0.5, 0.5, 0.0]));
         assert_eq!(of(&[medium([0.5, 0.1, 0.1], [0.1, 0.1, 0.2])]), None, "roulette ends walks sooner");

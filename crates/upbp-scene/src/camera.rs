@@ -290,6 +290,7 @@ mod tests {
         };
         refused(PerspectiveView { target: view().origin, ..view() }, 8, full);
         refused(PerspectiveView { up: view().target - view().origin, ..view() }, 8, full);
+        refused(PerspectiveView { horizontal_fov: 7.0, ..view() }, 8, full);
         refused(view(), 0, full);
         refused(view(), 8, PixelRect { x: 4, ..full });
         refused(view(), 8, PixelRect { x: u32::MAX, ..full });

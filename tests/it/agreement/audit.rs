@@ -146,7 +146,7 @@ impl<'a> Auditor<'a> {
         if matches!(sample.completion, Completion::Emission) {
             // In closed form only where nothing else makes the path.
             let is_alone = self.camera_vertices.iter().all(|vertex| vertex.delta);
-            assert!(found == 1.0 && is_alone, "{sample:?}");
+            assert!(found == 1.0 && is_alone && self.plan.lengths.contain(sample.camera_depth), "{sample:?}");
             return;
         }
         let (trace, strategy) = self.trace(sample);

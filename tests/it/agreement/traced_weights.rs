@@ -4,10 +4,11 @@
 //! The abstract test of the recursion takes densities as given. Here they are those of the walks: wrong
 //! distances, stacks of bodies, reverse densities and thresholds show.
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use glam::Vec3;
-use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, Weight};
+use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, VolumeMerges, Weight};
 use upbp_estimators::observer::{ObservedSample, Observer};
 use upbp_estimators::path::{Context, EdgeTrace, Extent};
 use upbp_estimators::scene::{EmitterId, Scene};
@@ -16,6 +17,7 @@ use upbp_estimators::{
     IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, RadiusField, Roulette, Stream,
     StreamKind, Technique, TechniqueSet,
 };
+use upbp_media::Medium as _;
 use upbp_testing::closed_form::fog::Fog;
 use upbp_testing::closed_form::material::Material;
 use upbp_testing::closed_form::scene::ClosedForm;
@@ -213,11 +215,13 @@ fn beams_of_all_extents() {
 
 #[test]
 fn some_path_lengths_only() {
-    for (min, max) in [(3, 4), (2, 2), (1, 20)] {
+    // Two edges have no connection, so that it takes four for one to be too short.
+    for (min, max, at_least) in [(3, 4, 400), (4, 5, 200), (2, 2, 0), (1, 20, 400)] {
         let choices = IterationChoices { lengths: PathLengths { min, max }, ..choices() };
-        // Two edges have no connection.
-        audit(&format!("lengths {min} to {max}"), CAMERAS[1], 48, &choices, if max > 2 { 400 } else { 0 });
+        audit(&format!("lengths {min} to {max}"), CAMERAS[1], 48, &choices, at_least);
     }
+    let choices = IterationChoices { lengths: PathLengths { min: 2, max: 4 }, ..choices() };
+    audit_scene("lengths 2 to 4, volumes", &ClosedForm::glowing(CAMERAS[1], 48), &choices, 100);
 }
 
 #[test]
@@ -339,6 +343,74 @@ fn parts_of_techniques_are_what_counting_one_twice_shows() {
             assert!(seen > 100, "{counted:?}: {seen}");
         }
     }
+}
+
+/// What weights count, relative to the usual choices (`docs/theory.md`, sections 2.1, 3.4 and 6.5).
+#[test]
+fn weights_count_the_samples_that_are_asked_for() {
+    use Technique::{Bb1d, Bp2d, Connect, Hit, LightTracing, Nee, Pb2d, Pp3d, Surf};
+    let scene = ClosedForm::new(CAMERAS[0], 1);
+    let counts = |choices: &IterationChoices| {
+        let mis = IterationPlan::new(&scene, choices).mis;
+        let VolumeMerges { pp3d, pb2d, bp2d, bb1d } = mis.volume[0];
+        [mis.hit, mis.nee, mis.connect, mis.light_tracing, mis.surf, pp3d, pb2d, bp2d, bb1d]
+    };
+    let usual = counts(&choices());
+    let check = |choices: IterationChoices, factors: &[(Technique, f64)]| {
+        let found = counts(&choices);
+        for technique in Technique::ALL {
+            let factor = factors.iter().find(|(other, _)| *other == technique).map_or(1.0, |found| found.1);
+            let ratio = found[technique as usize] / usual[technique as usize];
+            assert!((ratio / factor - 1.0).abs() < 1e-4, "{technique:?}: {ratio}, not {factor}: {choices:?}");
+        }
+    };
+    check(IterationChoices { camera_factor: 4.0, ..choices() }, &[(Hit, 4.0), (Nee, 4.0), (Connect, 4.0)]);
+    check(IterationChoices { next_events: 2.5, ..choices() }, &[(Nee, 2.5)]);
+    check(IterationChoices { connections: 1.0, ..choices() }, &[(Connect, 0.5)]);
+    check(
+        IterationChoices { light_paths: 3000, ..choices() },
+        &[(LightTracing, 0.5), (Surf, 0.5), (Pp3d, 0.5), (Pb2d, 0.5)],
+    );
+    check(IterationChoices { beam_paths: 250, ..choices() }, &[(Bp2d, 0.5), (Bb1d, 0.5)]);
+    let periods = MergePeriods::from_fn(|technique| {
+        NonZeroU32::new(if technique == Surf { 2 } else { 1 }).expect("not zero")
+    });
+    check(IterationChoices { periods, ..choices() }, &[(Surf, 0.5)]);
+    // Kernels as wide as a mean free path; those of `pp3d` and `bb1d` twice and three quarters of that.
+    let scale = scene.media[0].mean_free_path() / 0.04;
+    let wide = IterationChoices { kernels: kernels(scale), ..choices() };
+    let scale = f64::from(scale);
+    let square = scale * scale;
+    check(
+        wide,
+        &[
+            (Surf, square),
+            (Pp3d, scale * square / 17.0),
+            (Pb2d, square / 2.0),
+            (Bp2d, square / 2.0),
+            (Bb1d, scale / (1.0 + 0.75_f64.powi(4))),
+        ],
+    );
+}
+
+#[test]
+fn pilot_runs_have_fewer_paths_and_wider_kernels() {
+    let scene = ClosedForm::new(CAMERAS[0], 1);
+    let plan = IterationPlan::new(&scene, &choices());
+    // Beams of no more paths than the plan has, nor than run.
+    assert_eq!((plan.thinned(1000, 800).beam_paths, plan.thinned(300, 400).beam_paths), (500, 300));
+    // With an eighth of the paths as many photons are on a surface, in a disc and in a ball.
+    let blurred = plan.blurred(750, 100);
+    let ratio = |of: fn(&Kernels) -> f32| of(&blurred.kernels) / of(&plan.kernels);
+    let ratios = [ratio(|k| k.surf.radius()), ratio(|k| k.pb2d.radius()), ratio(|k| k.pp3d.radius())];
+    for (ratio, power) in ratios.into_iter().zip([2, 2, 3]) {
+        assert!((ratio.powi(power) - 8.0).abs() < 1e-4, "{ratio}");
+    }
+    assert_eq!([ratio(|k| k.bp2d.radius()), ratio(|k| k.bb1d.radius())], [1.0; 2]);
+    // Without merges there is no radius.
+    let of = |techniques| IterationChoices { techniques, radius_field: footprint(), ..choices() };
+    let field = |techniques| IterationPlan::new(&scene, &of(techniques)).radius_field;
+    assert_eq!([field(TechniqueSet::ALL), field(TechniqueSet::BPT)], [footprint(), RadiusField::Uniform]);
 }
 
 #[test]

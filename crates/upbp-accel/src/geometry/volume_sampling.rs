@@ -283,6 +283,21 @@ mod tests {
         }
     }
 
+    /// One random number chooses the cell and the place along its first axis.
+    #[test]
+    fn the_place_within_a_cell_does_not_depend_on_the_cell() {
+        let cells = Cells::cover(&ring(12));
+        let mut sums = [[0.0; 2]; 4];
+        for u in points(40_000) {
+            let place = (cells.sample(u).as_dvec3() - cells.min) / cells.size;
+            let quarter = &mut sums[(4.0 * u[0]) as usize];
+            *quarter = [quarter[0] + place.x.fract(), quarter[1] + 1.0];
+        }
+        for [sum, count] in sums {
+            assert!((sum / count - 0.5).abs() < 0.01, "{}", sum / count);
+        }
+    }
+
     #[test]
     fn cells_cover_every_point_of_a_mesh() {
         for segments in [3, 7, 400] {

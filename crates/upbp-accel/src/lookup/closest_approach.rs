@@ -162,6 +162,10 @@ mod tests {
         assert!(closest_approach(&ray, &segment, 1.0).is_none());
         let (_, opposite) = line(Vec3::Y * 0.5, -direction);
         assert!(closest_approach(&ray, &opposite, 1.0).is_none());
+        // Those that meet at less than the threshold count as parallel, however far apart.
+        let (_, almost) = line(Vec3::Y * 0.5, (direction + Vec3::X * 8e-6).normalize());
+        assert!(ray.direction.cross(almost.direction).length_squared() > 0.0);
+        assert!(closest_approach(&ray, &almost, 1.0).is_none());
         // Just above the threshold there is one, and it is finite.
         let (_, tilted) = line(Vec3::Y * 0.5, (direction + Vec3::X * 4e-5).normalize());
         let found = closest_approach(&ray, &tilted, 1.0).unwrap();

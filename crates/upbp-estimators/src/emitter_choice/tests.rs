@@ -178,6 +178,13 @@ fn receivers_choose_what_is_near_and_shines_their_way() {
     let above = at(Vec3::new(-1.0, 0.5, 0.0));
     assert!(above[0] > 5.0 * above[3], "{above:?}");
     assert!((above[2] - 0.25).abs() < 1e-6, "what is everywhere keeps its share: {above:?}");
+    // Also if that is not its power.
+    let next_event = Selection::new(&[1.0, 1.0, 5.0, 1.0]);
+    let mut tree = tree.clone();
+    tree.set_shares(&next_event);
+    let learnt = EmitterChoice { next_event, ..choice.clone() };
+    let above = probabilities(&learnt, &tree, &lamps, Vec3::new(-1.0, 0.5, 0.0));
+    assert!((above[2] - 0.625).abs() < 1e-6, "{above:?}");
 }
 
 #[test]

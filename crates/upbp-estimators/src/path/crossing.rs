@@ -71,3 +71,24 @@ const MAX_CORRECTIONS: usize = 64;
 pub(crate) const fn may_correct(corrections: usize) -> bool {
     corrections < MAX_CORRECTIONS
 }
+
+#[cfg(test)]
+mod tests {
+    use upbp_media::{BodyId, Interior};
+
+    use super::*;
+
+    /// From a glass into another of the same index; a third, hidden in that, is told of last.
+    #[test]
+    fn the_strongest_of_boundaries_that_coincide_has_the_surface() {
+        let glass =
+            |number: i32| Interior { body: BodyId(number as u32), medium: None, priority: number, ior: 1.5 };
+        let mut before = MediumStack::new(None);
+        let _ = before.enter(glass(2));
+        let crossing =
+            |number, entering| Crossing { t: 1.0, interior: glass(number), entering, scatters: true };
+        let place = [crossing(2, false), crossing(1, true), crossing(0, true)];
+        assert!(has_surface(&before, &place));
+        assert!(!has_surface(&before, &place[2..]), "one that is hidden has none");
+    }
+}

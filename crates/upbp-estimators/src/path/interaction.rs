@@ -345,3 +345,16 @@ impl<B: Bsdf> SurfaceInteraction<B> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_host_may_tell_of_any_probability_to_go_on() {
+        for (told, taken) in [(0.3, 0.3), (1.0, 1.0), (1.7, 1.0), (-0.2, 0.0)] {
+            assert_eq!(limited(told, Roulette::Below(0.5)), taken);
+            assert_eq!(limited(told, Roulette::Off), 1.0);
+        }
+    }
+}

@@ -57,3 +57,50 @@ fn lies_on<B, D: Densities, L: Lanes>(
         && normal.dot(other.geometric_normal) > MIN_NORMAL_COSINE
         && (photon.position - vertex.position).dot(normal).abs() < MAX_PLANE_DISTANCE * radius
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use upbp_media::Spectrum;
+
+    use super::*;
+    use crate::mis::VertexMis;
+    use crate::scene::Interface;
+
+    fn surface(normal: Vec3) -> SurfaceInteraction<()> {
+        let interface = Interface::MATCHED;
+        SurfaceInteraction { bsdf: (), geometric_normal: normal, shading_normal: normal, interface }
+    }
+
+    /// Whether a photon counts for a query in the origin, on a floor, with a radius of one.
+    fn counts(position: Vec3, normal: Vec3, towards_light: Vec3) -> bool {
+        let mis = VertexMis::<f64> { connect: 0.0, below: 0.0, distance_factor: 0.0, shares: () };
+        let (throughput, scale, depth) = (Spectrum::ONE, 1.0, 1);
+        let floor = surface(Vec3::Y);
+        let vertex = CameraVertex {
+            position: Vec3::ZERO,
+            towards_camera: Vec3::Y,
+            throughput,
+            mis,
+            scale,
+            depth,
+            interaction: Interaction::Surface(floor),
+        };
+        let interaction = Interaction::Surface(surface(normal));
+        let photon =
+            LightVertex { position, towards_light, throughput, mis, scale, depth, path: 0, interaction };
+        lies_on(&floor, &vertex, &photon, 1.0)
+    }
+
+    #[test]
+    fn light_leaks_neither_around_edges_nor_through_thin_walls() {
+        let slant = Vec3::new(1.0, 1.0, 0.0).normalize();
+        let beside = Vec3::new(0.5, 0.0, 0.4);
+        assert!(counts(beside, Vec3::Y, slant));
+        assert!(counts(beside - 0.1 * Vec3::Y, Vec3::new(0.5, 1.0, 0.0).normalize(), slant), "a bend");
+        // Light that falls on both sides of the edge alike.
+        assert!(!counts(Vec3::new(0.0, -0.1, 0.4), Vec3::X, slant), "the side of a step");
+        assert!(!counts(beside - 0.4 * Vec3::Y, Vec3::Y, slant), "the next floor below");
+        assert!(!counts(beside - 0.01 * Vec3::Y, Vec3::NEG_Y, -slant), "the ceiling below");
+    }
+}

@@ -48,6 +48,17 @@ fn are_those_within(found: &[(u32, u32)], all: &[(u32, u32, f32)]) -> bool {
     all.iter().all(is_right) && found.iter().all(|hit| all.iter().any(|(index, t, _)| (*index, *t) == *hit))
 }
 
+#[test]
+fn fields_of_a_wider_range_than_they_may_have_are_refused() {
+    let field = |most| {
+        RadiusField::Footprint(FootprintField { eye: [0.0; 3], offset: 0.1, slope: 0.5, least: 0.2, most })
+    };
+    assert!([0.2, 1.0, 0.2 * FootprintField::RANGE].into_iter().all(|most| field(most).is_valid(0.1)));
+    assert!(
+        [0.19, 0.21 * FootprintField::RANGE, f32::NAN].into_iter().all(|most| !field(most).is_valid(0.1))
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(400) })]
 

@@ -175,6 +175,14 @@ fn compare(geometric_normal: Vec3, shading_normal: Vec3) -> u32 {
         let from = Vec3::new(cos * (1.0 - z * z).sqrt(), sin * (1.0 - z * z).sqrt(), z);
         let above = from.dot(shading_normal) > 0.0;
         let ratio = if above { 1.1 / 1.6 } else { 1.6 / 1.1 };
+        let both = [Walk::Light, Walk::Camera].map(|walk| transmitted(&interaction, walk, from));
+        if let [Some(light), Some(camera)] = both {
+            // The material has one weight for both: the rest is the adjoint of the shading normal (1.6).
+            let cosines = |v: Vec3| v.dot(shading_normal) / v.dot(geometric_normal);
+            let expected = cosines(from) / cosines(light.direction);
+            let found = light.weight.r() / camera.weight.r();
+            assert!((found / expected - 1.0).abs() < 1e-4, "{from}: {found}, expected {expected}");
+        }
         for walk in [Walk::Light, Walk::Camera] {
             let Some(found) = transmitted(&interaction, walk, from) else { continue };
             assert!(found.delta);

@@ -59,6 +59,13 @@ fn public_densities_integrate_to_one() {
         let at = |t: f64| medium.segment(&segment(0.0, t as f32));
         let total = integrate(|t| at(t).stop_at_end, 0.0, 4.0, 500) + at(4.0).pass_probability;
         assert!((total - 1.0).abs() < 1e-6, "{medium:?}: {total}");
+        // A walk in lanes stops or passes by one of them.
+        let at = |t: f64| medium.segment_lanes(&segment(0.0, t as f32));
+        for lane in 0..3 {
+            let stops = integrate(|t| at(t).stop_at_end[lane], 0.0, 4.0, 500);
+            let total = stops + at(4.0).pass_probability[lane];
+            assert!((total - 1.0).abs() < 1e-6, "{medium:?}, lane {lane}: {total}");
+        }
     }
 }
 

@@ -131,6 +131,10 @@ fn points_and_spots_satisfy_the_contract() {
     for (beam, cutoff) in [(0.2, 0.5), (0.3, 0.3), (0.0, 1.0), (0.5, FRAC_PI_2), (1.0, PI), (PI, PI)] {
         check(Light::Spot(spot(beam, cutoff)));
     }
+    // Nothing starts beside the cone.
+    let (light, aside) = (spot(0.2, 0.5), Vec3::new(0.0, 0.5, 2.0).normalize());
+    let point = EmitterPoint { position: light.position, normal: aside };
+    assert!(light.emission_coordinates(&BOUNDS, &point, aside, aside).is_none());
 }
 
 #[test]
@@ -163,6 +167,43 @@ fn the_flux_of_a_spot_is_the_integral_of_its_falloff() {
         assert!(relative.abs() < 2e-3, "{beam} {cutoff}: {} {integral}", cone.solid_angle());
     }
     assert!((spot(PI, PI).cone.solid_angle() - 2.0 * TAU).abs() < 1e-5);
+}
+
+/// The mean of what light sub-paths carry, over a sequence that fills the four random numbers of a start
+/// evenly (Roberts 2018).
+#[test]
+fn power_is_what_emission_carries() {
+    let (sphere, cuboid) = (Sphere::new(Vec3::Y, 0.3).unwrap(), AxisBox::new(Vec3::ZERO, Vec3::ONE).unwrap());
+    let infinite = [
+        Light::Directional(DirectionalLight { direction: Vec3::NEG_Y, irradiance: Spectrum::splat(2.0) }),
+        Light::Constant(ConstantEnvironment { radiance: Spectrum::new(1.0, 0.5, 0.2) }),
+        Light::Image(ImageEnvironment::new(image(), 3.0, 0.4)),
+    ];
+    let finite = [
+        area(Quad::new(Vec3::ZERO, Vec3::X, Vec3::Z * 1.5).unwrap()),
+        area(sphere),
+        area(tetrahedron()),
+        volume(sphere, Spectrum::splat(20.0)),
+        volume(cuboid, Spectrum::ZERO),
+        Light::Point(PointLight { position: Vec3::Y, intensity: Spectrum::splat(5.0) }),
+    ];
+    let spots = [(0.2, 0.5), (0.0, 1.0), (1.0, PI)].map(|(beam, cutoff)| Light::Spot(spot(beam, cutoff)));
+    for light in infinite.into_iter().chain(finite).chain(spots) {
+        let count = 10_000;
+        let carried = (0..count).map(|i| {
+            let [a, b, c, d] = [0.856_674_883, 0.733_891_857, 0.628_706_721, 0.538_597_257]
+                .map(|step| ((step * f64::from(i)).fract() as f32).min(1.0 - f32::EPSILON));
+            light.sample_emission(&BOUNDS, [a, b], [c, d]).map_or(0.0, |emission| {
+                let cos = match light.kind() {
+                    EmitterKind::Area => emission.direction.dot(emission.point.normal),
+                    _ => 1.0,
+                };
+                f64::from(emission.radiance.mean() * cos / (emission.pdf_position * emission.pdf_direction))
+            })
+        });
+        let (mean, power) = (carried.sum::<f64>() / f64::from(count), f64::from(light.power(&BOUNDS)));
+        assert!((mean / power - 1.0).abs() < 0.01, "{light:?}: {mean}, told {power}");
+    }
 }
 
 #[test]
@@ -220,6 +261,15 @@ fn images_that_are_no_light_are_refused() {
     assert!(
         message(2, 1, vec![Spectrum::splat(f32::NAN), white]).starts_with("pixel (0, 0) is [NaN, NaN, NaN]")
     );
+    let infinite = Spectrum::new(0.0, 0.0, f32::INFINITY);
+    assert!(message(1, 2, vec![white, infinite]).starts_with("pixel (0, 1) is [0.0, 0.0, inf]"));
+}
+
+#[test]
+fn images_of_another_shape_are_others() {
+    let of = |width, height| EnvironmentImage::new(width, height, vec![Spectrum::ONE; 8]).unwrap();
+    assert_eq!(of(4, 2).fingerprint(), of(4, 2).fingerprint());
+    assert_ne!(of(4, 2).fingerprint(), of(2, 4).fingerprint());
 }
 
 #[test]

@@ -96,5 +96,7 @@ mod tests {
     fn schlick_runs_from_the_given_value_to_one() {
         assert_eq!(schlick(1.0, 0.3), 0.3);
         assert_eq!(schlick(0.0, 0.3), 1.0);
+        // At 60 degrees: 0.04 + 0.96 / 2⁵.
+        assert!((schlick(0.5, 0.04) - 0.07).abs() < 1e-6);
     }
 }

@@ -11,13 +11,14 @@ const INTERFACES: [Interface; 4] = [
     Interface { above: 1.5, below: 1.5004 },
 ];
 
+/// The complex index of gold.
+const GOLD: [Spectrum; 2] = [Spectrum::new(0.143, 0.375, 1.442), Spectrum::new(3.983, 2.386, 1.603)];
+
 fn materials() -> Vec<(&'static str, Material)> {
     let grey = |value| Spectrum::splat(value);
     let rough = |alpha| TrowbridgeReitz { alpha };
-    let gold = MetalFresnel::Indices {
-        eta: Spectrum::new(0.143, 0.375, 1.442),
-        k: Spectrum::new(3.983, 2.386, 1.603),
-    };
+    let [eta, k] = GOLD;
+    let gold = MetalFresnel::Indices { eta, k };
     let phong = |diffuse, specular, exponent| {
         Material::Phong(Phong { diffuse: grey(diffuse), specular: grey(specular), exponent })
     };
@@ -126,6 +127,34 @@ fn radiance_is_compressed_where_flux_is_not() {
         assert!(light.to.z < 0.0);
         assert!((camera.weight.r() * 2.25 / light.weight.r() - 1.0).abs() < 1e-5);
     }
+}
+
+/// At normal incidence from an index n: |(η + ik − n) / (η + ik + n)|².
+#[test]
+fn metals_reflect_by_their_index_and_that_of_what_is_outside() {
+    let [eta, k] = GOLD;
+    let normals = TrowbridgeReitz { alpha: 0.1 };
+    let gold = Material::Conductor(Conductor { normals, fresnel: MetalFresnel::Indices { eta, k } });
+    for n in [1.0, 1.33] {
+        let interface = Interface { above: n, below: 1.0 };
+        // The middle of the distribution of normals.
+        let sample = gold.sample(Vec3::Z, Walk::Light, interface, 0.5, [0.5, 0.0]).unwrap();
+        let albedo = gold.albedo(Vec3::Z);
+        for c in 0..3 {
+            let power = |sign: f32| (eta[c] + sign * n).powi(2) + k[c] * k[c];
+            let expected = power(-1.0) / power(1.0);
+            assert!((sample.weight[c] - expected).abs() < 1e-5, "{n}: {sample:?}, expected {expected}");
+            // That of a denoiser is in vacuum.
+            assert!(n > 1.0 || (albedo[c] - expected).abs() < 1e-5, "{albedo:?}, expected {expected}");
+        }
+    }
+}
+
+#[test]
+fn no_channel_gains_by_the_roulette_of_a_matt_surface() {
+    let red = Material::Lambert(Lambert { reflectance: Spectrum::new(0.9, 0.1, 0.1) });
+    let sample = red.sample(Vec3::Z, Walk::Light, Interface::MATCHED, 0.5, [0.3, 0.4]).unwrap();
+    assert_eq!(sample.weight.max_component() / red.continuation(Vec3::Z), 1.0);
 }
 
 #[test]

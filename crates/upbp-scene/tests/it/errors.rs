@@ -149,6 +149,10 @@ fn scenes_without_light_are_refused() {
         problem("media: { \"fog\": Homogeneous(sigma_s: 1) }, outside: \"fog\", lights: [Constant(1)]"),
         "light 1 (Constant): comes from infinitely far away and does not reach into the medium `fog` around everything; instead of `outside`, let it be the interior of a body with a `Null` material"
     );
+    assert_eq!(
+        problem("media: { \"fog\": Homogeneous(sigma_a: (1, 0, 1), glow: 1) }, outside: \"fog\""),
+        "scene, outside: the medium `fog` glows in a channel that it does not attenuate: without an end it is infinitely bright"
+    );
 }
 
 #[test]

@@ -66,16 +66,24 @@ fn special_cases_are_the_other_functions() {
 
 #[test]
 fn droplets_are_the_published_mixture() {
-    let PhaseFunction::Blend(blend) = PhaseFunction::droplets(10.0).unwrap() else { panic!("no blend") };
-    let [(_, PhaseFunction::HenyeyGreenstein(g)), (share, PhaseFunction::Draine(wide))] = blend.parts()
-    else {
-        panic!("other parts: {blend:?}")
-    };
-    // Worked out by hand from the equations of the paper.
-    for (value, expected) in
-        [(g.get(), 0.988_177), (*share, 0.481_954), (wide.g().get(), 0.555_66), (wide.alpha(), 21.995_5)]
-    {
-        assert!((value / expected - 1.0).abs() < 1e-4, "{value}, expected {expected}");
+    // Worked out from the equations of the paper and its supplement, each of the four ranges once: asymmetry
+    // of the lobe, share, asymmetry and factor of the wide part.
+    for (diameter, expected) in [
+        (0.05, [0.0345, 0.252_181, 0.025_661_2, 250.0]),
+        (1.0, [0.862, 0.240_759, 0.506_916, 250.0]),
+        (3.0, [0.945_945, 0.380_939, 0.421_973, 14.340_5]),
+        (10.0, [0.988_177, 0.481_954, 0.555_66, 21.995_5]),
+    ] {
+        let PhaseFunction::Blend(blend) = PhaseFunction::droplets(diameter).unwrap() else {
+            panic!("no blend")
+        };
+        let [(_, PhaseFunction::HenyeyGreenstein(g)), (share, PhaseFunction::Draine(wide))] = blend.parts()
+        else {
+            panic!("other parts: {blend:?}")
+        };
+        for (value, expected) in [g.get(), *share, wide.g().get(), wide.alpha()].into_iter().zip(expected) {
+            assert!((value / expected - 1.0).abs() < 1e-4, "{diameter}: {value}, expected {expected}");
+        }
     }
     // No diameter leads the fits out of the ranges of their parameters.
     for i in 1..=5000 {
