@@ -72,6 +72,25 @@ fn a_good_scene_renders_and_writes_its_files() {
     assert!(series[0]["relative_mse"].as_f64() > Some(0.0));
 }
 
+/// What is probably a mistake is said, and rendered all the same.
+#[test]
+fn a_medium_that_is_nowhere_is_told() {
+    let folder = folder("nowhere");
+    let check = |scene: &str, more: &[&str]| {
+        fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
+        let output = program::command("check", &folder, &[&["scene.ron"], more].concat()).output();
+        let output = output.expect("the program runs");
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).expect("UTF-8")
+    };
+    let empty = SMALL.replace("interior: \"m\",", "");
+    let note = "note: medium `m` is nowhere: no shape has it as `interior`, nor is it `outside`\n";
+    assert_eq!(check(&empty, &[]), note);
+    assert_eq!(check(&empty, &["--quiet"]), "");
+    assert_eq!(check(&empty.replace("version: 1,", "version: 1, outside: \"m\","), &[]), "");
+    assert_eq!(check(SMALL, &[]), "");
+}
+
 #[test]
 fn scenes_that_cannot_be_rendered_are_refused_by_place() {
     let folder = folder("scenes");

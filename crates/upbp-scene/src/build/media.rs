@@ -1,6 +1,6 @@
 //! Media and their phase functions.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use upbp_media::{Homogeneous, MediumId, PhaseFunction};
 
@@ -10,8 +10,7 @@ use crate::phase_table;
 
 /// Numbers of the media that something is filled with: a scene need not be ready for others.
 pub(super) fn number(description: &SceneDescription) -> BTreeMap<&str, MediumId> {
-    let interiors = description.shapes.iter().filter_map(|shape| shape.interior.as_deref());
-    let used: BTreeSet<&str> = interiors.chain(description.outside.as_deref()).collect();
+    let used = description.used_media();
     let names = description.media.names().filter(|name| used.contains(name));
     names.zip(0..).map(|(name, number)| (name, MediumId(number))).collect()
 }

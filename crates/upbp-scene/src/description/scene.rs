@@ -1,5 +1,7 @@
 //! The whole scene file.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use super::camera::{Camera, Film};
@@ -36,4 +38,18 @@ pub struct SceneDescription {
     /// Lights that are no surfaces.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<Light>,
+}
+
+impl SceneDescription {
+    /// Names of the media that something is filled with.
+    pub(crate) fn used_media(&self) -> BTreeSet<&str> {
+        let interiors = self.shapes.iter().filter_map(|shape| shape.interior.as_deref());
+        interiors.chain(self.outside.as_deref()).collect()
+    }
+
+    /// Names of the media that are neither inside of any shape nor around everything.
+    pub fn unused_media(&self) -> impl Iterator<Item = &str> {
+        let used = self.used_media();
+        self.media.names().filter(move |name| !used.contains(name))
+    }
 }
