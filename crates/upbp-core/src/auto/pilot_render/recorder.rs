@@ -13,9 +13,9 @@ use upbp_estimators::scene::CameraRay;
 
 use crate::auto::roulette;
 
-/// The least part of a technique that can find a path. A connection through a hundred mean free paths has next
-/// to no value, and no other technique has a part of it that single precision could divide by: that must not
-/// look as if only connections found this light.
+/// The least part of a technique that can find a path. A connection through a hundred mean free paths has
+/// next to no value, and no other technique has a part of it that single precision could divide by: that must
+/// not look as if only connections found this light.
 const LEAST_SHARE: f64 = 1e-30;
 
 /// The number of techniques.
