@@ -175,6 +175,9 @@ mod tests {
         }
     }
 
+    /// The name that a change is to be told by, and the change.
+    type Change<'a> = (&'a str, &'a dyn Fn(&mut Identity));
+
     /// Whatever changes iterations is compared: such a change is named, and it alone.
     #[test]
     fn each_difference_is_named() {
@@ -184,7 +187,7 @@ mod tests {
             i.emitters = ron::from_str(&text).unwrap();
         };
         let field = FootprintField { eye: [0.0; 3], offset: 1.0, slope: 0.01, least: 0.5, most: 2.0 };
-        let changes: [(&str, &dyn Fn(&mut Identity)); 30] = [
+        let changes: [Change<'_>; 30] = [
             ("version", &|i| i.version = "1.2.4".into()),
             ("scene", &|i| i.fingerprint = "cd".into()),
             ("film", &|i| i.film.0 = 41),
