@@ -133,9 +133,9 @@ fn stops_to(shown: f32, value: f32) -> f32 {
 }
 
 /// Said of a picture without any light.
-const BLACK: &str = "warning: the picture is black. Does a lamp face away (a quad shines on the side of its normal), \
-                     a spot, or the camera? Is there an opaque shape around or before the lights or the camera? Is the medium \
-                     too thick?";
+const BLACK: &str = "warning: the picture is black. Does a lamp face away (a quad shines on the side of its \
+                     normal), a spot, or the camera? Is there an opaque shape around or before the lights or \
+                     the camera? Is the medium too thick?";
 
 /// Options for the look of a PNG.
 #[derive(Debug, Args)]

@@ -345,7 +345,7 @@ fn parts_of_techniques_are_what_counting_one_twice_shows() {
     }
 }
 
-/// What weights count, relative to the usual choices (`docs/theory.md`, sections 2.1, 3.4 and 6.5).
+/// Sample counts in weights, relative to the usual choices (`docs/theory.md`, sections 2.1, 3.4 and 6.5).
 #[test]
 fn weights_count_the_samples_that_are_asked_for() {
     use Technique::{Bb1d, Bp2d, Connect, Hit, LightTracing, Nee, Pb2d, Pp3d, Surf};

@@ -141,11 +141,12 @@ fn load(options: &Options) -> Result<ReadyScene, SceneError> {
         if let Some(crop) = options.image.crop {
             description.film.crop = Some(crop);
         }
-        let unused = description.unused_media().filter(|_| !options.messages.quiet);
-        for name in unused {
-            complain(&format!(
-                "note: medium `{name}` is nowhere: no shape has it as `interior`, nor is it `outside`"
-            ));
+        if !options.messages.quiet {
+            for name in description.unused_media() {
+                complain(&format!(
+                    "note: medium `{name}` is nowhere: no shape has it as `interior`, nor is it `outside`"
+                ));
+            }
         }
     })
 }

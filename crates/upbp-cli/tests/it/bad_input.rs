@@ -72,7 +72,7 @@ fn a_good_scene_renders_and_writes_its_files() {
     assert!(series[0]["relative_mse"].as_f64() > Some(0.0));
 }
 
-/// What is probably a mistake is said, and rendered all the same.
+/// A likely mistake is told, and rendered all the same.
 #[test]
 fn a_medium_that_is_nowhere_is_told() {
     let folder = folder("nowhere");

@@ -139,9 +139,7 @@ impl ErrorMap {
         let high = if doubt.is_some() { f64::INFINITY } else { most * above };
         ErrorEstimate { relative_mse, low, high, doubt, tail_index }
     }
-}
 
-impl ErrorMap {
     /// Errors of the pixels of which the tail is a part: those that both halves have seen, so that the size
     /// of what is in the picture does not matter beside its black background. Where light is rare, black
     /// pixels are some that it has not met yet.

@@ -99,7 +99,7 @@ fn parts_add_up_to_the_whole() {
     assert_eq!(parted.overlap(&whole), Some(4..5));
 }
 
-/// What is there of an iteration in part stays that in a merged film, and belongs to the iteration's half.
+/// A part of an iteration stays one in a merged film, and belongs to the iteration's half.
 #[test]
 fn parts_are_merged_into_their_halves() {
     let rect = PixelRect { x: 0, y: 0, width: 16, height: 16 };
