@@ -9,8 +9,8 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use upbp_core::glam::{Vec2, Vec3};
 use upbp_core::media::{Homogeneous, MediaError, PhaseFunction, orthonormal_basis};
 use upbp_core::scene::{
-    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterBounds,
-    EmitterId, EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
+    Boundary, BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter,
+    EmitterBounds, EmitterId, EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
 };
 use upbp_core::{BodyId, Interior, MediumId, Ray, Spectrum};
 
@@ -231,18 +231,18 @@ impl Scene for Room {
                 position[axis] = side;
                 let mut normal = Vec3::ZERO;
                 normal[axis] = -side;
-                hit(t, position, normal, Some(wall), None, None)
+                hit(t, position, normal, Boundary::Opaque(wall), None)
             });
         }
         let (centre, radius) = self.milk;
         for t in ball(ray, centre, radius) {
             let interior = Interior { body: BodyId(0), medium: Some(MediumId(1)), priority: 0, ior: 1.0 };
-            keep(t, &|p| hit(t, p, (p - centre) / radius, None, Some(interior), None));
+            keep(t, &|p| hit(t, p, (p - centre) / radius, Boundary::Null(interior), None));
         }
         let lamp = &self.lamp[0];
         for t in ball(ray, lamp.centre, lamp.radius) {
-            let black = Some(Matt(Spectrum::ZERO));
-            keep(t, &|p| hit(t, p, (p - lamp.centre) / lamp.radius, black, None, Some(EmitterId(0))));
+            let black = Boundary::Opaque(Matt(Spectrum::ZERO));
+            keep(t, &|p| hit(t, p, (p - lamp.centre) / lamp.radius, black, Some(EmitterId(0))));
         }
         nearest
     }
@@ -272,11 +272,10 @@ fn hit(
     t: f32,
     position: Vec3,
     normal: Vec3,
-    bsdf: Option<Matt>,
-    interior: Option<Interior>,
+    boundary: Boundary<Matt>,
     emitter: Option<EmitterId>,
 ) -> Hit<Matt> {
-    Hit { t, position, geometric_normal: normal, shading_normal: normal, bsdf, interior, emitter }
+    Hit { t, position, geometric_normal: normal, shading_normal: normal, boundary, emitter }
 }
 
 /// Both intersections of a ray with a ball, in order; NaN if there are none.

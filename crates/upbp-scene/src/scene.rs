@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 use upbp_accel::{BoxTree, Candidate, Ray, SceneGeometry, ShapeId, Visit};
-use upbp_estimators::scene::{BoundingSphere, Bsdf, Crossing, EmitterId, Hit, Scene};
+use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId, Hit, Scene};
 use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
 
 use crate::camera::PerspectiveCamera;
@@ -18,10 +18,7 @@ use crate::material::Material;
 /// The record of a shape: everything but its geometry.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface {
-    /// `None`: an index-matched boundary.
-    pub(crate) bsdf: Option<Material>,
-    /// The body that it encloses.
-    pub(crate) interior: Option<Interior>,
+    pub(crate) boundary: Boundary<Material>,
     /// The light that it carries.
     pub(crate) emitter: Option<EmitterId>,
 }
@@ -110,8 +107,7 @@ impl ReadyScene {
             position: point.position,
             geometric_normal: point.geometric_normal,
             shading_normal: point.shading_normal,
-            bsdf: record.bsdf,
-            interior: record.interior,
+            boundary: record.boundary,
             emitter: record.emitter,
         }
     }
@@ -161,28 +157,27 @@ impl Scene for ReadyScene {
     }
 
     fn has_connectible_surfaces(&self) -> bool {
-        self.surfaces.iter().filter_map(|surface| surface.bsdf).any(|bsdf| bsdf.is_connectible())
+        self.surfaces.iter().filter_map(|surface| surface.boundary.bsdf()).any(Material::is_connectible)
     }
 
     fn has_specular_surfaces(&self) -> bool {
-        self.surfaces.iter().filter_map(|surface| surface.bsdf).any(|bsdf| bsdf.is_specular())
+        self.surfaces.iter().filter_map(|surface| surface.boundary.bsdf()).any(Material::is_specular)
     }
 
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Material>> {
         let (mut opaque, mut refracting) = (None, None);
         let mut second = f32::INFINITY;
         self.geometry.for_each_hit(*ray, |candidate| {
-            let record = self.record(candidate);
-            match (record.bsdf, record.interior) {
-                (None, Some(interior)) => {
+            match self.record(candidate).boundary {
+                Boundary::Null(interior) => {
                     crossings.push(self.crossing(ray, candidate, interior, false));
                     Visit::Continue
                 }
-                (_, None) => {
+                Boundary::Opaque(_) => {
                     self.keep_nearer(&mut opaque, candidate);
                     Visit::ShrinkTo(candidate.t.next_up())
                 }
-                (Some(_), Some(_)) => {
+                Boundary::Refracting(..) => {
                     second = second.min(self.keep_nearer(&mut refracting, candidate));
                     // As far as something may coincide.
                     Visit::ShrinkTo(candidate.t + self.largest_width(ray, candidate.t))
@@ -195,13 +190,13 @@ impl Scene for ReadyScene {
             return None;
         };
         let mut hit = self.hit(ray, &nearest);
-        if hit.interior.is_none() && crossings.is_empty() {
+        if hit.boundary.interior().is_none() && crossings.is_empty() {
             return Some(hit);
         }
         let width = self.width(ray, &nearest, &hit);
         let (before, behind) = (nearest.t - width, nearest.t + width);
         let coincides = |t: f32| before < t && t < behind;
-        if hit.interior.is_some()
+        if hit.boundary.interior().is_some()
             && (second < behind
                 || ray.t_max < behind
                 || opaque.is_some_and(|opaque| opaque.t < behind)
@@ -218,9 +213,9 @@ impl Scene for ReadyScene {
 
     fn is_clear(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> bool {
         let clear = !self.geometry.any_where(*ray, |candidate| {
-            let record = self.record(candidate);
-            let Some(interior) = record.interior else { return true };
-            crossings.push(self.crossing(ray, candidate, interior, record.bsdf.is_some()));
+            let boundary = &self.record(candidate).boundary;
+            let Some(interior) = boundary.interior() else { return true };
+            crossings.push(self.crossing(ray, candidate, interior, !boundary.is_null()));
             false
         });
         if clear {

@@ -32,7 +32,7 @@ pub(crate) struct Vertex {
 impl Vertex {
     /// Whether rounding decides on which side of a boundary without a surface the vertex is.
     fn is_at_boundary(&self, scene: &ClosedForm) -> bool {
-        let boundaries = scene.objects.iter().filter(|object| object.material.is_none());
+        let boundaries = scene.objects.iter().filter(|object| object.boundary.is_null());
         boundaries
             .flat_map(|object| [self.light, self.camera].map(|p| object.shape.distance(p)))
             .any(|d| d < TINY)
@@ -91,7 +91,7 @@ fn pass(scene: &ClosedForm, from: DVec3, to: DVec3, in_lanes: bool) -> Result<Pa
     }
     let direction = (to - from) / length;
     let mut borders = vec![0.0, length];
-    for object in scene.objects.iter().filter(|object| object.interior.is_some()) {
+    for object in scene.objects.iter().filter(|object| object.boundary.interior().is_some()) {
         let roots = object.shape.roots(from, direction).into_iter().flatten();
         borders.extend(roots.filter(|&t| t > TINY && t < length - TINY));
     }
@@ -151,7 +151,7 @@ fn at_surface(
 ) -> Scattering {
     let (object, distance) = scene.surface_at(vertex.camera);
     assert!(distance < 2e-6, "{vertex:?} is {distance} off its surface");
-    let material = object.material.expect("a surface");
+    let material = *object.boundary.bsdf().expect("a surface");
     let normal = object.shape.normal(vertex.camera);
     let shading = object.shading_normal(vertex.camera);
     let (light, camera) = (to_light.dot(shading), to_camera.dot(shading));

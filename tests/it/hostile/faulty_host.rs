@@ -5,8 +5,9 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use glam::{Vec2, Vec3};
 use upbp_core::media::{Homogeneous, Medium, PhaseFunction, RaySegment, SegmentDensity};
 use upbp_core::scene::{
-    BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterId,
-    EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, LensConnection, Scene, Walk,
+    Boundary, BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter,
+    EmitterId, EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface, LensConnection, Scene,
+    Walk,
 };
 use upbp_core::{BodyId, Canceller, Interior, MediumId, Ray, Spectrum};
 use upbp_scene::{Light, Material, PerspectiveCamera, ReadyScene};
@@ -118,6 +119,13 @@ impl Hostile {
     }
 }
 
+fn interior_of(hit: &mut Hit<HostileBsdf>) -> Option<&mut Interior> {
+    match &mut hit.boundary {
+        Boundary::Opaque(_) => None,
+        Boundary::Refracting(_, interior) | Boundary::Null(interior) => Some(interior),
+    }
+}
+
 impl Scene for Hostile {
     type Bsdf = HostileBsdf;
     type Emitter = HostileLight;
@@ -137,8 +145,11 @@ impl Scene for Hostile {
             position: hit.position,
             geometric_normal: hit.geometric_normal,
             shading_normal: hit.shading_normal,
-            bsdf: hit.bsdf.map(|bsdf| HostileBsdf(bsdf, self.fault)),
-            interior: hit.interior,
+            boundary: match hit.boundary {
+                Boundary::Opaque(bsdf) => Boundary::Opaque(HostileBsdf(bsdf, self.fault)),
+                Boundary::Refracting(bsdf, body) => Boundary::Refracting(HostileBsdf(bsdf, self.fault), body),
+                Boundary::Null(body) => Boundary::Null(body),
+            },
             emitter: hit.emitter,
         };
         match self.fault {
@@ -152,37 +163,41 @@ impl Scene for Hostile {
             F::HitInfinite => hit.t = f32::INFINITY,
             F::PositionNan => hit.position = Vec3::NAN,
             F::PositionInfinite => hit.position.x = f32::INFINITY,
-            F::BoundaryNan if hit.bsdf.is_none() => (hit.t, hit.position) = (f32::NAN, Vec3::NAN),
+            F::BoundaryNan if hit.boundary.is_null() => (hit.t, hit.position) = (f32::NAN, Vec3::NAN),
             F::Endless | F::EndlessBodies => {
                 hit.t = ray.t_min * 1.001 + 1e-6;
-                (hit.bsdf, hit.emitter) = (None, None);
+                hit.emitter = None;
                 hit.position = ray.at(hit.t);
                 (hit.geometric_normal, hit.shading_normal) = (ray.direction, ray.direction);
                 let body = if self.fault == F::Endless { 0 } else { self.new_body() };
-                hit.interior =
-                    Some(Interior { body: BodyId(body), medium: Some(MediumId(0)), priority: 0, ior: 1.0 });
+                let medium = Some(MediumId(0));
+                hit.boundary = Boundary::Null(Interior { body: BodyId(body), medium, priority: 0, ior: 1.0 });
             }
             F::NewBodies => {
-                if let Some(interior) = &mut hit.interior {
+                if let Some(interior) = interior_of(&mut hit) {
                     interior.body = BodyId(self.new_body());
                     (hit.geometric_normal, hit.shading_normal) = (ray.direction, ray.direction);
                 }
             }
-            F::NormalInwards if hit.interior.is_some() => {
+            F::NormalInwards if hit.boundary.interior().is_some() => {
                 (hit.geometric_normal, hit.shading_normal) = (-hit.geometric_normal, -hit.shading_normal);
             }
             F::NormalTurned if hit.geometric_normal.dot(ray.direction) > 0.0 => {
                 (hit.geometric_normal, hit.shading_normal) = (-hit.geometric_normal, -hit.shading_normal);
             }
-            F::InteriorMissing if hit.bsdf.is_some() => hit.interior = None,
+            F::InteriorMissing => {
+                if let Boundary::Refracting(bsdf, _) = hit.boundary {
+                    hit.boundary = Boundary::Opaque(bsdf);
+                }
+            }
             F::PositionElsewhere => hit.position += 10.0,
             F::MediumUnknown => {
-                if let Some(interior) = &mut hit.interior {
+                if let Some(interior) = interior_of(&mut hit) {
                     interior.medium = Some(MediumId(99));
                 }
             }
             F::RefractiveIndex(ior) => {
-                if let Some(interior) = &mut hit.interior {
+                if let Some(interior) = interior_of(&mut hit) {
                     interior.ior = ior;
                 }
             }

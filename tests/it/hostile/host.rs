@@ -103,7 +103,7 @@ fn check(fault: Fault) -> Result<(), String> {
         check_emitter(light, &bounds, &receivers).map_err(|violation| violation.to_string())?;
     }
     let down = Ray::new(Vec3::new(1.5, 0.0, 1.5), -Vec3::Y);
-    let floor = scene.intersect(&down).and_then(|hit| hit.bsdf).ok_or("no floor")?;
+    let floor = scene.intersect(&down).and_then(|hit| hit.boundary.bsdf().copied()).ok_or("no floor")?;
     check_bsdf(&floor, Interface::MATCHED).map_err(|violation| violation.to_string())?;
     check_camera(scene.camera()).map_err(|violation| violation.to_string())
 }

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 use upbp_media::BodyId;
 
-use super::{Check, fail, require};
+use super::{Check, require};
 use crate::Ray;
-use crate::scene::{Bsdf, EmitterId, Hit, Interface, MAX_CROSSINGS, Scene, Walk};
+use crate::scene::{Boundary, Bsdf, EmitterId, Hit, Interface, MAX_CROSSINGS, Scene, Walk};
 
 /// Fewest sightings of a normal that tell about its surface.
 const TELLING: u32 = 8;
@@ -105,21 +105,18 @@ impl Normals {
 }
 
 fn surface_of<B>(hit: &Hit<B>) -> Surface {
-    (hit.interior.map(|interior| interior.body), hit.emitter)
+    (hit.boundary.interior().map(|interior| interior.body), hit.emitter)
 }
 
 /// Checks that what has an inside that matters tells of it.
 fn check_enclosure<B: Bsdf>(hit: &Hit<B>) -> Check {
-    if hit.interior.is_some() {
-        return Ok(());
-    }
-    match &hit.bsdf {
-        None => fail("an index-matched boundary encloses a body: its hits have an interior", hit.position),
-        Some(bsdf) => require(
+    match &hit.boundary {
+        Boundary::Opaque(bsdf) => require(
             !refracts(bsdf),
             "a surface that refracts encloses a body: its hits have an interior",
             hit.position,
         ),
+        Boundary::Refracting(..) | Boundary::Null(_) => Ok(()),
     }
 }
 

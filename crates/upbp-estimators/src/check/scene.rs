@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::normals::Normals;
 use super::{Check, ContractViolation, Random, is_unit, require};
-use crate::scene::{BoundingSphere, Bsdf, Crossing, Emitter, Scene};
+use crate::scene::{Boundary, BoundingSphere, Bsdf, Crossing, Emitter, Scene};
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
 /// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside
@@ -87,7 +87,7 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
         require(near, "a hit's position is on the ray", case)?;
         let units = is_unit(hit.geometric_normal) && is_unit(hit.shading_normal);
         require(units, "normals are unit vectors", case)?;
-        let connectible = hit.bsdf.is_some_and(|bsdf| bsdf.is_connectible());
+        let connectible = hit.boundary.bsdf().is_some_and(Bsdf::is_connectible);
         let told = scene.has_connectible_surfaces() || !connectible;
         require(told, "a scene without connectible surfaces has none", case)?;
         let sides = hit.geometric_normal.dot(hit.shading_normal) >= 0.0;
@@ -95,7 +95,8 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
     }
     let mut crossings = Vec::new();
     let hit = scene.trace(ray, &mut crossings);
-    let interiors = crossings.iter().map(|c| c.interior).chain(hit.as_ref().and_then(|hit| hit.interior));
+    let interiors =
+        crossings.iter().map(|c| c.interior).chain(hit.as_ref().and_then(|hit| hit.boundary.interior()));
     let dull = interiors.clone().find(|interior| !(interior.ior > 0.0 && interior.ior.is_finite()));
     require(dull.is_none(), "a body has a positive finite index of refraction", (ray, dull))?;
     let unknown =
@@ -118,7 +119,7 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
     let before = crate::Ray { t_max: end - 1e-3 * radius, ..*ray };
     let clear = before.t_max <= before.t_min || scene.is_clear(&before, &mut passed);
     require(clear, "nothing blocks before the nearest hit", (ray, end))?;
-    if hit.is_some_and(|hit| hit.interior.is_none()) {
+    if hit.is_some_and(|hit| matches!(hit.boundary, Boundary::Opaque(_))) {
         let beyond = crate::Ray { t_max: end + 1e-3 * radius, ..*ray };
         require(!scene.is_clear(&beyond, &mut Vec::new()), "an opaque hit blocks", (ray, end))?;
     }

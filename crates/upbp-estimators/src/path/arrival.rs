@@ -58,7 +58,7 @@ pub(crate) fn arrive<'a, S: Scene, L: Lanes>(
     let Some(hit) = &edge_trace.hit else {
         return if sides.near.is_empty() { Arrival::Escaped } else { Arrival::Lost };
     };
-    let Some(bsdf) = hit.bsdf else { return Arrival::Lost };
+    let Some(&bsdf) = hit.boundary.bsdf() else { return Arrival::Lost };
     match Interaction::at_hit(hit, bsdf, edge_trace.direction, &sides) {
         Some(interaction) => Arrival::Vertex(Arrived {
             position: hit.position,

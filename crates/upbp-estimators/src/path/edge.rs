@@ -464,7 +464,8 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     /// The bodies where the walk stops, or on the two sides of the surface.
     #[must_use]
     pub fn sides(&self) -> MediumInterface<'_> {
-        let crosses = self.stop.is_none() && self.hit.as_ref().is_some_and(|hit| hit.interior.is_some());
+        let crosses =
+            self.stop.is_none() && self.hit.as_ref().is_some_and(|hit| hit.boundary.interior().is_some());
         MediumInterface { near: self.bodies(), far: if crosses { &self.behind } else { self.bodies() } }
     }
 }

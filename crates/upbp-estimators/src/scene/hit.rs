@@ -7,6 +7,46 @@ use upbp_media::Interior;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct EmitterId(pub u32);
 
+/// A surface as light sees it: whether it scatters, and whether it encloses a body whose inside matters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Boundary<B> {
+    /// A surface that light does not pass.
+    Opaque(B),
+    /// A surface that scatters and encloses a body, such as glass: what is refracted goes in or out.
+    Refracting(B, Interior),
+    /// An index-matched boundary of a body, which light passes straight.
+    Null(Interior),
+}
+
+impl<B> Boundary<B> {
+    /// Scattering of the surface, unless it is a null boundary.
+    #[inline]
+    #[must_use]
+    pub const fn bsdf(&self) -> Option<&B> {
+        match self {
+            Self::Opaque(bsdf) | Self::Refracting(bsdf, _) => Some(bsdf),
+            Self::Null(_) => None,
+        }
+    }
+
+    /// The body that the surface encloses, unless it is opaque.
+    #[inline]
+    #[must_use]
+    pub const fn interior(&self) -> Option<Interior> {
+        match self {
+            Self::Opaque(_) => None,
+            Self::Refracting(_, interior) | Self::Null(interior) => Some(*interior),
+        }
+    }
+
+    /// Whether light passes straight.
+    #[inline]
+    #[must_use]
+    pub const fn is_null(&self) -> bool {
+        matches!(self, Self::Null(_))
+    }
+}
+
 /// A ray meets a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit<B> {
@@ -18,11 +58,8 @@ pub struct Hit<B> {
     pub geometric_normal: Vec3,
     /// Unit normal for shading, in the hemisphere of the geometric one.
     pub shading_normal: Vec3,
-    /// Scattering of the surface. `None`: an index-matched boundary, which light passes straight.
-    pub bsdf: Option<B>,
-    /// The body that the surface encloses, if its inside matters: every null boundary, every refracting body.
-    /// Opaque surfaces have none.
-    pub interior: Option<Interior>,
+    /// Scattering of the surface, and the body that it encloses.
+    pub boundary: Boundary<B>,
     /// The light that the surface carries.
     pub emitter: Option<EmitterId>,
 }
@@ -34,9 +71,9 @@ impl<B> Hit<B> {
     pub fn crossing(&self, direction: Vec3) -> Option<Crossing> {
         Some(Crossing {
             t: self.t,
-            interior: self.interior?,
+            interior: self.boundary.interior()?,
             entering: direction.dot(self.geometric_normal) < 0.0,
-            scatters: self.bsdf.is_some(),
+            scatters: !self.boundary.is_null(),
         })
     }
 

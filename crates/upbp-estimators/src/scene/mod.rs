@@ -24,7 +24,7 @@ pub use emitter::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
     HitDensities, Incident,
 };
-pub use hit::{Crossing, EmitterId, Hit};
+pub use hit::{Boundary, Crossing, EmitterId, Hit};
 
 /// A scene to render: the host's geometry and everything on it.
 ///
@@ -88,7 +88,7 @@ pub trait Scene: Sync {
         let mut rest = *ray;
         for _ in 0..MAX_CROSSINGS {
             let hit = self.intersect(&rest)?;
-            if hit.bsdf.is_some() || !hit.is_sound(rest.t_min) {
+            if !hit.boundary.is_null() || !hit.is_sound(rest.t_min) {
                 return Some(hit);
             }
             crossings.extend(hit.crossing(ray.direction));
@@ -105,7 +105,7 @@ pub trait Scene: Sync {
         let mut rest = *ray;
         for _ in 0..MAX_CROSSINGS {
             let Some(hit) = self.intersect(&rest) else { return true };
-            if (hit.bsdf.is_some() && hit.interior.is_none()) || !hit.is_sound(rest.t_min) {
+            if matches!(hit.boundary, Boundary::Opaque(_)) || !hit.is_sound(rest.t_min) {
                 return false;
             }
             crossings.extend(hit.crossing(ray.direction));
@@ -131,7 +131,7 @@ pub trait Scene: Sync {
             if met > MAX_CROSSINGS {
                 return stack;
             }
-            if let Some(interior) = hit.interior {
+            if let Some(interior) = hit.boundary.interior() {
                 let step = if direction.dot(hit.geometric_normal) > 0.0 { 1 } else { -1 };
                 let place = *places.entry(interior.body).or_insert(balance.len());
                 match balance.get_mut(place) {

@@ -20,7 +20,7 @@ type BodyDraft<'a> = (usize, &'a Shape, Inside);
 /// Bodies among drafts, in their order.
 fn drafts_of_bodies(drafts: &[ShapeDraft]) -> Vec<BodyDraft<'_>> {
     let drafts = drafts.iter().enumerate();
-    drafts.filter_map(|(index, draft)| Some((index, &draft.shape, draft.body?))).collect()
+    drafts.filter_map(|(index, draft)| Some((index, &draft.shape, draft.boundary.inside()?))).collect()
 }
 
 /// Puts bodies in order, the lowest first: a body's [`Interior::priority`] is its place.
@@ -41,7 +41,7 @@ impl Builder<'_> {
     /// Reports surfaces that shine all inside of an opaque shape, where they would light nothing.
     pub(super) fn check_lamps_are_free(&mut self, drafts: &[ShapeDraft]) {
         for (index, lamp) in drafts.iter().enumerate().filter(|(_, draft)| !draft.emission.is_black()) {
-            let mut opaque = drafts.iter().enumerate().filter(|(_, draft)| draft.body.is_none());
+            let mut opaque = drafts.iter().enumerate().filter(|(_, draft)| draft.boundary.inside().is_none());
             if let Some((outer, _)) = opaque.find(|(_, draft)| is_buried(&lamp.shape, &draft.shape)) {
                 let message =
                     format!("lies inside of the opaque {} (a room is made of quads)", self.shape_item(outer));
@@ -55,8 +55,9 @@ impl Builder<'_> {
     pub(super) fn check_bodies_count(&mut self, drafts: &[ShapeDraft]) {
         let mut bodies = drafts_of_bodies(drafts);
         for (index, shape, _) in &bodies {
-            let is_around =
-                |(_, draft): &(usize, &ShapeDraft)| draft.body.is_none() && is_inside(shape, &draft.shape);
+            let is_around = |(_, draft): &(usize, &ShapeDraft)| {
+                draft.boundary.inside().is_none() && is_inside(shape, &draft.shape)
+            };
             if let Some((outer, _)) = drafts.iter().enumerate().find(is_around) {
                 let outer = self.shape_item(outer);
                 let message = format!(

@@ -50,7 +50,7 @@ impl Builder<'_> {
     pub(super) fn check_is_free(&mut self, item: &str, position: Vec3, drafts: &[Option<ShapeDraft>]) {
         for (index, draft) in drafts.iter().enumerate() {
             let Some(draft) = draft else { continue };
-            if draft.body.is_none() && draft.shape.contains(position) == Some(true) {
+            if draft.boundary.inside().is_none() && draft.shape.contains(position) == Some(true) {
                 let message =
                     format!("lies inside of the opaque {} (a room is made of quads)", self.shape_item(index));
                 self.problem(item, message);

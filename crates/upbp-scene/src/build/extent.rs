@@ -4,7 +4,7 @@ use glam::Vec3;
 use upbp_accel::Shape;
 use upbp_estimators::scene::BoundingSphere;
 
-use super::surfaces::ShapeDraft;
+use super::surfaces::{BoundaryDraft, ShapeDraft};
 use crate::camera::PerspectiveCamera;
 use crate::light::Light;
 
@@ -70,7 +70,7 @@ pub(super) fn bounds(drafts: &[ShapeDraft], lights: &[Light], camera: &Perspecti
 
 /// The largest coordinate of meshes that refract; zero if there are none.
 pub(super) fn largest_corner(drafts: &[ShapeDraft]) -> f32 {
-    let refracting = drafts.iter().filter(|draft| draft.bsdf.is_some() && draft.body.is_some());
+    let refracting = drafts.iter().filter(|draft| matches!(draft.boundary, BoundaryDraft::Refracting(..)));
     let meshes = refracting.filter(|draft| matches!(draft.shape, Shape::Mesh(_)));
     meshes.fold(0.0, |largest, draft| {
         let (min, max) = draft.shape.aabb();

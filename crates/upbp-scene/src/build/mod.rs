@@ -16,11 +16,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use upbp_accel::{BoxTree, SceneGeometry};
-use upbp_estimators::scene::EmitterId;
+use upbp_estimators::scene::{Boundary, EmitterId};
 use upbp_media::Homogeneous;
 
 use self::builder::Builder;
-use self::surfaces::{MeshFiles, ShapeDraft};
+use self::surfaces::{BoundaryDraft, MeshFiles, ShapeDraft};
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::SceneError;
 use crate::light::{AreaLight, Light, VolumeLight};
@@ -157,8 +157,12 @@ impl Builder<'_> {
                 self.problem(self.shape_item(index), "its area is too small or too large for a light");
                 None
             };
-            let interior = interiors.get(&index).copied();
-            surfaces.push(Surface { bsdf: draft.bsdf, interior, emitter });
+            let boundary = match draft.boundary {
+                BoundaryDraft::Opaque(material) => Boundary::Opaque(material),
+                BoundaryDraft::Refracting(material, _) => Boundary::Refracting(material, interiors[&index]),
+                BoundaryDraft::Null(_) => Boundary::Null(interiors[&index]),
+            };
+            surfaces.push(Surface { boundary, emitter });
         }
         surfaces
     }

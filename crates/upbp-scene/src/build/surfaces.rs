@@ -24,11 +24,26 @@ const COPIED_FROM: u32 = 4096;
 #[derive(Clone, Debug)]
 pub(super) struct ShapeDraft {
     pub(super) shape: Shape,
-    /// `None`: an index-matched boundary.
-    pub(super) bsdf: Option<Material>,
-    /// The inside, of refracting and index-matched materials.
-    pub(super) body: Option<Inside>,
+    pub(super) boundary: BoundaryDraft,
     pub(super) emission: Spectrum,
+}
+
+/// The boundary that a shape is, before its body has a rank among the others.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum BoundaryDraft {
+    Opaque(Material),
+    Refracting(Material, Inside),
+    Null(Inside),
+}
+
+impl BoundaryDraft {
+    /// The inside, unless light does not get there.
+    pub(super) const fn inside(&self) -> Option<Inside> {
+        match self {
+            Self::Opaque(_) => None,
+            Self::Refracting(_, inside) | Self::Null(inside) => Some(*inside),
+        }
+    }
 }
 
 /// The inside of a body.
@@ -46,15 +61,6 @@ enum Kind {
     Opaque(Material),
     Refracting(Material, f32),
     Null,
-}
-
-impl Kind {
-    fn bsdf(self) -> Option<Material> {
-        match self {
-            Self::Opaque(material) | Self::Refracting(material, _) => Some(material),
-            Self::Null => None,
-        }
-    }
 }
 
 impl Builder<'_> {
@@ -97,14 +103,14 @@ impl Builder<'_> {
         };
         let kind = (*kind)?;
         let emission = shape.emission.get();
-        if let Kind::Opaque(_) = kind {
+        if let Kind::Opaque(material) = kind {
             if let Some(interior) = &shape.interior {
                 let message =
                     format!("the material `{name}` is opaque, so that there is no interior for `{interior}`");
                 self.problem(&item, message);
             }
-            let draft = ShapeDraft { shape: geometry.ok()?, bsdf: kind.bsdf(), body: None, emission };
-            return Some(draft);
+            let boundary = BoundaryDraft::Opaque(material);
+            return Some(ShapeDraft { shape: geometry.ok()?, boundary, emission });
         }
         if !emission.is_black() {
             let message =
@@ -130,9 +136,13 @@ impl Builder<'_> {
                 "the triangles are wound the wrong way round: normals must point out of the body",
             );
         }
-        let ior = if let Kind::Refracting(_, ior) = kind { Some(ior) } else { None };
-        let inside = Inside { medium: medium.flatten(), ior, priority: shape.priority };
-        Some(ShapeDraft { shape: geometry, bsdf: kind.bsdf(), body: Some(inside), emission })
+        let inside = |ior| Inside { medium: medium.flatten(), ior, priority: shape.priority };
+        let boundary = match kind {
+            Kind::Opaque(material) => BoundaryDraft::Opaque(material),
+            Kind::Refracting(material, ior) => BoundaryDraft::Refracting(material, inside(Some(ior))),
+            Kind::Null => BoundaryDraft::Null(inside(None)),
+        };
+        Some(ShapeDraft { shape: geometry, boundary, emission })
     }
 
     fn geometry(&mut self, geometry: &Geometry) -> Result<Shape, String> {

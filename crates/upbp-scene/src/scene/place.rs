@@ -61,13 +61,13 @@ impl ReadyScene {
         let mut highest: Option<(Candidate, Crossing)> = None;
         let rank = |crossing: &Crossing| (crossing.interior.priority, crossing.entering);
         self.geometry.for_each_hit(near, |candidate| {
-            let record = self.record(candidate);
-            let Some(interior) = record.interior else {
+            let boundary = &self.record(candidate).boundary;
+            let Some(interior) = boundary.interior() else {
                 self.keep_nearer(&mut opaque, candidate);
                 return Visit::Continue;
             };
             end = end.max(candidate.t);
-            let crossing = self.crossing(ray, candidate, interior, record.bsdf.is_some());
+            let crossing = self.crossing(ray, candidate, interior, !boundary.is_null());
             let is_higher = |(_, other): &(_, _)| rank(&crossing) > rank(other);
             if crossing.scatters && highest.as_ref().is_none_or(is_higher) {
                 crossings.extend(highest.replace((*candidate, crossing)).map(|(_, lower)| lower));
@@ -103,7 +103,7 @@ impl ReadyScene {
             }
             let mut width = 0.0;
             self.geometry.for_each_hit(ray.with_range(t.next_down(), t.next_up()), |candidate| {
-                if self.record(candidate).interior == Some(interior) {
+                if self.record(candidate).boundary.interior() == Some(interior) {
                     width = self.width(ray, candidate, &self.hit(ray, candidate));
                 }
                 Visit::Continue

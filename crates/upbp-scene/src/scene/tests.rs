@@ -200,7 +200,7 @@ fn a_body_on_a_wall_is_not_left_through_the_wall() {
     );
     let mut crossings = Vec::new();
     let hit = scene.trace(&ALONG_X, &mut crossings).unwrap();
-    assert_eq!((hit.t, hit.interior), (6.0, None));
+    assert_eq!((hit.t, hit.boundary.interior()), (6.0, None));
     assert_eq!(crossings.len(), 1);
     assert!(crossings[0].entering);
 }
@@ -216,7 +216,7 @@ fn light_in_a_glass_on_a_table_does_not_get_below() {
         let scene = scene(MEDIA, &shapes.concat());
         let inside = Ray { origin: Vec3::new(0.0, 0.1, 0.2), ..ALONG_X };
         let hit = scene.trace(&inside, &mut Vec::new()).unwrap();
-        assert!(matches!(hit.bsdf, Some(Material::Lambert(_))));
+        assert!(matches!(hit.boundary, Boundary::Opaque(Material::Lambert(_))));
     }
 }
 
@@ -250,7 +250,7 @@ fn a_null_body_that_fills_glass_has_its_index() {
         // And its surface.
         let mut crossings = Vec::new();
         let hit = scene.trace(&ALONG_X, &mut crossings).unwrap();
-        assert_eq!((hit.interior.unwrap().body, crossings.len()), (BodyId(0), 1));
+        assert_eq!((hit.boundary.interior().unwrap().body, crossings.len()), (BodyId(0), 1));
         assert_eq!((crossings[0].interior.body, crossings[0].t), (BodyId(1), hit.t));
     }
 }
@@ -271,7 +271,10 @@ fn refracting_surfaces_that_coincide_are_one_hit() {
         let hit = scene.trace(&ray, &mut crossings).unwrap();
         let [other] = crossings[..] else { panic!("{crossings:?}") };
         assert_eq!((hit.t, other.t), (0.5, 0.5));
-        assert_eq!((hit.interior.unwrap().ior, other.interior.ior, other.scatters), (1.33, 1.5, true));
+        assert_eq!(
+            (hit.boundary.interior().unwrap().ior, other.interior.ior, other.scatters),
+            (1.33, 1.5, true)
+        );
         assert_eq!(other.entering, origin > 0.0);
         let mut stack = scene.stack_at(ray.origin);
         let mut connection = Vec::new();
@@ -322,7 +325,7 @@ fn refracting_bodies_do_not_block_a_segment_but_are_reported() {
     assert_eq!(crossings.len(), 2);
     assert!(crossings.iter().all(|crossing| crossing.scatters && crossing.interior.body == BodyId(0)));
     let hit = scene.trace(&ALONG_X, &mut Vec::new()).unwrap();
-    assert_eq!(hit.interior, Some(crossings[0].interior));
+    assert_eq!(hit.boundary.interior(), Some(crossings[0].interior));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use upbp_estimators::scene::{BoundingSphere, EmitterId, Hit, Scene};
+use upbp_estimators::scene::{Boundary, BoundingSphere, EmitterId, Hit, Scene};
 use upbp_estimators::{BodyId, EmissionGuide, EmitterChoice, Interior, MediumId, Ray};
 
 use super::camera::ThinLens;
@@ -20,23 +20,16 @@ const BUMP: f64 = 0.25;
 pub struct Object {
     /// Geometry.
     pub shape: Shape,
-    /// `None`: an index-matched boundary.
-    pub material: Option<Material>,
-    /// Body that the shape encloses.
-    pub interior: Option<Interior>,
+    /// Material, and the body that the shape encloses.
+    pub boundary: Boundary<Material>,
     /// Light that the shape is.
     pub emitter: Option<EmitterId>,
     bumpy: bool,
 }
 
 impl Object {
-    fn new(shape: Shape, material: Option<Material>) -> Self {
-        Self { shape, material, interior: None, emitter: None, bumpy: false }
-    }
-
-    fn filled(self, body: u32, medium: u32, priority: i32, ior: f32) -> Self {
-        let interior = Interior { body: BodyId(body), medium: Some(MediumId(medium)), priority, ior };
-        Self { interior: Some(interior), ..self }
+    fn new(shape: Shape, boundary: Boundary<Material>) -> Self {
+        Self { shape, boundary, emitter: None, bumpy: false }
     }
 
     /// Shading normal at a point of the surface, of unit length.
@@ -88,28 +81,41 @@ impl ClosedForm {
         // Both shine downwards: u × v = −y.
         let shining = |shape, emitter| Object {
             emitter: Some(EmitterId(emitter)),
-            ..Object::new(shape, Some(Material::Diffuse))
+            ..Object::new(shape, Boundary::Opaque(Material::Diffuse))
+        };
+        // Each body has a medium of its own.
+        let body = |number, priority, ior| Interior {
+            body: BodyId(number),
+            medium: Some(MediumId(number)),
+            priority,
+            ior,
         };
         let objects = vec![
             Object {
                 bumpy: true,
                 ..Object::new(
                     Shape::rectangle([-2.0, -1.0, -2.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0]),
-                    Some(Material::Diffuse),
+                    Boundary::Opaque(Material::Diffuse),
                 )
             },
             Object::new(
                 Shape::rectangle([-2.0, -1.0, -2.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]),
-                Some(Material::Coated),
+                Boundary::Opaque(Material::Coated),
             ),
             // Fog, open to the floor; a dense cloud in it, and a dark one in that.
-            Object::new(Shape::sphere([0.0, 0.1, 0.0], 1.3), None).filled(0, 0, 0, 1.0),
-            Object::new(Shape::sphere([0.55, -0.1, 0.1], 0.45), None).filled(1, 1, 1, 1.0),
-            Object::new(Shape::sphere([0.55, -0.1, 0.25], 0.2), None).filled(2, 2, 2, 1.0),
+            Object::new(Shape::sphere([0.0, 0.1, 0.0], 1.3), Boundary::Null(body(0, 0, 1.0))),
+            Object::new(Shape::sphere([0.55, -0.1, 0.1], 0.45), Boundary::Null(body(1, 1, 1.0))),
+            Object::new(Shape::sphere([0.55, -0.1, 0.25], 0.2), Boundary::Null(body(2, 2, 1.0))),
             // Half in the fog, whose boundary is hidden inside.
-            Object::new(Shape::sphere([-0.8, -0.4, 0.4], 0.45), Some(Material::Glass)).filled(3, 3, 10, 1.5),
-            Object::new(Shape::sphere([0.2, -0.7, 0.8], 0.25), Some(Material::Mirror)),
-            Object::new(Shape::sphere([-0.1, 0.6, -0.3], 0.3), Some(Material::Paper)).filled(4, 4, 5, 1.0),
+            Object::new(
+                Shape::sphere([-0.8, -0.4, 0.4], 0.45),
+                Boundary::Refracting(Material::Glass, body(3, 10, 1.5)),
+            ),
+            Object::new(Shape::sphere([0.2, -0.7, 0.8], 0.25), Boundary::Opaque(Material::Mirror)),
+            Object::new(
+                Shape::sphere([-0.1, 0.6, -0.3], 0.3),
+                Boundary::Refracting(Material::Paper, body(4, 5, 1.0)),
+            ),
             shining(lamp, 0),
             shining(lamp_in_fog, 1),
         ];
@@ -138,8 +144,10 @@ impl ClosedForm {
     /// lantern. Their volumes are the last lights.
     pub fn glowing(centre: Vec3, size: u32) -> Self {
         let mut scene = Self::new(centre, size);
-        for object in scene.objects.iter().filter(|object| object.interior.is_some()) {
-            let Some(Interior { body, medium: Some(medium), .. }) = object.interior else { continue };
+        for object in &scene.objects {
+            let Some(Interior { body, medium: Some(medium), .. }) = object.boundary.interior() else {
+                continue;
+            };
             if [1, 3, 4].contains(&body.0) {
                 scene.media[medium.0 as usize].glow = Source::GLOW;
                 scene.lights.push(Light { source: Source::Volume(object.shape, body.0), power: 1.0 });
@@ -151,14 +159,14 @@ impl ClosedForm {
     /// The body that counts at a point, by asking every body.
     pub fn body_at(&self, point: DVec3) -> Option<Interior> {
         let around = self.objects.iter().filter(|object| object.shape.contains(point));
-        around.filter_map(|object| object.interior).max_by_key(|interior| interior.priority)
+        around.filter_map(|object| object.boundary.interior()).max_by_key(|interior| interior.priority)
     }
 
     /// The surface with a material that is nearest to a point, and how far it is.
     pub fn surface_at(&self, point: DVec3) -> (&Object, f64) {
         self.objects
             .iter()
-            .filter(|object| object.material.is_some())
+            .filter(|object| !object.boundary.is_null())
             .map(|object| (object, object.shape.distance(point)))
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .expect("there are surfaces")
@@ -192,8 +200,7 @@ impl Scene for ClosedForm {
             position: rounded,
             geometric_normal: object.shape.normal(position).as_vec3(),
             shading_normal: object.shading_normal(rounded.as_dvec3()).as_vec3(),
-            bsdf: object.material,
-            interior: object.interior,
+            boundary: object.boundary,
             emitter: object.emitter,
         })
     }
