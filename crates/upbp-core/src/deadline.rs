@@ -34,6 +34,11 @@ pub(crate) struct Halt<'a> {
 }
 
 impl Halt<'_> {
+    /// Time until the deadline, if there is one.
+    pub(crate) fn time_left(&self) -> Option<Duration> {
+        Some(self.deadline?.saturating_duration_since(Instant::now()))
+    }
+
     /// Whether work has to stop now.
     pub(crate) fn now(&self) -> bool {
         self.canceller.is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
@@ -48,11 +53,11 @@ impl Halt<'_> {
 pub struct Stop {
     /// Number of iterations on the film.
     pub iterations: Option<u64>,
-    /// Seconds of rendering, those before a resumption and those of the preparation included: at the end of
-    /// the iteration that comes closest, or in the middle of one that would take longer than a twentieth
-    /// more, or than one second more if that is more. The light sub-paths of the first iteration are traced
-    /// to the end, since without them there is no picture: a [count](crate::LightPaths::Count) that is given
-    /// may take any time.
+    /// Seconds of rendering, those before a resumption and those of the preparation included. The last
+    /// iteration ends in its middle, unless it takes no longer than a hundredth more; one of which little
+    /// more than its light sub-paths could be done is not begun. The light sub-paths of the first iteration
+    /// are traced to the end, since without them there is no picture: a
+    /// [count](crate::LightPaths::Count) that is given may take any time.
     pub seconds: Option<f64>,
     /// Largest upper end of [`Film::estimated_error`](crate::Film::estimated_error). Asked for after 8, 10,
     /// 12, 14, 16, 20, 24, 28, 32, 40 iterations and so on: who asks after each stops at the luckiest answer.

@@ -140,7 +140,8 @@ impl<'a> Renderer<'a> {
 
     /// Renders the next iteration, but ends when the time of `stop` is up.
     fn iterate_until(&mut self, stop: &Stop) -> bool {
-        /// Sets of pixels that are traced together take about so long: what is lost when a render is stopped.
+        /// Sets of pixels that are traced together take at most about so long: what is lost when a render is
+        /// stopped.
         const PORTION: Duration = Duration::from_millis(200);
         let Some(iteration) = self.next_iteration() else { return false };
         if self.canceller.is_cancelled() {
@@ -169,7 +170,8 @@ impl<'a> Renderer<'a> {
         let mut clock = Clock::start();
         let mut done = missing.start;
         while done < missing.end {
-            let fit = self.set_time.map_or(1.0, |time| PORTION.as_secs_f64() / time.as_secs_f64().max(1e-9));
+            let portion = halt.time_left().map_or(PORTION, |left| left.min(PORTION));
+            let fit = self.set_time.map_or(1.0, |time| portion.as_secs_f64() / time.as_secs_f64().max(1e-9));
             let sets = done..done.saturating_add((fit as u32).max(1)).min(missing.end);
             let camera_halt = if film.is_empty() && done == 0 { &unlimited } else { &halt };
             let buffers = Buffers { pixels: &mut self.pixels, features: &mut self.features };
@@ -243,11 +245,15 @@ impl<'a> Renderer<'a> {
 
     /// Moment at which an iteration that begins now has to end.
     fn deadline(&self, stop: &Stop) -> Option<Instant> {
+        /// Part of the limit by which an iteration may exceed it, so that short ones stay whole.
+        const PATIENCE: f64 = 0.01;
+        /// Seconds, and part of the limit, that the first iteration has however long the preparation took:
+        /// there is always a picture.
+        const FIRST: (f64, f64) = (0.5, 0.025);
         let limit = stop.seconds?;
-        let patience = (0.05 * limit).max(1.0);
-        let left = limit + patience - self.seconds() - self.film_time.as_secs_f64();
-        // However long the preparation took, there is a picture.
-        let left = left.max(if self.state.film.is_empty() { 0.5 * patience } else { 0.0 });
+        let left = (1.0 + PATIENCE) * limit - self.seconds() - self.film_time.as_secs_f64();
+        let least = if self.state.film.is_empty() { FIRST.0.max(FIRST.1 * limit) } else { 0.0 };
+        let left = left.max(least);
         // What is longer than a clock can tell is no limit.
         Instant::now().checked_add(Duration::try_from_secs_f64(left).ok()?)
     }
@@ -257,15 +263,22 @@ impl<'a> Renderer<'a> {
         if self.next_iteration().is_none() || stop.iterations.is_some_and(|limit| done >= limit) {
             return Some(StopReason::Iterations);
         }
-        if let Some(limit) = stop.seconds {
-            let elapsed = self.seconds();
-            let one = (elapsed - self.state.record.times.pilot.as_secs_f64()) / done.max(1) as f64;
-            if elapsed >= limit && !self.state.film.is_empty() || done > 0 && elapsed + 0.5 * one > limit {
-                return Some(StopReason::Time);
-            }
+        if let Some(limit) = stop.seconds
+            && !self.state.film.is_empty()
+            && self.seconds() + self.seconds_until_it_pays() > limit
+        {
+            return Some(StopReason::Time);
         }
         let reached = |target| ErrorEstimate::is_due(done) && self.estimated_error.reached(target);
         stop.error.is_some_and(reached).then_some(StopReason::Error)
+    }
+
+    /// Time that an iteration takes until there is something to show for it: its light sub-paths, and a tenth
+    /// of its camera sub-paths.
+    fn seconds_until_it_pays(&self) -> f64 {
+        let times = self.state.seconds();
+        let done = self.state.film.iterations().max(1);
+        (times.light + times.build + 0.1 * times.camera) / done as f64
     }
 
     /// Estimates the error when a stop rule asks for it, and now and then before, for those who watch.
