@@ -10,10 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use upbp_core::{
-    Content, Metadata, Output, Settings, Start, Stop, ToneMapping, check_outputs, check_writable, write_exr,
-    write_png,
-};
+use upbp_core::{Content, Output, Settings, Start, Stop, ToneMapping, check_outputs, write_exr, write_png};
 use upbp_scene::ReadyScene;
 
 /// Ends after a minute, or when more iterations would hardly be seen.
@@ -53,14 +50,12 @@ fn render(path: &Path, exr: &Path) -> Result<(), Box<dyn Error>> {
     ];
     let read = scene.files().iter().map(|file| ("a file of the scene", file.as_path()));
     check_outputs(&outputs, &[("the scene", path)].into_iter().chain(read).collect::<Vec<_>>())?;
-    check_writable(exr)?;
-    check_writable(&png)?;
 
     // Settings are checked once. By default the renderer chooses its techniques from small pilot renders, for
     // the time that there is.
     let settings = Settings::default();
     let start = Start { stop: STOP, ..Start::default() };
-    let mut renderer = scene.start_renderer(settings.clone().validate()?, start)?;
+    let mut renderer = scene.start_renderer(settings.validate()?, start)?;
     renderer.identify_scene(&path.display().to_string(), &scene.hash().to_le_bytes());
 
     let bar = ProgressBar::new(100).with_style(ProgressStyle::with_template("{elapsed} {wide_bar} {msg}")?);
@@ -71,11 +66,9 @@ fn render(path: &Path, exr: &Path) -> Result<(), Box<dyn Error>> {
     });
     bar.finish();
 
-    // All that is known of the render is in its film and its report.
-    let report = renderer.report();
-    let metadata = Metadata { scene: &path.display().to_string(), settings: &settings, report: &report };
-    write_exr(exr, renderer.film(), &metadata)?;
+    // All that is known of the render is in its state.
+    write_exr(exr, renderer.state())?;
     write_png(&png, &renderer.film().image(), ToneMapping::default())?;
-    println!("{report}wrote {} and {}", exr.display(), png.display());
+    println!("{}wrote {} and {}", renderer.report(), exr.display(), png.display());
     Ok(())
 }

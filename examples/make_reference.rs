@@ -16,7 +16,6 @@ use clap::Parser;
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image as ExrImage, WritableImage as _, f16};
 use upbp_core::{
     Content, Image, Output, OutputError, Radii, Radius, Settings, Stop, TechniqueSet, check_outputs,
-    check_writable,
 };
 use upbp_scene::{ReadyScene, SceneError};
 use upbp_testing::shipped::{Group, Shipped, names};
@@ -136,8 +135,7 @@ fn check_files(jobs: &[Job]) -> Result<(), OutputError> {
         .flat_map(|job| [&job.file].into_iter().chain(job.scene.files()))
         .map(|path| ("a file of a scene", path.as_path()))
         .collect();
-    check_outputs(&outputs, &inputs)?;
-    outputs.iter().try_for_each(|output| check_writable(output.path))
+    check_outputs(&outputs, &inputs)
 }
 
 /// Independent renders of one scene with one set.

@@ -19,7 +19,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use upbp_core::{
     Content, Output, Radii, Radius, Renderer, Settings, Stop, Technique, TechniqueSet, check_outputs,
-    check_writable, write_text,
+    write_text,
 };
 use upbp_scene::ReadyScene;
 use upbp_testing::Estimate;
@@ -114,7 +114,6 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
             &[Output { role: "the table", path, content: Content::Text("scene,techniques,") }],
             &inputs,
         )?;
-        check_writable(path)?;
     }
     let mut csv = "scene,techniques,iterations,mean_r,mean_g,mean_b,error_r,error_g,error_b,sigmas_r,sigmas_g,sigmas_b,\
         percent_r,percent_g,percent_b,chi_square,outliers,tile_sigmas,relative_mse,missed\n"

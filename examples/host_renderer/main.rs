@@ -10,7 +10,7 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use upbp_core::{Metadata, Renderer, Settings, Start, Stop, ToneMapping, write_exr, write_png};
+use upbp_core::{Renderer, Settings, Start, Stop, ToneMapping, write_exr, write_png};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let room = scene::Room::new(256)?;
@@ -18,15 +18,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let stop = Stop { seconds: Some(20.0), ..Stop::default() };
     // The choice of techniques has to know how much time there is.
     let start = Start { stop, ..Start::default() };
-    let mut renderer = Renderer::start(&room, settings.clone().validate()?, start)?;
+    let mut renderer = Renderer::start(&room, settings.validate()?, start)?;
     renderer.render(&stop, |now| {
         println!("{:3.0} %, estimated relMSE {}", 100.0 * now.fraction, now.estimated_error);
         ControlFlow::Continue(())
     });
-    let report = renderer.report();
-    println!("{report}");
-    let metadata = Metadata { scene: "host room", settings: &settings, report: &report };
-    write_exr(Path::new("host_renderer.exr"), renderer.film(), &metadata)?;
+    println!("{}", renderer.report());
+    write_exr(Path::new("host_renderer.exr"), renderer.state())?;
     write_png(Path::new("host_renderer.png"), &renderer.film().image(), ToneMapping::default())?;
     Ok(())
 }

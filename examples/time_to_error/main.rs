@@ -24,8 +24,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use upbp_core::{
-    Content, ErrorPoint, Output, OutputError, Settings, TechniqueSet, ToneMapping, check_outputs,
-    check_writable, write_png, write_text,
+    Content, ErrorPoint, Output, OutputError, Settings, TechniqueSet, ToneMapping, check_outputs, write_png,
+    write_text,
 };
 
 use analysis::Curve;
@@ -165,8 +165,7 @@ fn check_files(
     let settings = options.settings.iter().map(|path| ("the settings", path.as_path()));
     let read = subjects.iter().flat_map(|subject| &subject.files);
     let read = read.map(|path| ("a file of a scene", path.as_path()));
-    check_outputs(&outputs, &settings.chain(read).collect::<Vec<_>>())?;
-    outputs.iter().try_for_each(|output| Ok(check_writable(output.path)?))
+    Ok(check_outputs(&outputs, &settings.chain(read).collect::<Vec<_>>())?)
 }
 
 fn plot(subject: &Subject, curves: &[Curve], folder: &Path) -> Result<(), OutputError> {

@@ -18,16 +18,9 @@ pub(crate) fn prepare(
     seconds: f64,
 ) -> Result<Renderer<'_>, Box<dyn Error>> {
     let stop = Stop { seconds: Some(seconds), ..Stop::default() };
-    let renderer = subject.scene.start_renderer(settings.validate()?, Start { stop, ..Start::default() })?;
-    let (rect, reference) = (renderer.film().rect(), &subject.reference);
-    if (reference.width, reference.height) != (rect.width, rect.height) {
-        return Err(format!(
-            "{}: expected a reference of {} x {} pixels, found {} x {}",
-            subject.name, rect.width, rect.height, reference.width, reference.height
-        )
-        .into());
-    }
-    Ok(renderer)
+    let start = Start { stop, reference: Some(subject.reference.clone()), ..Start::default() };
+    let renderer = subject.scene.start_renderer(settings.validate()?, start);
+    Ok(renderer.map_err(|error| format!("{}: {error}", subject.name))?)
 }
 
 /// Renders each for some time and takes errors after iterations at geometric distances, and after the last
@@ -61,20 +54,20 @@ struct Line<'a> {
 
 impl<'a> Line<'a> {
     fn new(subject: &'a Subject, renderer: Renderer<'a>) -> Self {
-        let pilot = renderer.report().seconds.total();
+        let pilot = renderer.state().seconds().total();
         Self { subject, renderer, points: Vec::new(), next: 1, pilot, done: false }
     }
 
     /// Goes on until `until` seconds are taken, of `limit` in all.
     fn go_on(&mut self, until: f64, limit: f64) {
         loop {
-            let seconds = self.renderer.report().seconds.total();
+            let seconds = self.renderer.state().seconds().total();
             let iterations = self.renderer.film().iterations();
             // As near to the limit as whole iterations come.
             let one = (seconds - self.pilot) / iterations.max(1) as f64;
             self.done = iterations > 0 && seconds + 0.5 * one > limit;
             if iterations >= self.next || self.done {
-                self.take_error(seconds);
+                self.points.push(self.renderer.state().error_against(&self.subject.reference));
                 self.next = ((iterations as f64 * SPACING) as u64).max(iterations + 1);
             }
             if self.done || seconds >= until && iterations > 0 {
@@ -82,17 +75,5 @@ impl<'a> Line<'a> {
             }
             self.renderer.iterate();
         }
-    }
-
-    fn take_error(&mut self, seconds: f64) {
-        let (film, reference) = (self.renderer.film(), &self.subject.reference);
-        let image = film.image();
-        self.points.push(ErrorPoint {
-            seconds,
-            iterations: film.iterations(),
-            relative_mse: image.relative_mse(reference),
-            over_scales: image.relative_mse_over_scales(reference),
-            rmse: image.rmse(reference),
-        });
     }
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use upbp_core::{
-    Content, Image, Metadata, Output, OutputError, Report, State, ToneCurve, ToneMapping, write_exr,
-    write_image, write_png, write_text,
+    Content, Image, Output, OutputError, Report, State, ToneCurve, ToneMapping, write_exr, write_image,
+    write_png, write_text,
 };
 
 use crate::exit::complain;
@@ -49,14 +49,11 @@ impl Images {
     pub(crate) fn write_render(
         &self,
         state: &State,
-        report: &Report,
         tones: ToneMapping,
         mut attempt: impl FnMut(Result<(), OutputError>),
     ) -> Option<String> {
         if let Some(path) = &self.exr {
-            let identity = state.identity();
-            let metadata = Metadata { scene: &identity.scene, settings: &identity.settings, report };
-            attempt(write_exr(path, state.film(), &metadata));
+            attempt(write_exr(path, state));
         }
         let image = state.film().image();
         attempt(write_png(&self.png, &image, tones));

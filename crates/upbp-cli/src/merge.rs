@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
-use upbp_core::{Content, Output, OutputError, State, check_outputs, check_writable};
+use upbp_core::{Content, Output, OutputError, State, check_outputs};
 
 use crate::exit::{Failure, say};
 use crate::files::{self, Images, Look};
@@ -55,9 +55,6 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     let outputs = options.outputs();
     let inputs: Vec<_> = options.states.iter().map(|path| ("a state to merge", path.as_path())).collect();
     check_outputs(&outputs, &inputs).map_err(Failure::input)?;
-    for output in outputs {
-        check_writable(output.path).map_err(Failure::input)?;
-    }
     let (merged, parts) = merge(&options.states, options.quiet)?;
     if options.image.output.is_some() && merged.film().is_empty() {
         return Err(Failure::Input("there is no picture in the states yet: no pixel is rendered".to_owned()));
@@ -70,7 +67,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     }
     let mut hint = None;
     if let Some(images) = &options.image.output {
-        hint = images.write_render(&merged, &report, options.image.look.tones(), &mut attempt);
+        hint = images.write_render(&merged, options.image.look.tones(), &mut attempt);
     }
     if let Some(path) = &options.report {
         attempt(files::write_report(&report, path));

@@ -70,6 +70,14 @@ pub enum RenderError {
         /// The techniques that are not ruled out.
         techniques: TechniqueSet,
     },
+    /// A reference image of another size than what is rendered.
+    #[error("expected a reference of {} x {} pixels, found {} x {}", expected[0], expected[1], found[0], found[1])]
+    Reference {
+        /// Width and height of what is rendered.
+        expected: [u32; 2],
+        /// Width and height of the reference.
+        found: [u32; 2],
+    },
     /// The render was cancelled before there was anything to show.
     #[error("cancelled before the first iteration")]
     Cancelled,

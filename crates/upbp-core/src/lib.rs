@@ -21,17 +21,14 @@ pub use auto::technique_support::TechniqueSupport;
 pub use deadline::{Canceller, Preparing, Stop};
 pub use error::{OutputError, RenderError, SettingsError, StateError, TextError};
 pub use files::{
-    Content, Output, abandon_files, check_outputs, check_writable, open_exr, open_file, read_text,
-    remove_leftovers, write_text,
+    Content, Output, abandon_files, check_outputs, open_exr, open_file, read_text, remove_leftovers,
+    write_text,
 };
-pub use film::{
-    Doubt, ErrorEstimate, ErrorMap, FeatureImages, Film, HalfImage, Image, IterationSet, MAX_ITERATIONS,
-    Pixel,
-};
-pub use output::{Metadata, ToneCurve, ToneMapping, read_exr, write_exr, write_image, write_png};
+pub use film::{Doubt, ErrorEstimate, ErrorMap, FeatureImages, Film, Image, IterationSet, MAX_ITERATIONS};
+pub use output::{ToneCurve, ToneMapping, read_exr, write_exr, write_image, write_png};
 pub use plan::{FrozenPlan, Plan};
 pub use radius_schedule::{Radii, Radius, RadiusSchedule};
-pub use render::{Outcome, Progress, Renderer, Start, StopReason};
+pub use render::{Progress, Renderer, Start, StopReason};
 pub use report::Report;
 pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTechniques};
 pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};

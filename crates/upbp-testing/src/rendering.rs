@@ -1,6 +1,7 @@
 //! Short renders that become estimates of the image mean.
 
-use upbp_core::{Image, Renderer, Settings};
+use upbp_core::scene::{Camera as _, PixelRect, Scene as _};
+use upbp_core::{Image, Renderer, Settings, Start};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::{Count, Film};
 
@@ -20,6 +21,16 @@ pub fn room(side: u32) -> ReadyScene {
 /// A renderer of a scene and settings that cannot be refused.
 pub fn renderer(scene: &ReadyScene, settings: Settings) -> Renderer<'_> {
     scene.renderer(settings.validate().expect("valid settings")).expect("a scene that can be rendered")
+}
+
+/// As [`renderer`], with a series of errors: those against a grey picture.
+pub fn comparing_renderer(scene: &ReadyScene, settings: Settings) -> Renderer<'_> {
+    let PixelRect { width, height, .. } = scene.camera().crop();
+    let reference = Image { width, height, pixels: vec![[0.5; 3]; (width * height) as usize] };
+    let start = Start { reference: Some(reference), ..Start::default() };
+    scene
+        .start_renderer(settings.validate().expect("valid settings"), start)
+        .expect("a scene that can be rendered")
 }
 
 /// Renders `iterations` iterations and returns the image mean of each, per channel, and the image.

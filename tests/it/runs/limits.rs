@@ -40,7 +40,7 @@ fn the_preparation_says_what_it_does_and_can_be_cancelled() {
 fn a_render_without_time_has_a_picture_and_goes_on_from_there() {
     let room = upbp_testing::room(40);
     let go_on = |_: &upbp_core::Progress<'_>| ControlFlow::Continue(());
-    let render = |renderer: &mut Renderer<'_>, stop: Stop| renderer.render(&stop, go_on).reason;
+    let render = |renderer: &mut Renderer<'_>, stop: Stop| renderer.render(&stop, go_on);
     let renderer = || upbp_testing::renderer(&room, settings());
     let mut whole = renderer();
     assert_eq!(render(&mut whole, Stop { iterations: Some(3), ..Stop::default() }), StopReason::Iterations);

@@ -4,9 +4,10 @@
 #![cfg(target_os = "linux")]
 
 use std::fs;
+use std::ops::ControlFlow;
 use std::time::Instant;
 
-use upbp_core::{ErrorPoint, LightPaths, MAX_ITERATIONS, Radius, Renderer, Settings};
+use upbp_core::{LightPaths, MAX_ITERATIONS, Radius, Renderer, Settings, State, Stop};
 use upbp_scene::ReadyScene;
 
 use super::own_process;
@@ -26,7 +27,7 @@ fn renderer(room: &ReadyScene, change: impl Fn(&mut Settings)) -> Renderer<'_> {
         ..Settings::default()
     };
     change(&mut settings);
-    upbp_testing::renderer(room, settings)
+    upbp_testing::comparing_renderer(room, settings)
 }
 
 #[test]
@@ -45,27 +46,19 @@ fn nothing_grows_with_the_number_of_iterations() {
     let start = Instant::now();
     let mut early = 0;
     let mut early_size = 0;
-    let size = |renderer: &Renderer<'_>| {
+    let size = |state: &State| {
         let mut bytes = Vec::new();
-        renderer.state().write(&mut bytes).expect("a vector takes all");
+        state.write(&mut bytes).expect("a vector takes all");
         bytes.len()
     };
-    for i in 0..wanted {
-        assert!(renderer.iterate());
-        let rmse = 1.0 / (i + 1) as f64;
-        renderer.record_error(ErrorPoint {
-            seconds: i as f64,
-            iterations: i + 1,
-            relative_mse: rmse * rmse,
-            over_scales: rmse * rmse,
-            rmse,
-        });
-        if i + 1 == (wanted / 4).min(1000) {
-            early_size = size(&renderer);
+    renderer.render(&Stop { iterations: Some(wanted), ..Stop::default() }, |now| {
+        if now.iterations == (wanted / 4).min(1000) {
+            early_size = size(now.state);
             early = resident();
         }
-    }
-    let (late, late_size) = (resident(), size(&renderer));
+        ControlFlow::Continue(())
+    });
+    let (late, late_size) = (resident(), size(renderer.state()));
     let report = renderer.report();
     println!(
         "{wanted} iterations in {:.1} s: resident {early} KiB early, {late} KiB at the end; state {early_size} and \

@@ -1,9 +1,10 @@
 //! State files that are cut off, changed or of somebody else are refused, whatever is in them.
 
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use proptest::prelude::*;
-use upbp_core::{ErrorPoint, LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
+use upbp_core::{LightPaths, Renderer, Settings, State, StateError, Stop, TechniqueSet};
 use upbp_scene::ReadyScene;
 use upbp_testing::readers::sealed;
 
@@ -14,7 +15,7 @@ fn renderer(room: &ReadyScene) -> Renderer<'_> {
         light_paths: LightPaths::Count(100),
         ..Settings::default()
     };
-    let mut renderer = upbp_testing::renderer(room, settings);
+    let mut renderer = upbp_testing::comparing_renderer(room, settings);
     renderer.identify_scene("room", b"room");
     renderer
 }
@@ -27,15 +28,8 @@ fn good() -> &'static [u8] {
         let mut renderer = renderer(&room);
         for range in [0..2, 7..8] {
             renderer.set_range(range);
-            while renderer.iterate() {}
+            renderer.render(&Stop::default(), |_| ControlFlow::Continue(()));
         }
-        renderer.record_error(ErrorPoint {
-            seconds: 0.1,
-            iterations: 3,
-            relative_mse: 1e-300,
-            over_scales: 1e-300,
-            rmse: 1.0 / 3.0,
-        });
         let mut bytes = Vec::new();
         renderer.state().write(&mut bytes).expect("a vector takes all");
         bytes
@@ -46,6 +40,8 @@ fn good() -> &'static [u8] {
 fn a_state_survives() {
     let state = State::read(good()).expect("a good state");
     assert_eq!(state.film().iteration_set().to_string(), "0..2, 7..8");
+    let compared: Vec<_> = state.report().series.points().iter().map(|point| point.iterations).collect();
+    assert_eq!(compared, [1, 2, 3]);
     let mut again = Vec::new();
     state.write(&mut again).expect("a vector takes all");
     assert!(again == good(), "reading and writing gives the same bytes");

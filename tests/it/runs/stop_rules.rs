@@ -17,39 +17,39 @@ fn each_rule_stops() {
 
     let mut by_count = renderer(&room);
     let stop = Stop { iterations: Some(5), ..Stop::default() };
-    assert_eq!(by_count.render(&stop, go_on).reason, StopReason::Iterations);
+    assert_eq!(by_count.render(&stop, go_on), StopReason::Iterations);
     assert_eq!(by_count.film().iterations(), 5);
     // Already there: nothing more is rendered. A higher limit goes on from here.
-    assert_eq!(by_count.render(&stop, go_on).reason, StopReason::Iterations);
+    assert_eq!(by_count.render(&stop, go_on), StopReason::Iterations);
     assert_eq!(by_count.film().iterations(), 5);
 
     let mut by_error = renderer(&room);
     let stop = Stop { error: Some(1e9), ..Stop::default() };
-    assert_eq!(by_error.render(&stop, go_on).reason, StopReason::Error);
+    assert_eq!(by_error.render(&stop, go_on), StopReason::Error);
     assert_eq!(by_error.film().iterations(), 8, "fewer tell nothing of rare light");
 
     let mut by_time = renderer(&room);
     let stop = Stop { seconds: Some(1e-6), ..Stop::default() };
-    assert_eq!(by_time.render(&stop, go_on).reason, StopReason::Time);
+    assert_eq!(by_time.render(&stop, go_on), StopReason::Time);
     assert!(!by_time.film().is_empty(), "there is always a picture");
     assert!(by_time.film().image().pixels.iter().all(|pixel| pixel.iter().all(|value| *value > 0.0)));
 
     let mut by_callback = renderer(&room);
-    let outcome = by_callback.render(&Stop::default(), |now| {
+    let reason = by_callback.render(&Stop::default(), |now| {
         if now.iterations < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
-    assert_eq!(outcome.reason, StopReason::Cancelled);
+    assert_eq!(reason, StopReason::Cancelled);
     assert_eq!(by_callback.film().iterations(), 3);
 
     let mut by_handle = renderer(&room);
     let canceller = by_handle.canceller();
-    let outcome = by_handle.render(&Stop::default(), |now| {
+    let reason = by_handle.render(&Stop::default(), |now| {
         if now.iterations == 2 {
             canceller.cancel();
         }
         ControlFlow::Continue(())
     });
-    assert_eq!(outcome.reason, StopReason::Cancelled);
+    assert_eq!(reason, StopReason::Cancelled);
     assert_eq!(by_handle.film().iterations(), 2, "an abandoned iteration leaves no trace");
 }
 

@@ -9,8 +9,7 @@ use std::path::Path;
 
 use upbp_core::{
     Canceller, CheckedSettings, FrozenPlan, Image, OutputError, Preparing, RenderError, Renderer, Start,
-    State, StateError, Stop, StopReason, check_outputs, check_writable, read_exr, read_text,
-    remove_leftovers, write_text,
+    State, StateError, Stop, StopReason, check_outputs, read_exr, read_text, remove_leftovers, write_text,
 };
 use upbp_scene::{ReadyScene, SceneError};
 
@@ -33,11 +32,8 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
         if options.is_lost_share() && !options.messages.quiet {
             complain("note: without --state these iterations cannot be merged with others");
         }
-        let beside = Beside {
-            reference: job.reference.as_ref(),
-            state: options.saving.state.as_deref().map(|path| (path, options.save_every())),
-            bar,
-        };
+        let beside =
+            Beside { state: options.saving.state.as_deref().map(|path| (path, options.save_every())), bar };
         let reason = render(&mut renderer, &options.stop(), beside);
         write(renderer.state(), reason, options)
     })
@@ -82,9 +78,6 @@ impl Job {
         let inputs: Vec<_> = options.inputs().chain(files).collect();
         let outputs = options.outputs(&images);
         check_outputs(&outputs, &inputs).map_err(Failure::input)?;
-        for output in outputs {
-            check_writable(output.path).map_err(Failure::input)?;
-        }
         let reference =
             options.messages.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
         let plan = options.method.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
@@ -99,27 +92,19 @@ impl Job {
         // A render that goes on does not choose again.
         let plan = self.plan.clone().or_else(|| state.as_ref().map(|state| state.identity().frozen_plan()));
         let stop = Stop { iterations: options.range().map(|range| range.end), ..options.stop() };
-        let start = Start { plan, canceller, stop, progress: Some(&mut show) };
+        let reference = self.reference.clone();
+        let start = Start { plan, canceller, stop, reference, progress: Some(&mut show) };
         let renderer = self.scene.start_renderer(self.settings.clone(), start);
         let mut renderer = renderer.map_err(|error| match error {
             RenderError::Cancelled => Failure::Interrupted(format!("interrupted: {error}")),
+            RenderError::Reference { .. } => {
+                let name = options.messages.reference.as_deref().unwrap_or(Path::new("reference"));
+                Failure::Input(format!("{}: {error}", name.display()))
+            }
             error => Failure::input(error),
         })?;
         let hash = self.scene.hash();
         renderer.identify_scene(&format!("{} ({hash:016x})", options.scene.display()), &hash.to_le_bytes());
-        let rect = renderer.film().rect();
-        if let (Some(reference), Some(name)) = (&self.reference, &options.messages.reference)
-            && (reference.width, reference.height) != (rect.width, rect.height)
-        {
-            return Err(Failure::Input(format!(
-                "{}: expected a reference of {} x {} pixels, found {} x {}",
-                name.display(),
-                rect.width,
-                rect.height,
-                reference.width,
-                reference.height
-            )));
-        }
         if let (Some(state), Some(path)) = (state, &options.saving.state) {
             let resumed = renderer.resume(state);
             resumed.map_err(|source| Failure::input(OutputError::State { path: path.clone(), source }))?;
@@ -184,7 +169,7 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
     let rendered = !state.film().is_empty();
     let mut hint = None;
     if rendered {
-        hint = images.write_render(state, &report, options.image.look.tones(), &mut attempt);
+        hint = images.write_render(state, options.image.look.tones(), &mut attempt);
     }
     if let Some(path) = &options.messages.report {
         attempt(files::write_report(&report, path));

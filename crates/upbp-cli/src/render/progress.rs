@@ -1,18 +1,16 @@
-//! A render with all that goes on beside it: progress, errors against a reference, the state on the disk.
+//! A render with all that goes on beside it: progress, the state on the disk.
 
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use upbp_core::{ErrorPoint, ErrorSeries, Image, Progress, Renderer, State, Stop, StopReason};
+use upbp_core::{Progress, Renderer, State, Stop, StopReason};
 
 use super::bar::Bar;
 use crate::exit::{complain, describe};
 
 /// Work to be done after each iteration.
 pub(crate) struct Beside<'a> {
-    /// An image to compare with.
-    pub(crate) reference: Option<&'a Image>,
     /// File for the state, and the time between two savings.
     pub(crate) state: Option<(&'a Path, Duration)>,
     pub(crate) bar: Bar,
@@ -20,20 +18,9 @@ pub(crate) struct Beside<'a> {
 
 /// Renders until a rule of `stop` holds, and says which.
 pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: Beside<'_>) -> StopReason {
-    let Beside { reference, state, bar } = beside;
-    let mut errors = ErrorSeries::default();
+    let Beside { state, bar } = beside;
     let mut saved = Instant::now();
-    let outcome = renderer.render(stop, |now: &Progress<'_>| {
-        if let Some(reference) = reference {
-            let image = now.film.image();
-            errors.push(ErrorPoint {
-                seconds: now.seconds,
-                iterations: now.iterations,
-                relative_mse: image.relative_mse(reference),
-                over_scales: image.relative_mse_over_scales(reference),
-                rmse: image.rmse(reference),
-            });
-        }
+    let reason = renderer.render(stop, |now: &Progress<'_>| {
         bar.show(now.iterations, now.fraction, status(now));
         if let Some((path, every)) = state
             && saved.elapsed() >= every
@@ -43,11 +30,8 @@ pub(crate) fn render(renderer: &mut Renderer<'_>, stop: &Stop, beside: Beside<'_
         }
         ControlFlow::Continue(())
     });
-    bar.end(outcome.reason != StopReason::Cancelled);
-    for point in errors.points() {
-        renderer.record_error(*point);
-    }
-    outcome.reason
+    bar.end(reason != StopReason::Cancelled);
+    reason
 }
 
 /// Saves the state, or warns: a disk that is full now need not be so at the end.

@@ -15,11 +15,8 @@ const UNFINISHED: &str = ".part";
 /// The age at which an unfinished file is no longer being written.
 const LEFTOVER: Duration = Duration::from_secs(3600);
 
-/// Checks that a file can be written, before hours are spent on its content.
-///
-/// # Errors
-/// The file system's own; or that the file is read-only, or a folder.
-pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+/// Checks that a file can be written: that it is not read-only, and no folder.
+pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
     let check = || {
         if path.is_dir() {
             return Err(io::ErrorKind::IsADirectory.into());

@@ -5,7 +5,7 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use self::platform::{FileId, file_id, is_block_device, is_character_device};
-use super::atomic_write::{folder, is_one_name, target};
+use super::atomic_write::{check_writable, folder, is_one_name, target};
 use crate::error::OutputError;
 
 /// Kinds of files. One that is there and holds something else is not overwritten.
@@ -62,16 +62,16 @@ pub struct Output<'a> {
     pub content: Content,
 }
 
-/// Checks, before the work, that writing `outputs` destroys nothing else: that they are different files, none
-/// of `inputs`, and that those that are there already hold what will be in them, or nothing. Links are
-/// followed, and hard links to a file are the same file. An input is its role and its path; a file that is
-/// read and written on purpose is an output only.
+/// Checks, before hours are spent on their content, that `outputs` can be written, and that this destroys
+/// nothing else: that they are different files, none of `inputs`, and that those that are there already hold
+/// what will be in them, or nothing. Links are followed, and hard links to a file are the same file. An input
+/// is its role and its path; a file that is read and written on purpose is an output only.
 ///
 /// Hard links are not noticed on platforms that have no numbers of files (all but Unix).
 ///
 /// # Errors
 /// [`SameFile`](OutputError::SameFile), [`Overwrites`](OutputError::Overwrites), or what the file system
-/// says.
+/// says; or a file is read-only, or a folder.
 pub fn check_outputs(outputs: &[Output<'_>], inputs: &[(&str, &Path)]) -> Result<(), OutputError> {
     // An input that is not there cannot be destroyed.
     let mut taken: Vec<_> =
@@ -106,7 +106,7 @@ pub fn check_outputs(outputs: &[Output<'_>], inputs: &[(&str, &Path)]) -> Result
             });
         }
     }
-    Ok(())
+    outputs.iter().try_for_each(|output| check_writable(output.path))
 }
 
 /// Whether a file begins as `content` does, or is empty.

@@ -40,14 +40,14 @@ const FEW_ITERATIONS: u64 = 8;
 
 /// The mean of the iterations of one half, per pixel, row by row.
 #[derive(Clone, Copy, Debug)]
-pub struct HalfImage<'a> {
+pub(crate) struct HalfImage<'a> {
     /// Mean radiance of each pixel.
-    pub image: &'a [[f32; 3]],
+    pub(crate) image: &'a [[f32; 3]],
     /// The part of the light that the camera sees directly, or by mirrors and through glass only: then it is
     /// no sign of an error that a pixel is much brighter than its neighbours. `None` where it is not known.
-    pub seen: Option<&'a [[f32; 3]]>,
+    pub(crate) seen: Option<&'a [[f32; 3]]>,
     /// Number of iterations.
-    pub iterations: u64,
+    pub(crate) iterations: u64,
 }
 
 /// Estimated relMSE of an image.
@@ -98,8 +98,7 @@ impl ErrorMap {
     ///
     /// # Panics
     /// If the halves are of different sizes, or not of whole rows of `width`.
-    #[must_use]
-    pub fn new(width: usize, halves: [HalfImage<'_>; 2]) -> Self {
+    pub(crate) fn new(width: usize, halves: [HalfImage<'_>; 2]) -> Self {
         let pair = Pair::new(width, halves);
         let iterations = halves[0].iterations.saturating_add(halves[1].iterations);
         let black = halves.iter().all(|half| half.image.iter().all(|pixel| *pixel == [0.0; 3]));

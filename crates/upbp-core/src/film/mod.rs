@@ -14,7 +14,8 @@ use rayon::prelude::*;
 use upbp_estimators::scene::PixelRect;
 use upbp_estimators::{Features, Layer, Spectrum, TechniqueSet, half};
 
-pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap, HalfImage};
+use error_estimate::HalfImage;
+pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap};
 use exact_sum::Sum3;
 pub use features::FeatureImages;
 use features::FeatureSums;
@@ -25,17 +26,17 @@ use pixel_sets::{SETS, set_of, stand_ins};
 
 /// A pixel of one iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pixel {
+pub(crate) struct Pixel {
     /// Radiance by layer.
-    pub layers: [Spectrum; Layer::COUNT],
+    pub(crate) layers: [Spectrum; Layer::COUNT],
     /// The part of the light that the camera sees directly, by mirrors or through glass: then it is no sign
     /// of an error that a pixel is much brighter than its neighbours.
-    pub seen: Spectrum,
+    pub(crate) seen: Spectrum,
 }
 
 impl Pixel {
     /// No light.
-    pub const BLACK: Self = Self { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
+    pub(crate) const BLACK: Self = Self { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
 }
 
 /// Sums over a set of iterations, to the last bit the same in whatever order they were added. A mean is too

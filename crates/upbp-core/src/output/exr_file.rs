@@ -12,28 +12,28 @@ use serde::Serialize;
 use super::check_size;
 use crate::error::OutputError;
 use crate::files::{open_exr, write_whole};
-use crate::film::{FeatureImages, Film, Image as Picture};
+use crate::film::{FeatureImages, Image as Picture};
 use crate::report::Report;
 use crate::settings::Settings;
+use crate::state::{Identity, State};
 
 /// Origin of an image file, as RON text in its attribute `upbp`, in UTF-8.
-#[derive(Clone, Debug, Serialize)]
-pub struct Metadata<'a> {
-    /// Name or hash of the scene.
-    pub scene: &'a str,
-    /// Settings of the render.
-    pub settings: &'a Settings,
-    /// Report of the render.
-    pub report: &'a Report,
+#[derive(Serialize)]
+struct Metadata<'a> {
+    scene: &'a str,
+    settings: &'a Settings,
+    report: &'a Report,
 }
 
-/// Writes the mean of a film, its layers, variance, halves, estimated error and features, as far as the film
-/// has them, in float32.
+/// Writes the mean of a render's film, its layers, variance, halves, estimated error and features, as far as
+/// the film has them, in float32. The attribute `upbp` of the file holds the name of the scene, the settings
+/// and the report as RON text.
 ///
 /// # Errors
 /// Those of the file system or of the encoder.
-pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::result::Result<(), OutputError> {
+pub fn write_exr(path: &Path, state: &State) -> std::result::Result<(), OutputError> {
     let fail = |reason: String| OutputError::Encode { path: path.to_owned(), reason };
+    let film = state.film();
     let mut channels = SmallVec::<[AnyChannel<FlatSamples>; 4]>::new();
     push(&mut channels, "", &film.image());
     for layer in film.layers() {
@@ -62,7 +62,9 @@ pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata<'_>) -> std::resu
     }
 
     let mut attributes = LayerAttributes::default();
-    let text = ron::to_string(metadata).map_err(|error| fail(error.to_string()))?;
+    let Identity { scene, settings, .. } = state.identity();
+    let metadata = Metadata { scene, settings, report: &state.report() };
+    let text = ron::to_string(&metadata).map_err(|error| fail(error.to_string()))?;
     // Not `Text::from`, which takes nothing but Latin-1.
     let text = Text::from_slice_unchecked(text.as_bytes());
     attributes.other.insert(Text::from("upbp"), AttributeValue::Text(text));

@@ -10,7 +10,7 @@ use std::path::Path;
 use crate::error::OutputError;
 use crate::film::Image;
 
-pub use exr_file::{Metadata, read_exr, write_exr, write_image};
+pub use exr_file::{read_exr, write_exr, write_image};
 pub use png_file::write_png;
 pub use tone::{ToneCurve, ToneMapping};
 

@@ -8,4 +8,4 @@ mod stop;
 
 pub use prepare::Start;
 pub use renderer::Renderer;
-pub use stop::{Outcome, Progress, StopReason};
+pub use stop::{Progress, StopReason};

@@ -9,7 +9,7 @@ use super::engine::{Engine, SceneEngine};
 use crate::auto;
 use crate::deadline::{Budget, Canceller, Preparing, Stop};
 use crate::error::RenderError;
-use crate::film::Film;
+use crate::film::{Film, Image};
 use crate::plan::FrozenPlan;
 use crate::settings::CheckedSettings;
 use crate::state::{Identity, PassTimes, Record, State};
@@ -18,6 +18,7 @@ use crate::state::{Identity, PassTimes, Record, State};
 pub(super) struct Prepared<'a> {
     pub(super) engine: Box<dyn Engine + 'a>,
     pub(super) canceller: Canceller,
+    pub(super) reference: Option<Image>,
     pub(super) state: State,
 }
 
@@ -37,6 +38,9 @@ pub struct Start<'a> {
     /// few light sub-paths that there are several iterations. If choices are to be
     /// [deterministic](crate::Settings::deterministic), all limits are ignored.
     pub stop: Stop,
+    /// An image to compare with after each iteration, of the size of what is rendered: the errors are a
+    /// [series](crate::ErrorSeries) of the state and its report.
+    pub reference: Option<Image>,
     /// Is told what comes next, before each step of the preparation.
     pub progress: Option<&'a mut (dyn FnMut(Preparing) + Send)>,
 }
@@ -48,13 +52,18 @@ pub(super) fn prepare<'a, S: Scene>(
     start: Start<'_>,
 ) -> Result<Prepared<'a>, RenderError> {
     let begun = Instant::now();
-    let Start { plan, canceller, stop, progress } = start;
+    let Start { plan, canceller, stop, reference, progress } = start;
     stop.check()?;
+    let rect = scene.camera().crop();
+    if let Some(Image { width, height, .. }) = reference
+        && (width, height) != (rect.width, rect.height)
+    {
+        return Err(RenderError::Reference { expected: [rect.width, rect.height], found: [width, height] });
+    }
     let stop = if settings.deterministic { Stop::default() } else { stop };
     let mut budget = Budget { start: begun, canceller: canceller.clone(), stop, progress };
     let mut prepared = PreparedScene::new(scene)?;
     let choice = auto::choose(&mut prepared, &settings, plan, &mut budget)?;
-    let rect = scene.camera().crop();
     let identity = Identity {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scene: String::new(),
@@ -79,5 +88,5 @@ pub(super) fn prepare<'a, S: Scene>(
     } else {
         Box::new(SceneEngine::<S, f64> { scene: prepared, statistics, map: LightMap::empty() })
     };
-    Ok(Prepared { engine, canceller, state: State { identity, record, film } })
+    Ok(Prepared { engine, canceller, reference, state: State { identity, record, film } })
 }

@@ -9,14 +9,14 @@ use upbp_estimators::{Counters, Features, IterationPlan};
 use super::engine::Engine;
 use super::passes::Buffers;
 use super::prepare::{Prepared, Start, prepare};
-use super::stop::{Outcome, Progress, StopReason};
+use super::stop::{Progress, StopReason};
 use crate::auto::technique_support::TechniqueSupport;
 use crate::deadline::{Canceller, Clock, Halt, Stop};
 use crate::error::{RenderError, StateError};
-use crate::film::{ErrorEstimate, Film, MAX_ITERATIONS, Pixel};
+use crate::film::{ErrorEstimate, Film, Image, MAX_ITERATIONS, Pixel};
 use crate::report::Report;
 use crate::settings::CheckedSettings;
-use crate::state::{ErrorPoint, Identity, PassTimes, State, fingerprint};
+use crate::state::{Identity, PassTimes, State, fingerprint};
 
 /// A render of one scene.
 ///
@@ -36,6 +36,7 @@ pub struct Renderer<'a> {
     film_time: Duration,
     /// Estimate of the error when it was last due.
     estimated_error: ErrorEstimate,
+    reference: Option<Image>,
     canceller: Canceller,
 }
 
@@ -63,7 +64,8 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// Those of [`new`](Self::new); or the plan has techniques that the settings or the scene rule out, or
-    /// exceeds the memory budget, or it or the stop rules have a value out of its range; or it was cancelled.
+    /// exceeds the memory budget, or it or the stop rules have a value out of its range; or the reference is
+    /// of another size; or it was cancelled.
     pub fn start<S: Scene>(
         scene: &'a S,
         settings: CheckedSettings,
@@ -72,7 +74,7 @@ impl<'a> Renderer<'a> {
         Ok(Self::begin(prepare(scene, settings, start)?))
     }
 
-    fn begin(Prepared { engine, canceller, state }: Prepared<'a>) -> Self {
+    fn begin(Prepared { engine, canceller, reference, state }: Prepared<'a>) -> Self {
         /// Nanoseconds per sum of a pixel, where its memory is used for the first time.
         const SUM: u64 = 60;
         let rect = state.film.rect();
@@ -86,12 +88,14 @@ impl<'a> Renderer<'a> {
             set_time: None,
             film_time: Duration::from_nanos(SUM.saturating_mul(sums)),
             estimated_error: ErrorEstimate::UNKNOWN,
+            reference,
             canceller,
         }
     }
 
     /// Says which scene this is, so that states of different scenes are told apart: a name for people, and a
-    /// fingerprint of all that the scene's content depends on.
+    /// fingerprint of all that the scene's content depends on. It comes before a state is
+    /// [resumed](Self::resume).
     pub fn identify_scene(&mut self, name: &str, content: &[u8]) {
         name.clone_into(&mut self.state.identity.scene);
         self.state.identity.fingerprint = fingerprint(content);
@@ -204,30 +208,38 @@ impl<'a> Renderer<'a> {
         self.state.seconds().total()
     }
 
-    /// Renders until a rule of `stop` holds or `progress`, which is called after every iteration, breaks.
-    /// Time spent in `progress` does not count.
-    pub fn render(&mut self, stop: &Stop, progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>) -> Outcome {
-        let outcome = self.render_until(stop, progress);
+    /// Renders until a rule of `stop` holds or `progress`, which is called after every iteration, breaks, and
+    /// says why it ends. Time spent in `progress`, and in comparing with the
+    /// [reference](Start::reference), does not count.
+    pub fn render(
+        &mut self,
+        stop: &Stop,
+        progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
+    ) -> StopReason {
+        let reason = self.render_until(stop, progress);
         // Room for what is done with the picture.
         self.engine.shrink();
-        outcome
+        reason
     }
 
     fn render_until(
         &mut self,
         stop: &Stop,
         mut progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
-    ) -> Outcome {
+    ) -> StopReason {
         self.estimated_error = self.state.film.estimated_error();
         loop {
             if let Some(reason) = self.reason_to_stop(stop) {
-                return Outcome { reason };
+                return reason;
             }
             if !self.iterate_until(stop) {
+                // With what is done of the iteration.
+                self.compare();
                 let cancelled = self.canceller.is_cancelled();
-                return Outcome { reason: if cancelled { StopReason::Cancelled } else { StopReason::Time } };
+                return if cancelled { StopReason::Cancelled } else { StopReason::Time };
             }
             self.estimate_error();
+            self.compare();
             let film = &self.state.film;
             let now = Progress {
                 iterations: film.iterations(),
@@ -238,7 +250,7 @@ impl<'a> Renderer<'a> {
                 film,
             };
             if progress(&now).is_break() {
-                return Outcome { reason: StopReason::Cancelled };
+                return StopReason::Cancelled;
             }
         }
     }
@@ -291,6 +303,16 @@ impl<'a> Renderer<'a> {
         }
     }
 
+    /// Adds the error against the reference, if there is one, to the series of the record.
+    fn compare(&mut self) {
+        if let Some(reference) = &self.reference
+            && !self.state.film.is_empty()
+        {
+            let point = self.state.error_against(reference);
+            self.state.record.series.push(point);
+        }
+    }
+
     fn fraction(&self, stop: &Stop) -> f64 {
         let film = &self.state.film;
         let in_range = film.iteration_set().count_in(&self.range);
@@ -307,11 +329,6 @@ impl<'a> Renderer<'a> {
     #[must_use]
     pub fn canceller(&self) -> Canceller {
         self.canceller.clone()
-    }
-
-    /// Adds a point to the report's series of errors.
-    pub fn record_error(&mut self, point: ErrorPoint) {
-        self.state.record.series.push(point);
     }
 
     /// The film.

@@ -17,13 +17,6 @@ pub enum StopReason {
     Cancelled,
 }
 
-/// The end of a render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    /// The reason for the stop.
-    pub reason: StopReason,
-}
-
 /// Progress of a render, after an iteration.
 pub struct Progress<'a> {
     /// Iterations done.

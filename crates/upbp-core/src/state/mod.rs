@@ -18,8 +18,7 @@ use upbp_estimators::Counters;
 
 use crate::error::{OutputError, StateError};
 use crate::files::{open_file, write_whole};
-use crate::film::Film;
-use crate::film::MAX_ITERATIONS;
+use crate::film::{Film, Image, MAX_ITERATIONS};
 
 pub(crate) use format::fingerprint;
 
@@ -54,6 +53,19 @@ impl State {
     #[must_use]
     pub fn seconds(&self) -> PassSeconds {
         self.record.times.seconds()
+    }
+
+    /// The error of what is on the film against a reference; not a number if it has another size.
+    #[must_use]
+    pub fn error_against(&self, reference: &Image) -> ErrorPoint {
+        let image = self.film.image();
+        ErrorPoint {
+            seconds: self.seconds().total(),
+            iterations: self.film.iterations(),
+            relative_mse: image.relative_mse(reference),
+            over_scales: image.relative_mse_over_scales(reference),
+            rmse: image.rmse(reference),
+        }
     }
 
     /// Adds what another run of the same render has done. The result has the same bits in whatever order

@@ -64,7 +64,7 @@ impl PassTimes {
 pub struct ErrorPoint {
     /// Seconds of rendering, without evaluation of the error.
     pub seconds: f64,
-    /// Iterations done.
+    /// Whole iterations done.
     pub iterations: u64,
     /// Mean of `(x − r)² / (r² + 0.01)`.
     pub relative_mse: f64,
