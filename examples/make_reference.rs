@@ -151,7 +151,7 @@ struct Batches {
 impl Batches {
     fn render(scene: &ReadyScene, set: &Set, count: u32, options: &Options) -> Result<Self, Box<dyn Error>> {
         let Set { techniques, radius, .. } = *set;
-        let radii = Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius };
+        let radii = Radii::all(radius);
         let (mut images, mut iterations, mut seconds) = (Vec::new(), 0, 0.0);
         for batch in 0..u64::from(count) {
             let settings = Settings {

@@ -248,7 +248,7 @@ fn exponents(scenes: &[&str], seconds: f64) -> Result<(), Box<dyn Error>> {
                 let radius = Radius::Scene(EXPONENT_RADIUS / divisor);
                 let settings = Settings {
                     techniques: techniques.parse()?,
-                    radii: Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius },
+                    radii: Radii::all(radius),
                     progressive: false,
                     min_length: 2,
                     ..Settings::default()

@@ -11,7 +11,7 @@ fn settings(techniques: &str) -> Settings {
     let radius = Radius::Absolute(0.01);
     Settings {
         techniques: techniques.parse().expect("technique names"),
-        radii: Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius },
+        radii: Radii::all(radius),
         progressive: false,
         min_length: 2,
         light_paths: upbp_core::LightPaths::Count(2000),

@@ -24,7 +24,7 @@ pub(crate) fn prepare(
 }
 
 /// Renders each for some time and takes errors after iterations at geometric distances, and after the last
-/// one. Seconds are those of rendering, the pilot included; taking errors does not count.
+/// one. Seconds are those of rendering, the preparation included; taking errors does not count.
 ///
 /// They take turns: the speed of a machine that others use changes within seconds, and so it does for all of
 /// them alike.
@@ -48,14 +48,14 @@ struct Line<'a> {
     points: Vec<ErrorPoint>,
     /// The number of iterations at which the next error is taken.
     next: u64,
-    pilot: f64,
+    preparation: f64,
     done: bool,
 }
 
 impl<'a> Line<'a> {
     fn new(subject: &'a Subject, renderer: Renderer<'a>) -> Self {
-        let pilot = renderer.state().seconds().total();
-        Self { subject, renderer, points: Vec::new(), next: 1, pilot, done: false }
+        let preparation = renderer.state().seconds().total();
+        Self { subject, renderer, points: Vec::new(), next: 1, preparation, done: false }
     }
 
     /// Goes on until `until` seconds are taken, of `limit` in all.
@@ -64,7 +64,7 @@ impl<'a> Line<'a> {
             let seconds = self.renderer.state().seconds().total();
             let iterations = self.renderer.film().iterations();
             // As near to the limit as whole iterations come.
-            let one = (seconds - self.pilot) / iterations.max(1) as f64;
+            let one = (seconds - self.preparation) / iterations.max(1) as f64;
             self.done = iterations > 0 && seconds + 0.5 * one > limit;
             if iterations >= self.next || self.done {
                 self.points.push(self.renderer.state().error_against(&self.subject.reference));

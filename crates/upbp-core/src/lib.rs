@@ -32,9 +32,9 @@ pub use render::{Progress, Renderer, Start, StopReason};
 pub use report::Report;
 pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTechniques};
 pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};
-pub use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan};
+pub use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
 pub use upbp_estimators::{
-    BodyId, Counters, EmitterChoice, FootprintField, Interior, IterationPlan, Kernel, Kernels, Layer,
-    MediumId, MediumStack, MergePeriods, PathLengths, PerMerge, PrepareError, RAY_OFFSET, RadiusField, Ray,
-    Roulette, Spectrum, Technique, TechniqueSet, check, offset_origin, scene,
+    BodyId, Counters, EmissionGuide, EmitterChoice, FootprintField, Interior, IterationPlan, Kernel, Kernels,
+    Layer, MediumId, MediumStack, MergePeriods, PathLengths, PerMerge, PrepareError, RAY_OFFSET, RadiusField,
+    Ray, Roulette, Spectrum, Technique, TechniqueSet, UnknownTechnique, check, offset_origin, scene,
 };

@@ -6,7 +6,7 @@ use upbp_estimators::{Kernel, Kernels, RadiusField, Technique, TechniqueSet};
 /// The first radius of a kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Radius {
-    /// From a pilot: as many photons in a kernel as smooth well, within bounds relative to what the picture
+    /// From a few sub-paths: as many photons in a kernel as smooth well, within bounds relative to what the picture
     /// shows, and over the scene as the width of a pixel. All techniques have the same radius everywhere if
     /// one of them has another setting.
     #[default]
@@ -34,6 +34,12 @@ pub struct Radii {
 }
 
 impl Radii {
+    /// The same first radius of all techniques.
+    #[must_use]
+    pub const fn all(radius: Radius) -> Self {
+        Self { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius }
+    }
+
     /// Whether all that `techniques` use are [automatic](Radius::Auto).
     pub(crate) fn are_auto(&self, techniques: TechniqueSet) -> bool {
         [

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
-use upbp_estimators::{Counters, Technique};
+use upbp_estimators::{Counters, PerMerge, Technique};
 
 use crate::auto::technique_support::TechniqueSupport;
 use crate::film::{ErrorEstimate, IterationSet};
@@ -33,9 +33,9 @@ pub struct Report {
     pub deterministic: bool,
     /// Techniques, sample counts and first radii.
     pub plan: Plan,
-    /// Radii of the iteration with the largest index, where the scale of radii is one, scene units: `surf`,
-    /// `pp3d`, `pb2d`, `bp2d`, `bb1d`.
-    pub last_radii: [f32; 5],
+    /// Radii of the iteration with the largest index, where the scale of radii is one, scene units; 0 where a
+    /// technique is off.
+    pub last_radii: PerMerge<f32>,
     /// Counts over all iterations.
     pub counters: Counters,
     /// Part of the image's mean luminance that each layer holds.
@@ -79,13 +79,7 @@ impl Report {
             seconds: record.times.seconds(),
             deterministic: identity.settings.deterministic,
             plan: identity.plan,
-            last_radii: [
-                radii.surf.radius(),
-                radii.pp3d.radius(),
-                radii.pb2d.radius(),
-                radii.bp2d.radius(),
-                radii.bb1d.radius(),
-            ],
+            last_radii: radii.map(|kernel| kernel.radius()),
             counters: record.counters,
             shares: film.shares().into_iter().map(|(layer, share)| (layer.name(), share)).collect(),
             map_bytes: record.map_bytes,
@@ -106,10 +100,10 @@ impl fmt::Display for Report {
         let s = &self.seconds;
         writeln!(
             f,
-            "{width} x {height}, {} iterations in {:.1} s (pilot {:.1}, light {:.1}, build {:.1}, camera {:.1}, film {:.1})",
+            "{width} x {height}, {} iterations in {:.1} s (preparation {:.1}, light {:.1}, build {:.1}, camera {:.1}, film {:.1})",
             self.iterations,
             s.total(),
-            s.pilot,
+            s.preparation,
             s.light,
             s.build,
             s.camera,

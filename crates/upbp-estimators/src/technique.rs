@@ -117,6 +117,18 @@ impl<T> PerMerge<T> {
         }
     }
 
+    /// A function of each value.
+    #[must_use]
+    pub fn map<U>(self, mut function: impl FnMut(T) -> U) -> PerMerge<U> {
+        PerMerge {
+            surf: function(self.surf),
+            pp3d: function(self.pp3d),
+            pb2d: function(self.pb2d),
+            bp2d: function(self.bp2d),
+            bb1d: function(self.bb1d),
+        }
+    }
+
     /// The value of a technique; `None` if it merges nothing.
     #[inline]
     #[must_use]

@@ -23,7 +23,7 @@ pub use self::homogeneous::Homogeneous;
 pub use self::lane_values::LaneValues;
 pub use self::lanes::{Lanes, lane_probabilities};
 pub use self::medium::Medium;
-pub use self::medium_stack::{BodyId, Crossing, Interior, MediumId, MediumStack};
+pub use self::medium_stack::{BodyId, Crossed, Interior, MediumId, MediumStack};
 pub use self::phase::{
     Asymmetry, Blend, Draine, PerChannel, PhaseFunction, PhaseSample, PhaseValue, Tabulated,
 };

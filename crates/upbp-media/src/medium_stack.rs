@@ -31,7 +31,7 @@ pub struct Interior {
 /// The outcome of crossing a boundary.
 #[derive(Copy, Clone, Debug, PartialEq, Eq)]
 #[must_use]
-pub enum Crossing {
+pub enum Crossed {
     /// The stack has changed.
     Done,
     /// Entered a body that the point is already inside of: ignored.
@@ -165,9 +165,9 @@ impl MediumStack {
 
     /// Enters a body, above all others of at most its priority.
     #[inline]
-    pub fn enter(&mut self, interior: Interior) -> Crossing {
+    pub fn enter(&mut self, interior: Interior) -> Crossed {
         if self.contains(interior.body) {
-            return Crossing::AlreadyInside;
+            return Crossed::AlreadyInside;
         }
         let Interior { body, medium, priority, ior } = interior;
         let entry = Entry { body, filling: Filling::new(medium), priority, ior };
@@ -183,15 +183,15 @@ impl MediumStack {
             }
             self.many.insert(slot, entry);
         }
-        Crossing::Done
+        Crossed::Done
     }
 
     /// Leaves a body, wherever in the list it is.
     #[inline]
-    pub fn leave(&mut self, body: BodyId) -> Crossing {
+    pub fn leave(&mut self, body: BodyId) -> Crossed {
         let len = self.len();
         let Some(slot) = self.entries().iter().position(|entry| entry.body == body) else {
-            return Crossing::NotInside;
+            return Crossed::NotInside;
         };
         if len <= Self::FEW {
             self.bodies.copy_within(slot + 1..len, slot);
@@ -203,12 +203,12 @@ impl MediumStack {
                 self.many.clear();
             }
         }
-        Crossing::Done
+        Crossed::Done
     }
 
     /// Crosses the surface of a body, inwards if `entering`.
     #[inline]
-    pub fn cross(&mut self, interior: Interior, entering: bool) -> Crossing {
+    pub fn cross(&mut self, interior: Interior, entering: bool) -> Crossed {
         if entering { self.enter(interior) } else { self.leave(interior.body) }
     }
 }
@@ -269,9 +269,9 @@ mod tests {
     #[test]
     fn a_body_of_vacuum_hides_what_is_around_it() {
         let mut stack = MediumStack::new(Some(MediumId(7)));
-        assert_eq!(stack.enter(Interior { medium: None, ..interior(1, 0) }), Crossing::Done);
+        assert_eq!(stack.enter(Interior { medium: None, ..interior(1, 0) }), Crossed::Done);
         assert_eq!((stack.medium(), stack.ior()), (None, 2.0));
-        assert_eq!(stack.leave(BodyId(1)), Crossing::Done);
+        assert_eq!(stack.leave(BodyId(1)), Crossed::Done);
         assert_eq!(stack, MediumStack::new(Some(MediumId(7))));
     }
 
@@ -280,11 +280,11 @@ mod tests {
         let mut stack = MediumStack::new(None);
         for (body, priority, top) in [(1, 5, 1), (2, 3, 1), (3, 5, 3), (4, 5, 4), (5, i32::MIN, 4), (6, 9, 6)]
         {
-            assert_eq!(stack.cross(interior(body, priority), true), Crossing::Done);
+            assert_eq!(stack.cross(interior(body, priority), true), Crossed::Done);
             assert_eq!(stack.medium(), Some(MediumId(top)), "after entering {body}");
         }
         for (body, top) in [(4, 6), (6, 3), (3, 1), (1, 2), (2, 5)] {
-            assert_eq!(stack.cross(interior(body, 0), false), Crossing::Done);
+            assert_eq!(stack.cross(interior(body, 0), false), Crossed::Done);
             assert_eq!(stack.medium(), Some(MediumId(top)), "after leaving {body}");
         }
     }
@@ -292,12 +292,12 @@ mod tests {
     #[test]
     fn contradictions_are_reported_and_ignored() {
         let mut stack = MediumStack::new(None);
-        assert_eq!(stack.leave(BodyId(1)), Crossing::NotInside);
-        assert_eq!(stack.enter(interior(1, 0)), Crossing::Done);
+        assert_eq!(stack.leave(BodyId(1)), Crossed::NotInside);
+        assert_eq!(stack.enter(interior(1, 0)), Crossed::Done);
         // The second time even with another priority.
-        assert_eq!(stack.enter(interior(1, 3)), Crossing::AlreadyInside);
+        assert_eq!(stack.enter(interior(1, 3)), Crossed::AlreadyInside);
         assert_eq!((stack.len(), stack.priority()), (1, 0));
-        assert_eq!(stack.leave(BodyId(2)), Crossing::NotInside);
+        assert_eq!(stack.leave(BodyId(2)), Crossed::NotInside);
         assert_eq!(stack.len(), 1);
     }
 
@@ -305,10 +305,10 @@ mod tests {
     fn equality_does_not_see_bodies_that_were_left() {
         let (mut one, mut other) = (MediumStack::new(None), MediumStack::new(None));
         for body in [1, 2] {
-            assert_eq!(one.enter(interior(body, 0)), Crossing::Done);
+            assert_eq!(one.enter(interior(body, 0)), Crossed::Done);
         }
-        assert_eq!(one.leave(BodyId(2)), Crossing::Done);
-        assert_eq!(other.enter(interior(1, 0)), Crossing::Done);
+        assert_eq!(one.leave(BodyId(2)), Crossed::Done);
+        assert_eq!(other.enter(interior(1, 0)), Crossed::Done);
         assert_eq!(one, other);
         assert_ne!(one, MediumStack::new(None));
         assert_ne!(MediumStack::new(None), MediumStack::new(Some(MediumId(0))));
@@ -327,10 +327,10 @@ mod tests {
                 let interior = interior(body % bodies, priority);
                 let inside = history.iter().position(|other| other.body == interior.body);
                 let expected = match (entering, inside) {
-                    (true, Some(_)) => Crossing::AlreadyInside,
-                    (true, None) => { history.push(interior); Crossing::Done }
-                    (false, Some(index)) => { history.remove(index); Crossing::Done }
-                    (false, None) => Crossing::NotInside,
+                    (true, Some(_)) => Crossed::AlreadyInside,
+                    (true, None) => { history.push(interior); Crossed::Done }
+                    (false, Some(index)) => { history.remove(index); Crossed::Done }
+                    (false, None) => Crossed::NotInside,
                 };
                 prop_assert_eq!(stack.cross(interior, entering), expected);
                 // The last of the highest: `max_by_key` returns the last among equals.
@@ -348,10 +348,10 @@ mod tests {
         ) {
             let mut stack = MediumStack::new(None);
             for &body in &entering {
-                prop_assert_eq!(stack.enter(interior(body, 10 * body.cast_signed())), Crossing::Done);
+                prop_assert_eq!(stack.enter(interior(body, 10 * body.cast_signed())), Crossed::Done);
             }
             for &body in &leaving {
-                prop_assert_eq!(stack.leave(BodyId(body)), Crossing::Done);
+                prop_assert_eq!(stack.leave(BodyId(body)), Crossed::Done);
             }
             let left: Vec<_> = (0..10)
                 .filter(|body| !leaving.contains(body))

@@ -145,7 +145,7 @@ pub fn settings(techniques: &str, radius: Option<f64>) -> Settings {
     let radius = radius.map_or(Radius::Auto, |radius| Radius::Absolute(radius as f32));
     Settings {
         techniques: techniques.parse().expect("technique names"),
-        radii: Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius },
+        radii: Radii::all(radius),
         progressive: radius == Radius::Auto,
         // Thick slabs that hardly absorb have long paths.
         max_length: 1_000_000,

@@ -17,7 +17,7 @@ fn scene(parts: &str) -> ReadyScene {
 
 fn fixed_radii(radius: f32) -> Radii {
     let radius = Radius::Absolute(radius);
-    Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius }
+    Radii::all(radius)
 }
 
 /// Share of what is extinguished that is scattered.

@@ -108,7 +108,7 @@ fn unbiased(name: &str, folder: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/data/{data}/{name}.exr"));
     let expected = read_exr(&path).expect("a reference").mean().map(Estimate::exactly);
     let narrow = Radius::Scene(6e-4);
-    let radii = Radii { surf: narrow, pp3d: narrow, pb2d: narrow, bp2d: narrow, bb1d: narrow };
+    let radii = Radii::all(narrow);
     let mut plans = std::collections::BTreeSet::new();
     let means: Vec<[f64; 3]> = (0..SEEDS)
         .map(|seed| {

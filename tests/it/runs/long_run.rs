@@ -85,8 +85,7 @@ fn the_last_iterations_have_kernels_and_finite_pixels() {
         [("auto", Radius::Auto), ("tiny", Radius::Absolute(1e-30)), ("scene", Radius::Scene(1e-12))]
     {
         let mut renderer = renderer(&room, |settings| {
-            settings.radii =
-                upbp_core::Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius };
+            settings.radii = upbp_core::Radii::all(radius);
         });
         renderer.set_range(MAX_ITERATIONS - 20..u64::MAX);
         while renderer.iterate() {}

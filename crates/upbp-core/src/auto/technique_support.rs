@@ -24,7 +24,6 @@ pub struct TechniqueSupport {
     pub needs_merges: bool,
     /// Whether media emit in whose volume no light sub-path starts: that light is found by emission hits
     /// alone, where camera sub-paths pass.
-    #[serde(default)]
     pub emitting_media: bool,
     /// One sentence for each reason to leave something out.
     pub reasons: Vec<String>,

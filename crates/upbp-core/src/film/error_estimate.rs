@@ -61,8 +61,8 @@ pub struct ErrorEstimate {
     pub high: f64,
     /// The doubt for which there is no upper end.
     pub doubt: Option<Doubt>,
-    /// Weight of the tail of the pixels' errors: the exponent of a Pareto distribution inverted:
-    /// without a variance from 1/2 on, without a mean from 1 on.
+    /// Weight of the tail of the pixels' errors: one over the exponent of a Pareto distribution with such a
+    /// tail. From 1/2 on it has no variance, from 1 on no mean.
     pub tail_index: f64,
 }
 

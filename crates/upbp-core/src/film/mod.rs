@@ -151,7 +151,7 @@ impl Film {
         &self.iterations
     }
 
-    /// Iterations that are there in part, with the number of sets of pixels, of 256, that are.
+    /// Iterations of which only some of the 256 sets of pixels are there, with the number of these.
     #[must_use]
     pub const fn parts(&self) -> &BTreeMap<u64, u32> {
         &self.parts
@@ -276,7 +276,7 @@ impl Film {
         self.layers.iter().map(|(_, sums)| sums).chain([&self.even, even, odd, &self.squares]).chain(features)
     }
 
-    /// A film whose sums are going to be filled in row by row.
+    /// As [`all`](Self::all), to be filled in row by row.
     pub(crate) fn all_mut(&mut self) -> impl Iterator<Item = &mut Vec<Sum3>> {
         let [even, odd] = &mut self.seen;
         let others = [&mut self.even, even, odd, &mut self.squares];

@@ -76,7 +76,7 @@ pub(super) fn prepare<'a, S: Scene>(
         emitters: prepared.emitter_choice().clone(),
     };
     let record = Record {
-        times: PassTimes { pilot: begun.elapsed(), ..PassTimes::default() },
+        times: PassTimes { preparation: begun.elapsed(), ..PassTimes::default() },
         expected_bytes: choice.room.expected_bytes::<S>(&choice.plan, &choice.statistics),
         ..Record::default()
     };

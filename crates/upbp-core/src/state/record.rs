@@ -9,7 +9,7 @@ use upbp_estimators::Counters;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PassSeconds {
     /// The preparation, with its pilot renders.
-    pub pilot: f64,
+    pub preparation: f64,
     /// Light sub-paths.
     pub light: f64,
     /// Building look-up structures.
@@ -24,14 +24,14 @@ impl PassSeconds {
     /// All passes together.
     #[must_use]
     pub fn total(&self) -> f64 {
-        self.pilot + self.light + self.build + self.camera + self.film
+        self.preparation + self.light + self.build + self.camera + self.film
     }
 }
 
 /// Wall time of the passes, in whole nanoseconds: sums do not depend on the order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct PassTimes {
-    pub(crate) pilot: Duration,
+    pub(crate) preparation: Duration,
     pub(crate) light: Duration,
     pub(crate) build: Duration,
     pub(crate) camera: Duration,
@@ -41,7 +41,7 @@ pub(crate) struct PassTimes {
 impl PassTimes {
     pub(crate) fn add(&mut self, other: &Self) {
         let sum = |a: &mut Duration, b| *a = a.saturating_add(b);
-        sum(&mut self.pilot, other.pilot);
+        sum(&mut self.preparation, other.preparation);
         sum(&mut self.light, other.light);
         sum(&mut self.build, other.build);
         sum(&mut self.camera, other.camera);
@@ -50,7 +50,7 @@ impl PassTimes {
 
     pub(crate) fn seconds(&self) -> PassSeconds {
         PassSeconds {
-            pilot: self.pilot.as_secs_f64(),
+            preparation: self.preparation.as_secs_f64(),
             light: self.light.as_secs_f64(),
             build: self.build.as_secs_f64(),
             camera: self.camera.as_secs_f64(),

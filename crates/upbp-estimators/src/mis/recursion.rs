@@ -269,9 +269,9 @@ impl<L: Lanes> Edge<L> {
     }
 }
 
-/// Throughput of a beam at a point of it: `T/R` inside a short beam, `T` on a long one.
 impl BeamExtent {
-    /// The divisor of the transmittance: the probability that the beam gets there at all.
+    /// The divisor of the transmittance `T` in the throughput of a beam at a point of it: the probability `R`
+    /// that the beam gets there at all, if it is short.
     #[inline]
     #[must_use]
     pub const fn normalisation(self, pass_probability: f64) -> f64 {

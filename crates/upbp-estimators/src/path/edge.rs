@@ -359,7 +359,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             self.end.clone_from(&self.start);
         }
         let crossing = self.crossings[crossings - 1];
-        if self.end.cross(crossing.interior, crossing.entering) != upbp_media::Crossing::Done {
+        if self.end.cross(crossing.interior, crossing.entering) != upbp_media::Crossed::Done {
             self.conflicts += 1;
         }
         // An invisible boundary between two parts of the same medium changes nothing, not even a density.

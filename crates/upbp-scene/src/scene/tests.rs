@@ -186,7 +186,7 @@ fn coincident_boundaries_are_all_found() {
     assert_eq!(connection, crossings);
     let mut stack = scene.stack_at(ALONG_X.origin);
     for crossing in crossings {
-        assert_eq!(stack.cross(crossing.interior, crossing.entering), upbp_media::Crossing::Done);
+        assert_eq!(stack.cross(crossing.interior, crossing.entering), upbp_media::Crossed::Done);
     }
     assert!(stack.is_empty());
 }
@@ -281,7 +281,7 @@ fn refracting_surfaces_that_coincide_are_one_hit() {
         assert!(scene.is_clear(&ray.with_range(0.0, 0.6), &mut connection));
         assert_eq!(connection.iter().map(|crossing| crossing.t).collect::<Vec<_>>(), [0.5, 0.5]);
         for crossing in connection {
-            assert_eq!(stack.cross(crossing.interior, crossing.entering), upbp_media::Crossing::Done);
+            assert_eq!(stack.cross(crossing.interior, crossing.entering), upbp_media::Crossed::Done);
         }
         assert_eq!(stack, scene.stack_at(ray.at(0.6)));
     }

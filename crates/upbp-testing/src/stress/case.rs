@@ -195,7 +195,7 @@ impl Axes {
             light_paths: LightPaths::Count(512),
             beams: Some(64),
             max_length: self.max_length,
-            radii: Radii { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius },
+            radii: Radii::all(radius),
             progressive: self.radius.is_none(),
             photon_beams: if self.long_photon_beams {
                 upbp_core::BeamExtent::Long
