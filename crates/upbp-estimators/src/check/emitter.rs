@@ -7,14 +7,24 @@ use glam::Vec3;
 use super::{Check, DRAWS, Random, direction, is_density, is_light, is_unit, require, same, same_spectrum};
 use crate::scene::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint};
 
-/// Checks the contract of [`Emitter`] for receivers at the given points, of which a light that shines
-/// should reach at least one.
+/// Checks the contract of [`Emitter`] in a scene with these bounds, for receivers at the given points, of
+/// which a light that shines should reach at least one.
 pub fn check_emitter(emitter: &impl Emitter, bounds: &BoundingSphere, receivers: &[Vec3]) -> Check {
     let power = emitter.power(bounds);
     require(power.is_finite() && power >= 0.0, "power is finite and not negative", power)?;
     let place = emitter.bounds(bounds);
     let is_place = place.is_none_or(|place| place.is_valid() && !emitter.kind().is_infinite());
     require(is_place, "bounds are finite and ascending, with a unit axis, and of a finite light", place)?;
+    check_densities(emitter, bounds, receivers)?;
+    if emitter.kind().is_infinite() {
+        // As when light sub-paths start around a point that matters.
+        let centre = bounds.centre + 0.5 * bounds.radius * Vec3::X;
+        check_densities(emitter, &BoundingSphere { centre, radius: 1.5 * bounds.radius }, receivers)?;
+    }
+    Ok(())
+}
+
+fn check_densities(emitter: &impl Emitter, bounds: &BoundingSphere, receivers: &[Vec3]) -> Check {
     let mut random = Random(7);
     for _ in 0..2000 {
         check_emission(emitter, bounds, &mut random)?;

@@ -182,16 +182,20 @@ impl EmitterBounds {
 /// A light.
 ///
 /// Emitters are chosen by [`power`](Self::power), by [`bounds`](Self::bounds) and by what small runs find
-/// that they bring; the walks multiply that probability in. The
-/// radiance of an emitter that is given here and the one that [`hit`](Self::hit) returns must be the same
-/// function.
+/// that they bring; the walks multiply that probability in. The radiance of an emitter that is given here and
+/// the one that [`hit`](Self::hit) returns must be the same function.
+///
+/// `sphere` is what light from infinity starts in front of: it holds the scene, and is
+/// [its bounds](super::Scene::bounds) or a larger one around a point that matters to the picture. Within a
+/// render it may change, so that nothing is to be remembered of it.
 pub trait Emitter: Send + Sync {
     /// The kind of the light.
     fn kind(&self) -> EmitterKind;
 
     /// Power in W (any common factor may be left out): how often the emitter is chosen. For infinite
-    /// emitters the power that falls on the disc `π radius²`. Finite, not negative; zero is never chosen.
-    fn power(&self, bounds: &BoundingSphere) -> f32;
+    /// emitters the power that falls on the disc `π radius²` of the bounds of the scene. Finite, not
+    /// negative; zero is never chosen.
+    fn power(&self, scene: &BoundingSphere) -> f32;
 
     /// Place of the emitter, and which way it shines. The default is an emitter of which that is unknown, or
     /// that is infinitely far away: all receivers then choose it equally often, unless it turns out where it
@@ -204,20 +208,20 @@ pub trait Emitter: Send + Sync {
     /// Starts a light sub-path. The four random numbers are uniform in `[0, 1)`.
     fn sample_emission(
         &self,
-        bounds: &BoundingSphere,
+        sphere: &BoundingSphere,
         u_position: [f32; 2],
         u_direction: [f32; 2],
     ) -> Option<Emission>;
 
     /// Chooses a point of the emitter for next event estimation at `receiver`.
-    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident>;
+    fn sample_incident(&self, sphere: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident>;
 
     /// Radiance and densities for a path from `point` (on a surface that carries this emitter, or in its
     /// volume; for an environment only `direction` counts) in `direction`, the direction of the light, to
     /// `receiver`. `None` for lights that cannot be hit, and on a side that does not shine.
     fn hit(
         &self,
-        bounds: &BoundingSphere,
+        sphere: &BoundingSphere,
         point: &EmitterPoint,
         direction: Vec3,
         receiver: Vec3,
@@ -242,12 +246,12 @@ pub trait Emitter: Send + Sync {
     /// except that there are none for a ray that the emitter cannot start.
     fn emission_coordinates(
         &self,
-        bounds: &BoundingSphere,
+        sphere: &BoundingSphere,
         point: &EmitterPoint,
         direction: Vec3,
         on_ray: Vec3,
     ) -> Option<EmissionCoordinates> {
-        let _ = (bounds, point, direction, on_ray);
+        let _ = (sphere, point, direction, on_ray);
         None
     }
 
@@ -256,13 +260,13 @@ pub trait Emitter: Send + Sync {
     /// not depend on the receiver, so that it equals `pdf_position`.
     fn pdf_incident(
         &self,
-        bounds: &BoundingSphere,
+        sphere: &BoundingSphere,
         point: &EmitterPoint,
         direction: Vec3,
         receiver: Vec3,
         pdf_position: f32,
     ) -> f32 {
-        let _ = (bounds, point, direction, receiver);
+        let _ = (sphere, point, direction, receiver);
         pdf_position
     }
 }
