@@ -69,7 +69,7 @@ pub(super) fn prepare<'a, S: Scene>(
         scene: String::new(),
         fingerprint: String::new(),
         film: scene.camera().resolution(),
-        part: (rect.x, rect.y, rect.width, rect.height),
+        part: rect,
         settings: settings.into_inner(),
         support: choice.support,
         plan: choice.plan,

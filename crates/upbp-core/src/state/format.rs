@@ -30,7 +30,7 @@ use crate::film::{IterationSet, MAX_ITERATIONS};
 const MAGIC: [u8; 8] = *b"UPBPSTAT";
 
 /// Version of the format.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// The longest header, bytes: room for millions of emitters to choose from, and of ranges of iterations.
 const MAX_HEADER: u64 = 1 << 28;
@@ -104,7 +104,7 @@ impl State {
         let mut checksum = Checksum::new();
         write_block(&mut to, &mut checksum, text.as_bytes())?;
         let mut bytes = Vec::new();
-        for row in 0..self.identity.rect().height as usize {
+        for row in 0..self.identity.part.height as usize {
             self.film.encode_row(row, &mut bytes);
             write_block(&mut to, &mut checksum, &bytes)?;
         }
@@ -131,7 +131,7 @@ impl State {
         let Header { identity, iterations, parts, record } =
             ron::from_str(text).map_err(|error| damaged("header", &error))?;
 
-        let rect = identity.rect();
+        let rect = identity.part;
         let inside = |start: u32, size: u32, whole: u32| {
             size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
         };

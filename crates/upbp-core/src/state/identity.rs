@@ -27,8 +27,8 @@ pub struct Identity {
     pub fingerprint: String,
     /// Width and height of the whole film in pixels.
     pub film: (u32, u32),
-    /// Column, row, width and height of the part that is rendered.
-    pub part: (u32, u32, u32, u32),
+    /// The part of it that is rendered.
+    pub part: PixelRect,
     /// Settings as they were given.
     pub settings: Settings,
     /// Techniques that the scene can use.
@@ -44,12 +44,6 @@ impl Identity {
     #[must_use]
     pub fn frozen_plan(&self) -> FrozenPlan {
         FrozenPlan { plan: self.plan, emitters: self.emitters.clone() }
-    }
-
-    /// The part of the film.
-    pub(crate) const fn rect(&self) -> PixelRect {
-        let (x, y, width, height) = self.part;
-        PixelRect { x, y, width, height }
     }
 
     /// Compares with the identity of another render. Settings count by their effect: how much memory is
@@ -91,7 +85,7 @@ impl Identity {
             memory: _,
         } = &self.settings;
         let (width, height) = self.film;
-        let (x, y, columns, rows) = self.part;
+        let PixelRect { x, y, width: columns, height: rows } = self.part;
         [
             ("version", self.version.clone()),
             ("scene", if self.fingerprint.is_empty() { "unnamed".into() } else { self.fingerprint.clone() }),
@@ -162,7 +156,7 @@ mod tests {
             scene: "room".into(),
             fingerprint: "ab".into(),
             film: (40, 30),
-            part: (0, 0, 40, 30),
+            part: PixelRect { x: 0, y: 0, width: 40, height: 30 },
             settings: Settings::default(),
             support: TechniqueSupport {
                 techniques: TechniqueSet::STANDARD,
@@ -191,7 +185,7 @@ mod tests {
             ("version", &|i| i.version = "1.2.4".into()),
             ("scene", &|i| i.fingerprint = "cd".into()),
             ("film", &|i| i.film.0 = 41),
-            ("crop", &|i| i.part.1 = 1),
+            ("crop", &|i| i.part.y = 1),
             ("seed", &|i| i.settings.seed = 1),
             ("min_length", &|i| i.settings.min_length = 2),
             ("max_length", &|i| i.settings.max_length = 100),

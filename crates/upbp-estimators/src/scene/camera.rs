@@ -1,6 +1,7 @@
 //! The camera and its film.
 
 use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// A ray of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +41,7 @@ pub struct LensConnection {
 }
 
 /// A rectangle of pixels, `[x, x + width) × [y, y + height)`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PixelRect {
     /// First column.
     pub x: u32,
