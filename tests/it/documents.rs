@@ -1,5 +1,5 @@
 //! The documents: links lead somewhere; sections, tests and names that they cite exist; the scene and the
-//! host of the README work.
+//! host of the README work, and so do the files of settings.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -203,6 +203,34 @@ fn names_in_documents_exist() {
     }
     assert!(names > 40, "{names} names");
     assert!(missing.is_empty(), "{missing:#?}");
+}
+
+/// The files of settings that `docs/settings.md` shows, read as `--settings` reads them.
+#[test]
+fn the_page_of_settings_names_every_field() {
+    let page = fs::read_to_string(root().join("docs/settings.md")).unwrap();
+    let fields = |settings: &Settings| serde_json::to_value(settings).unwrap().as_object().unwrap().clone();
+    let default = fields(&Settings::default());
+    let mut complete = Vec::new();
+    for block in page.split("```ron\n").skip(1) {
+        let text = block.split_once("```").unwrap().0;
+        let settings = Settings::from_ron(text).unwrap_or_else(|error| panic!("{error} of\n{text}"));
+        let found = fields(&settings);
+        settings.validate().unwrap();
+        if default.keys().all(|name| text.contains(&format!("\n    {name}: "))) {
+            complete.push(found);
+        }
+    }
+    let [defaults, others]: [_; 2] =
+        complete.try_into().expect("a file of defaults, and one of other values");
+    assert_eq!(defaults, default);
+    for (name, value) in &default {
+        assert!(page.contains(&format!("\n| `{name}` | ")), "{name} has no row");
+        assert_ne!(&others[name], value, "{name}");
+    }
+    for technique in default["radii"].as_object().unwrap().keys() {
+        assert!(page.contains(&format!("{technique}: R")), "{technique}");
+    }
 }
 
 /// The first block of code in a language.

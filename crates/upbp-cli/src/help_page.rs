@@ -25,7 +25,11 @@ fn page() -> String {
         let name = command.get_name();
         let _ = writeln!(page, "| [`upbp {name}`](#upbp-{name}) | {} |", cell(text(command.get_about())));
     }
-    let _ = writeln!(page, "\n`upbp help COMMAND` prints what is below.");
+    let _ = writeln!(
+        page,
+        "\n`upbp help COMMAND` prints what is below.\n\
+         The file that `--settings` reads is described in [settings](settings.md)."
+    );
     page += &lists("##", program.get_after_help());
     let mut before = String::new();
     for command in commands {
