@@ -10,22 +10,19 @@
 
 use glam::Vec3;
 use upbp_estimators::mis::{ByTechnique, Densities};
-use upbp_estimators::observer::{
-    Completion, DynObserver, LightEnd, ObservedSample, ObservedVertex, Observer,
-};
+use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, LightChunk, LightVertex};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
-use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, StreamKind, Technique,
-    TechniqueSet, effective_samples,
+    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet,
+    effective_samples,
 };
 use upbp_media::Lanes;
 
 use super::full_plan::{full_plan, iteration_plan, plan_with};
 use super::guides::{self, Evidence, Starts};
 use super::memory_limit::Room;
-use super::parallel_walks::{PilotRun, in_pieces, pixel};
+use super::parallel_walks::{PilotRun, camera_path, in_pieces, light_path, pixel};
 use super::statistics::{self, PATHS_PER_BEAM_PATH};
 use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
@@ -246,11 +243,9 @@ fn measure<S: Scene, L: Lanes>(
     seen.emission.iter_mut().for_each(|(_, contribution)| contribution.pixel *= per_pixel);
 
     let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
-        let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
+        let (index, counters) = (u64::from(index), &mut Counters::default());
         let before = (seen.light, seen.emission.len(), seen.next_event.len());
-        let observer: &mut DynObserver<'_, S::Bsdf, ByTechnique> = seen;
-        let counters = &mut Counters::default();
-        trace_camera_path(&context, &map, kind, pixel(film, index), index, scratch, counters, observer);
+        camera_path(&context, &map, pixel(film, index), index, scratch, counters, seen);
         let pixel = seen.light - before.0;
         let emission = seen.emission[before.1..].iter_mut().map(|(_, contribution)| contribution);
         let next_events = seen.next_event[before.2..].iter_mut().map(|(.., contribution)| contribution);
@@ -307,11 +302,9 @@ fn light_sub_paths<S: Scene, L: Lanes>(
 ) -> Option<LightMap<S::Bsdf, ByTechnique, L>> {
     let plan = context.plan;
     let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
-    let kind = StreamKind::PilotLight;
     let pieces =
         in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_, ByTechnique, L>, Seen)| {
-            let observer: &mut DynObserver<'_, S::Bsdf, ByTechnique> = seen;
-            trace_light_path(context, kind, index, scratch, out, observer);
+            light_path(context, index, scratch, out, seen);
             true
         })?;
     let (mut vertices, mut beams) = (Vec::new(), Vec::new());

@@ -3,8 +3,12 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use upbp_estimators::path::Scratch;
-use upbp_estimators::scene::PixelRect;
+use upbp_estimators::mis::ByTechnique;
+use upbp_estimators::observer::DynObserver;
+use upbp_estimators::path::{Context, LightChunk, Scratch};
+use upbp_estimators::scene::{PixelRect, Scene};
+use upbp_estimators::trace::{trace_camera_path, trace_light_path};
+use upbp_estimators::{Counters, LightMap, StreamKind};
 use upbp_media::Lanes;
 
 use crate::deadline::Halt;
@@ -58,6 +62,34 @@ pub(super) fn in_pieces<B: Copy, L: Lanes, O: Default + Send>(
         Some(out)
     };
     pieces.into_par_iter().map_init(Scratch::default, piece).collect()
+}
+
+/// The observer of all pilots: their walks carry the densities of every technique, even where only places
+/// matter, so that they are compiled for one type of observers beside that of renders.
+pub(super) type PilotObserver<'a, B> = DynObserver<'a, B, ByTechnique>;
+
+/// Traces a camera sub-path of a pilot.
+pub(super) fn camera_path<S: Scene, L: Lanes>(
+    context: &Context<'_, S>,
+    map: &LightMap<S::Bsdf, ByTechnique, L>,
+    pixel: [u32; 2],
+    index: u64,
+    scratch: &mut Scratch<S::Bsdf, L>,
+    counters: &mut Counters,
+    observer: &mut PilotObserver<'_, S::Bsdf>,
+) {
+    trace_camera_path(context, map, StreamKind::PilotCamera, pixel, index, scratch, counters, observer);
+}
+
+/// Traces a light sub-path of a pilot.
+pub(super) fn light_path<S: Scene, L: Lanes>(
+    context: &Context<'_, S>,
+    index: u32,
+    scratch: &mut Scratch<S::Bsdf, L>,
+    out: &mut LightChunk<S::Bsdf, ByTechnique, L>,
+    observer: &mut PilotObserver<'_, S::Bsdf>,
+) {
+    trace_light_path(context, StreamKind::PilotLight, index, scratch, out, observer);
 }
 
 /// Steps of a sequence that fills the unit square evenly, from its beginning on (Roberts's R2).

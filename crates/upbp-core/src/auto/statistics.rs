@@ -2,18 +2,18 @@
 
 use glam::{Vec2, Vec3};
 use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
-use upbp_estimators::mis::{BeamExtent, Heuristic};
-use upbp_estimators::observer::{DynObserver, NoObserver, ObservedVertex, Observer};
+use upbp_estimators::mis::{BeamExtent, ByTechnique, Heuristic};
+use upbp_estimators::observer::{NoObserver, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, Interaction, LightChunk, LightVertex, PhotonBeam};
 use upbp_estimators::scene::{Camera, CameraRay, Scene};
-use upbp_estimators::trace::{trace_camera_path, trace_light_path};
+use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
     PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
 };
 use upbp_media::Lanes;
 
-use super::parallel_walks::{PIECE, PilotRun, in_pieces, pixel};
+use super::parallel_walks::{PIECE, PilotRun, camera_path, in_pieces, pixel};
 use super::photon_distances::{Nearest, Neighbours, median};
 use super::pixel_footprint::{self, FAR};
 use super::roulette::usual_roulette;
@@ -312,7 +312,7 @@ struct Queries {
 }
 
 impl<B> Observer<B> for Queries {
-    type Densities = f64;
+    type Densities = ByTechnique;
 
     fn camera_end(&mut self, _: Vec2, ray: &CameraRay) {
         self.last = ray.origin;
@@ -354,10 +354,8 @@ impl Queries {
         let crop = context.prepared.scene.camera().crop();
         let map = LightMap::<_, _, L>::empty();
         let pieces = in_pieces(paths, halt, |index, scratch, queries: &mut Self| {
-            let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
-            let observer: &mut DynObserver<'_, S::Bsdf> = queries;
-            let counters = &mut Counters::default();
-            trace_camera_path(context, &map, kind, pixel(crop, index), index, scratch, counters, observer);
+            let (index, counters) = (u64::from(index), &mut Counters::default());
+            camera_path(context, &map, pixel(crop, index), index, scratch, counters, queries);
             true
         })?;
         let mut queries = Self::default();

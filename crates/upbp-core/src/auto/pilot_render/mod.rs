@@ -13,15 +13,12 @@ use std::ops::Range;
 use upbp_estimators::mis::{self, Heuristic};
 use upbp_estimators::path::{Context, LightChunk, LightVertex, Splat};
 use upbp_estimators::scene::{Camera, Scene};
-use upbp_estimators::trace::{trace_camera_path, trace_light_path};
-use upbp_estimators::{
-    Counters, IterationPlan, LightMap, PreparedScene, StreamKind, Technique, TechniqueSet,
-};
+use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet};
 use upbp_media::Lanes;
 
 use super::full_plan::iteration_plan;
 use super::memory_limit;
-use super::parallel_walks::{PIECE, PilotRun, in_pieces};
+use super::parallel_walks::{PIECE, PilotRun, camera_path, in_pieces, light_path};
 use super::roulette;
 use crate::deadline::Halt;
 use crate::plan::Plan;
@@ -383,9 +380,7 @@ impl Pass {
         let pieces =
             in_pieces(paths, halt, |index, scratch, piece: &mut (Recorder, LightChunk<_, _, L>)| {
                 let (recorder, out) = piece;
-                let kind = StreamKind::PilotLight;
-                recorder
-                    .record(room, |recorder| trace_light_path(context, kind, index, scratch, out, recorder))
+                recorder.record(room, |recorder| light_path(context, index, scratch, out, recorder))
             })?;
         let mut pass = Self {
             light: Vec::new(),
@@ -418,13 +413,12 @@ impl Pass {
             LightMap::empty()
         };
         pass.points = map.photon_points();
-        let kind = StreamKind::PilotCamera;
         let pieces = in_pieces(grid.cells(), halt, |cell, scratch, piece: &mut (Recorder, Counters)| {
             let (recorder, counters) = piece;
             // Passes begin alike: what they differ in is what stratification leaves.
             let (pixel, index) = (grid.pixel(cell), u64::from(cell));
             recorder.record(room, |recorder| {
-                trace_camera_path(context, &map, kind, pixel, index, scratch, counters, recorder);
+                camera_path(context, &map, pixel, index, scratch, counters, recorder);
             })
         })?;
         for (recorder, counters) in pieces {
@@ -437,16 +431,7 @@ impl Pass {
                 let mut counters = Counters::default();
                 recorder.record(room, |recorder| {
                     if let Some((pixel, _)) = grid.partner(cell) {
-                        trace_camera_path(
-                            context,
-                            &map,
-                            kind,
-                            pixel,
-                            index,
-                            scratch,
-                            &mut counters,
-                            recorder,
-                        );
+                        camera_path(context, &map, pixel, index, scratch, &mut counters, recorder);
                     }
                 })
             })?;
