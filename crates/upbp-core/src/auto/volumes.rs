@@ -6,16 +6,14 @@
 //! compares the variance that the light of each volume has with that of hits alone, on the same sub-paths
 //! (`docs/theory.md`, section 6.12).
 
-use upbp_estimators::observer::{Completion, DynObserver, ObservedSample, Observer};
+use upbp_estimators::mis::ByTechnique;
+use upbp_estimators::observer::{Completion, ObservedSample, Observer};
 use upbp_estimators::path::Context;
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
-use upbp_estimators::trace::trace_camera_path;
-use upbp_estimators::{
-    Counters, IterationPlan, LightMap, PreparedScene, StreamKind, Technique, TechniqueSet,
-};
+use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet};
 
 use super::full_plan::{iteration_plan, plan_with};
-use super::parallel_walks::{PilotRun, in_pieces, pixel};
+use super::parallel_walks::{PilotRun, camera_path, in_pieces, pixel};
 use super::statistics::Statistics;
 use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
@@ -88,13 +86,11 @@ fn look<S: Scene>(
     let context = Context { prepared: scene, plan };
     let (width, height) = scene.scene.camera().resolution();
     let film = PixelRect { x: 0, y: 0, width, height };
-    let map = LightMap::<_, f64, f64>::empty();
+    let map = LightMap::<_, _, f64>::empty();
     let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut Vec<Seen>| {
         let mut seen = Seen::default();
-        let (kind, index) = (StreamKind::PilotCamera, u64::from(index));
-        let observer: &mut DynObserver<'_, S::Bsdf> = &mut seen;
-        let counters = &mut Counters::default();
-        trace_camera_path(&context, &map, kind, pixel(film, index), index, scratch, counters, observer);
+        let (index, counters) = (u64::from(index), &mut Counters::default());
+        camera_path(&context, &map, pixel(film, index), index, scratch, counters, &mut seen);
         piece.push(seen);
         true
     })?;
@@ -130,9 +126,9 @@ impl Seen {
 }
 
 impl<B> Observer<B> for Seen {
-    type Densities = f64;
+    type Densities = ByTechnique;
 
-    fn sample(&mut self, sample: &ObservedSample<B>) {
+    fn sample(&mut self, sample: &ObservedSample<B, ByTechnique>) {
         let (value, weight) = (f64::from(sample.value.mean()), sample.weight.value());
         self.all += value * weight;
         let (emitter, hit) = match sample.completion {
