@@ -6,6 +6,7 @@ mod error;
 mod files;
 mod film;
 mod output;
+mod parallel;
 mod plan;
 mod radius_schedule;
 mod render;

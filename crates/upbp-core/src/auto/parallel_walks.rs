@@ -1,8 +1,5 @@
 //! Sub-paths of pilots, traced in parallel with a result that does not depend on the number of threads.
 
-use std::ops::Range;
-
-use rayon::prelude::*;
 use upbp_estimators::mis::ByTechnique;
 use upbp_estimators::observer::DynObserver;
 use upbp_estimators::path::{Context, LightChunk, Scratch};
@@ -12,6 +9,7 @@ use upbp_estimators::{Counters, LightMap, StreamKind};
 use upbp_media::Lanes;
 
 use crate::deadline::Halt;
+use crate::parallel::do_all;
 
 /// Sub-paths per piece of work.
 pub(super) const PIECE: usize = 16;
@@ -50,18 +48,13 @@ pub(super) fn in_pieces<B: Copy, L: Lanes, O: Default + Send>(
     halt: &Halt<'_>,
     trace: impl Fn(u32, &mut Scratch<B, L>, &mut O) -> bool + Sync,
 ) -> Option<Vec<O>> {
-    let pieces: Vec<Range<u32>> =
-        (0..paths).step_by(PIECE).map(|first| first..first.saturating_add(PIECE as u32).min(paths)).collect();
-    let piece = |scratch: &mut Scratch<B, L>, paths: Range<u32>| {
-        let mut out = O::default();
-        for path in paths {
-            if halt.now() || !trace(path, scratch, &mut out) {
-                return None;
-            }
-        }
-        Some(out)
-    };
-    pieces.into_par_iter().map_init(Scratch::default, piece).collect()
+    let firsts = (0..paths).step_by(PIECE);
+    let mut outs: Vec<O> = firsts.clone().map(|_| O::default()).collect();
+    let done = do_all(firsts.zip(&mut outs), |scratch: &mut Scratch<B, L>, (first, out)| {
+        let mut piece = first..first.saturating_add(PIECE as u32).min(paths);
+        piece.all(|path| !halt.now() && trace(path, scratch, out))
+    });
+    done.then_some(outs)
 }
 
 /// The observer of all pilots: their walks carry the densities of every technique, even where only places

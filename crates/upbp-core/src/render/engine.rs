@@ -5,13 +5,12 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
 use upbp_estimators::path::Context;
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, StreamKind};
 use upbp_media::Lanes;
 
-use super::passes::{Buffers, Lists, add_splats, camera_pass, light_pass};
+use super::passes::{Buffers, Lists, add_splats, blacken, camera_pass, light_pass};
 use crate::auto;
 use crate::auto::memory_limit::LightCounts;
 use crate::auto::statistics::Statistics;
@@ -119,7 +118,7 @@ fn trace_light<S: Scene, L: Lanes>(
     let plan = context.plan;
     let mut times = PassTimes::default();
     let mut clock = Clock::start();
-    pixels.par_iter_mut().with_min_len(1024).for_each(|pixel| *pixel = Pixel::BLACK);
+    blacken(pixels);
     let stores = plan.stores_vertices() || plan.stores_beams();
     let expected = LightCounts::expected(statistics, plan.light_paths, plan.beam_paths);
     let expected = if stores { expected } else { LightCounts::default() };

@@ -3,7 +3,9 @@
 //! Work is cut into pieces of fixed size, and what pieces return is put together in their order: a reduction
 //! by work stealing would change the last bits with the schedule.
 
+use std::iter::repeat_with;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use upbp_estimators::observer::NoObserver;
@@ -17,6 +19,7 @@ use crate::auto::memory_limit::LightCounts;
 use crate::deadline::Halt;
 use crate::film::Pixel;
 use crate::film::pixel_sets::set_of;
+use crate::parallel::do_all;
 
 /// Most light sub-paths per piece of work.
 const LIGHT_CHUNK: u32 = 64;
@@ -77,18 +80,20 @@ pub(crate) fn light_pass<S: Scene, L: Lanes>(
     let _ = lists.beams.try_reserve_exact((1.05 * expected.beams) as usize);
     for start in (0..chunks).step_by(wave as usize) {
         let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
-        let trace = |scratch: &mut Scratch<S::Bsdf, L>,
-                     (i, out): (usize, &mut LightChunk<S::Bsdf, f64, L>)| {
-            let first = (start + i as u32) * chunk;
-            for index in first..first.saturating_add(chunk).min(paths) {
-                if halt.now() {
-                    return None;
+        let done =
+            do_all((start..chunks).zip(&mut *buffers), |scratch: &mut Scratch<S::Bsdf, L>, (piece, out)| {
+                let first = piece * chunk;
+                for index in first..first.saturating_add(chunk).min(paths) {
+                    if halt.now() {
+                        return false;
+                    }
+                    trace_light_path(context, kind, index, scratch, out, &mut NoObserver);
                 }
-                trace_light_path(context, kind, index, scratch, out, &mut NoObserver);
-            }
-            Some(())
-        };
-        buffers.par_iter_mut().enumerate().map_init(Scratch::default, trace).collect::<Option<()>>()?;
+                true
+            });
+        if !done {
+            return None;
+        }
         for out in buffers {
             lists.vertices.append(&mut out.vertices);
             lists.beams.append(&mut out.beams);
@@ -108,9 +113,6 @@ pub(crate) struct Buffers<'b> {
     pub(crate) features: &'b mut [Features],
 }
 
-/// The number of a chunk, its pixels, and their features if they are kept.
-type CameraChunk<'a> = (usize, (&'a mut [Pixel], &'a mut [Features]));
-
 /// Traces one camera sub-path for each pixel of `rect` that belongs to one of `sets`, and adds it to
 /// the buffers. `None` if it was halted: then the pixels of these sets mean nothing.
 pub(crate) fn camera_pass<S: Scene, L: Lanes>(
@@ -123,9 +125,11 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
 ) -> Option<Counters> {
     let width = rect.width as usize;
     // None of them if there is no room for any.
-    let mut chunks: Vec<_> = features.chunks_mut(CAMERA_CHUNK).collect();
-    chunks.resize_with(pixels.len().div_ceil(CAMERA_CHUNK), Default::default);
-    let trace = |scratch: &mut Scratch<S::Bsdf, L>, (chunk, (pixels, features)): CameraChunk<'_>| {
+    let features = features.chunks_mut(CAMERA_CHUNK).chain(repeat_with(Default::default));
+    let chunks = pixels.chunks_mut(CAMERA_CHUNK).zip(features).enumerate();
+    // Integers: the same in whatever order they are added.
+    let sum = Mutex::new(Counters::default());
+    let done = do_all(chunks, |scratch: &mut Scratch<S::Bsdf, L>, (chunk, (pixels, features))| {
         let mut counters = Counters::default();
         for (i, pixel) in pixels.iter_mut().enumerate() {
             let place = chunk * CAMERA_CHUNK + i;
@@ -134,7 +138,7 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
                 continue;
             }
             if halt.now() {
-                return None;
+                return false;
             }
             let place = [rect.x + column as u32, rect.y + row as u32];
             let (kind, index, counters) = (StreamKind::Camera, pixel_index(place), &mut counters);
@@ -148,15 +152,15 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
                 *own = walk.features;
             }
         }
-        Some(counters)
-    };
-    let chunks =
-        pixels.par_chunks_mut(CAMERA_CHUNK).zip(chunks).enumerate().map_init(Scratch::default, trace);
-    // Integers: the same in whatever order they are added.
-    chunks.try_reduce(Counters::default, |mut sum, counters| {
-        sum.add(&counters);
-        Some(sum)
-    })
+        sum.lock().unwrap_or_else(PoisonError::into_inner).add(&counters);
+        true
+    });
+    done.then(|| sum.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// Makes pixels black.
+pub(crate) fn blacken(pixels: &mut [Pixel]) {
+    pixels.par_iter_mut().with_min_len(1024).for_each(|pixel| *pixel = Pixel::BLACK);
 }
 
 /// Adds splats of light tracing, in their order.

@@ -1,0 +1,72 @@
+//! Pieces of work on all threads of the current pool.
+//!
+//! Iterators of rayon would be compiled for each kind of piece, thus for each type of scene, where they were
+//! a fifth of all that the compiler was given. What is compiled here for each of them is a loop.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// Does `pieces` of work on all threads; each thread takes the next one when it is done with its last, and
+/// has a scratch of its own. Whether all were done: none is begun after one that has returned `false`.
+///
+/// What pieces leave has to be put in their order: which thread does which is a matter of chance.
+pub(crate) fn do_all<T, S: Default>(
+    pieces: impl Iterator<Item = T> + Send,
+    work: impl Fn(&mut S, T) -> bool + Sync,
+) -> bool {
+    let (pieces, is_halted) = (Mutex::new(pieces), AtomicBool::new(false));
+    let next = || pieces.lock().unwrap_or_else(PoisonError::into_inner).next();
+    on_all_threads(&|| {
+        let mut scratch = S::default();
+        while !is_halted.load(Ordering::Relaxed)
+            && let Some(piece) = next()
+        {
+            if !work(&mut scratch, piece) {
+                is_halted.store(true, Ordering::Relaxed);
+            }
+        }
+    });
+    !is_halted.into_inner()
+}
+
+/// Runs the same on each thread of the pool that is free.
+fn on_all_threads(run: &(dyn Fn() + Sync)) {
+    rayon::scope(|scope| {
+        for _ in 0..rayon::current_num_threads() {
+            scope.spawn(|_| run());
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_piece_is_done_once() {
+        for threads in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut counts = vec![0; 1000];
+            let done = pool.install(|| {
+                do_all(counts.iter_mut().enumerate(), |before: &mut usize, (index, count)| {
+                    *count += 1;
+                    *before <= std::mem::replace(before, index + 1)
+                })
+            });
+            assert!(done && counts.iter().all(|count| *count == 1));
+        }
+    }
+
+    #[test]
+    fn none_is_begun_after_one_that_broke_off() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let mut counts = vec![0; 100];
+        let done = pool.install(|| {
+            do_all(counts.iter_mut().enumerate(), |(): &mut (), (index, count)| {
+                *count += 1;
+                index < 30
+            })
+        });
+        assert!(!done && counts.iter().sum::<i32>() == 31);
+    }
+}
