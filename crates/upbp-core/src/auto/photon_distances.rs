@@ -32,6 +32,9 @@ impl Neighbours {
     }
 }
 
+/// Visits the distances of elements within a radius of a query.
+type Around<'a, Q> = &'a (dyn Fn(&Q, f32, &mut dyn FnMut(f32)) + Sync);
+
 /// Looks for neighbours.
 #[derive(Clone, Copy)]
 pub(crate) struct Nearest {
@@ -49,7 +52,7 @@ impl Nearest {
         queries: &[Q],
         count: usize,
         dimension: f64,
-        around: impl Fn(&Q, f32, &mut dyn FnMut(f32)) + Sync,
+        around: Around<'_, Q>,
     ) -> Option<Neighbours> {
         // Enough elements that the rank-th is still near.
         let rank = RANK.min(count / 4).max(1);
@@ -92,7 +95,7 @@ mod tests {
 
     /// The distances of elements on a line, in no order.
     fn found(queries: &[f32], elements: &[f32]) -> Option<Neighbours> {
-        Nearest { paths: 10.0, scale: 0.1 }.of(queries, elements.len(), 1.0, |query, radius, visit| {
+        Nearest { paths: 10.0, scale: 0.1 }.of(queries, elements.len(), 1.0, &|query, radius, visit| {
             elements.iter().map(|x| (x - query).abs()).filter(|d| *d < radius).for_each(visit);
         })
     }

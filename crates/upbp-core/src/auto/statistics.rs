@@ -1,10 +1,10 @@
 //! Statistics of light and camera sub-paths, from which radii, counts and memory follow.
 
 use glam::{Vec2, Vec3};
-use upbp_accel::{PointTree, Ray, SegmentTree, SplitParams};
+use upbp_accel::{PointTree, Ray, Segment, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Heuristic};
 use upbp_estimators::observer::{NoObserver, ObservedVertex, Observer};
-use upbp_estimators::path::{Context, Interaction, LightChunk, LightVertex, PhotonBeam};
+use upbp_estimators::path::{Context, Interaction, LightChunk};
 use upbp_estimators::scene::{Camera, CameraRay, Scene};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
@@ -97,7 +97,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
         let light_paths = (part * f64::from(light_paths)).ceil() as u32;
         let camera_paths = (part * f64::from(CAMERA_PATHS)).ceil() as u32;
         let plan = |paths| nominal_plan(scene, settings, techniques, lanes, paths);
-        let light = LightPaths::<_, L>::trace(scene, plan, light_paths, halt)?;
+        let light = LightPaths::trace::<_, L>(scene, plan, light_paths, halt)?;
         let plan = plan(light.paths);
         let queries = Queries::trace::<_, L>(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?;
         let field = if settings.radii.are_auto(techniques) {
@@ -149,18 +149,26 @@ fn nominal_plan<S: Scene>(
     IterationPlan::new(scene.scene, &choices)
 }
 
-/// Light sub-paths with all that they store.
-struct LightPaths<B, L: Lanes> {
+/// A light vertex, as far as distances depend on it.
+struct Photon {
+    position: Vec3,
+    path: u32,
+    in_medium: bool,
+}
+
+/// Light sub-paths with the places of all that they store. Without the types of scenes, so that what follows
+/// from them is compiled once.
+struct LightPaths {
     paths: u32,
-    vertices: Vec<LightVertex<B, f64, L>>,
-    beams: Vec<PhotonBeam<f64, L>>,
+    photons: Vec<Photon>,
+    beams: Vec<Segment>,
     /// Wall seconds per light sub-path.
     seconds: f64,
 }
 
-impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
+impl LightPaths {
     /// Traces one, then a few, then at most `most` if their vertices are not [enough](ENOUGH_VERTICES).
-    fn trace<S: Scene<Bsdf = B>>(
+    fn trace<S: Scene, L: Lanes>(
         scene: &PreparedScene<'_, S>,
         plan: impl Fn(u32) -> IterationPlan,
         most: u32,
@@ -170,23 +178,27 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
             let mut clock = Clock::start();
             let plan = plan(paths);
             let context = Context { prepared: scene, plan: &plan };
-            let pieces = in_pieces(paths, halt, |index, scratch, out: &mut LightChunk<B, f64, L>| {
+            let pieces = in_pieces(paths, halt, |index, scratch, out: &mut LightChunk<_, f64, L>| {
                 trace_light_path(&context, StreamKind::PilotLight, index, scratch, out, &mut NoObserver);
                 true
             })?;
-            let (mut vertices, mut beams) = (Vec::new(), Vec::new());
+            let (mut photons, mut beams) = (Vec::new(), Vec::new());
             for out in pieces {
-                vertices.extend(out.vertices);
-                beams.extend(out.beams);
+                photons.extend(out.vertices.iter().map(|vertex| Photon {
+                    position: vertex.position,
+                    path: vertex.path,
+                    in_medium: matches!(vertex.interaction, Interaction::Medium(_)),
+                }));
+                beams.extend(out.beams.iter().map(|beam| beam.segment));
             }
-            Some(Self { paths, vertices, beams, seconds: clock.lap().as_secs_f64() / f64::from(paths) })
+            Some(Self { paths, photons, beams, seconds: clock.lap().as_secs_f64() / f64::from(paths) })
         };
         let mut found = trace(1)?;
         // Walks that hardly ever end would fill all memory.
         for (paths, vertices) in
             [(PIECE as u32, MOST_VERTICES), (FEW_LIGHT_PATHS, MOST_VERTICES), (LIGHT_PATHS, ENOUGH_VERTICES)]
         {
-            let enough = vertices / found.vertices.len().max(1) as f64 * f64::from(found.paths);
+            let enough = vertices / found.photons.len().max(1) as f64 * f64::from(found.paths);
             let paths = (enough as u32).min(paths).min(most);
             if paths > found.paths {
                 found = trace(paths)?;
@@ -203,16 +215,14 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
         scale: f32,
     ) -> Statistics {
         let (paths, beam_paths) = (f64::from(self.paths), f64::from(plan.beam_paths));
-        let on_surfaces = |interaction: &Interaction<B>| matches!(interaction, Interaction::Surface(_));
-        let in_media = |interaction: &Interaction<B>| matches!(interaction, Interaction::Medium(_));
-        let per_path = |queried: bool, keep: &dyn Fn(&Interaction<B>) -> bool| {
-            let count = self.vertices.iter().filter(|vertex| keep(&vertex.interaction)).count();
+        let per_path = |queried: bool, in_medium: bool| {
+            let count = self.photons.iter().filter(|photon| photon.in_medium == in_medium).count();
             if queried { count as f64 / paths } else { 0.0 }
         };
-        let (near, near_paths) = first_paths(&self.vertices, paths);
-        let (surface, medium) = (photons(near, on_surfaces), photons(near, in_media));
+        let (near, near_paths) = first_paths(&self.photons, paths);
+        let [surface, medium] = [false, true].map(|in_medium| tree(near, in_medium));
         // Split in any case: so memory is enough whether or not the beams of an iteration are.
-        let segments = self.beams.iter().map(|beam| (beam.segment, ())).collect();
+        let segments = self.beams.iter().map(|segment| (*segment, ())).collect();
         let beams = SegmentTree::build(segments, SplitParams::default());
         let near = Nearest { paths: near_paths, scale };
         let near_beams = Nearest { paths: beam_paths, scale };
@@ -223,35 +233,35 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
         Statistics {
             lanes: None,
             light_path_seconds: self.seconds,
-            vertices_per_path: self.vertices.len() as f64 / paths,
+            vertices_per_path: self.photons.len() as f64 / paths,
             footprint: median(&mut queries.footprints).unwrap_or(0.0),
             largest_coordinate: largest_coordinate(&queries.first),
             radius_field: field,
-            surface_per_path: per_path(plan.merges_by(Technique::Surf), &on_surfaces),
-            medium_per_path: per_path(plan.stores_medium_photons(), &in_media),
+            surface_per_path: per_path(plan.merges_by(Technique::Surf), false),
+            medium_per_path: per_path(plan.stores_medium_photons(), true),
             pieces_per_path: beams.pieces() as f64 / beam_paths,
             beams_per_path: self.beams.len() as f64 / beam_paths,
             surf: of(Technique::Surf, &|| {
-                near.of(&queries.surfaces, surface.len(), 2.0, |point, radius, found| {
+                near.of(&queries.surfaces, surface.len(), 2.0, &|point, radius, found| {
                     let scale = field.at(*point);
                     surface.in_ball(*point, scale * radius, |(), distance2| found(distance2.sqrt() / scale));
                 })
             }),
             pp3d: of(Technique::Pp3d, &|| {
-                near.of(&queries.media, medium.len(), 3.0, |point, radius, found| {
+                near.of(&queries.media, medium.len(), 3.0, &|point, radius, found| {
                     let scale = field.at(*point);
                     medium.in_ball(*point, scale * radius, |(), distance2| found(distance2.sqrt() / scale));
                 })
             }),
             pb2d: of(Technique::Pb2d, &|| {
-                near.of(&queries.edges, medium.len(), 2.0, |edge, radius, found| {
+                near.of(&queries.edges, medium.len(), 2.0, &|edge, radius, found| {
                     medium.around_ray(edge, field.search_radius(radius), |(), t, distance2| {
                         found(distance2.sqrt() / field.at(edge.at(t)));
                     });
                 })
             }),
             bp2d: of(Technique::Bp2d, &|| {
-                near_beams.of(&queries.media, self.beams.len(), 2.0, |point, radius, found| {
+                near_beams.of(&queries.media, self.beams.len(), 2.0, &|point, radius, found| {
                     let scale = field.at(*point);
                     beams.around_point(*point, scale * radius, |(), _, distance2| {
                         found(distance2.sqrt() / scale);
@@ -259,7 +269,7 @@ impl<B: Copy + Send + Sync, L: Lanes> LightPaths<B, L> {
                 })
             }),
             // Tells how many beams are enough, too.
-            bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, |edge, radius, found| {
+            bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, &|edge, radius, found| {
                 beams.around_ray(edge, field.search_radius(radius), |(), approach| {
                     found(approach.distance / field.at(edge.at(approach.t_ray)));
                 });
@@ -276,22 +286,18 @@ fn largest_coordinate(places: &[Vec3]) -> f32 {
     largest.get(((1.0 - FAR) * last as f32) as usize).copied().unwrap_or(0.0)
 }
 
-/// The vertices of the first light sub-paths, and how many sub-paths those are.
-fn first_paths<B, L: Lanes>(
-    vertices: &[LightVertex<B, f64, L>],
-    paths: f64,
-) -> (&[LightVertex<B, f64, L>], f64) {
-    match vertices.get(NEIGHBOURS) {
-        None => (vertices, paths),
-        Some(next) => (&vertices[..NEIGHBOURS], f64::from(next.path + 1)),
+/// The photons of the first light sub-paths, and how many sub-paths those are.
+fn first_paths(photons: &[Photon], paths: f64) -> (&[Photon], f64) {
+    match photons.get(NEIGHBOURS) {
+        None => (photons, paths),
+        Some(next) => (&photons[..NEIGHBOURS], f64::from(next.path + 1)),
     }
 }
 
-fn photons<B, L: Lanes>(
-    vertices: &[LightVertex<B, f64, L>],
-    keep: impl Fn(&Interaction<B>) -> bool,
-) -> PointTree<()> {
-    PointTree::build(vertices.iter().filter(|v| keep(&v.interaction)).map(|v| (v.position, ())).collect())
+/// The photons in media, or those on surfaces.
+fn tree(photons: &[Photon], in_medium: bool) -> PointTree<()> {
+    let chosen = photons.iter().filter(|photon| photon.in_medium == in_medium);
+    PointTree::build(chosen.map(|photon| (photon.position, ())).collect())
 }
 
 /// Queries that camera sub-paths make.
