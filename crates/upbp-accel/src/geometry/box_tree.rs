@@ -32,8 +32,8 @@ impl BoxTree {
             return Err(GeometryError::NonFiniteElement { what: "box", index });
         }
         let boxed: Vec<_> = boxes.iter().map(|&(min, max)| Boxed { min, max, kind: Kind::Box }).collect();
-        let block = |kind, members: &[u32]| Child::block(kind, members[0] as usize, 1);
-        Ok(Self { boxes, hierarchy: build(&boxed, Leaves::BOXES, block) })
+        let mut block = |kind, members: &[u32]| Child::block(kind, members[0] as usize, 1);
+        Ok(Self { boxes, hierarchy: build(&boxed, Leaves::BOXES, &mut block) })
     }
 
     /// Calls `visit` with the number of each box that `point` lies in, or on, in no particular but always the

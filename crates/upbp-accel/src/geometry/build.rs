@@ -62,12 +62,11 @@ impl Boxed {
     }
 }
 
-/// Builds over primitives; `pack` makes a block of some of a kind.
-pub(super) fn build(
-    boxes: &[Boxed],
-    leaves: Leaves,
-    mut pack: impl FnMut(Kind, &[u32]) -> Child,
-) -> Hierarchy {
+/// What makes a block of some primitives of a kind. Not a type parameter, so that the build is compiled once.
+type Pack<'a> = &'a mut dyn FnMut(Kind, &[u32]) -> Child;
+
+/// Builds over primitives.
+pub(super) fn build(boxes: &[Boxed], leaves: Leaves, pack: Pack<'_>) -> Hierarchy {
     if boxes.len() <= leaves.small {
         let all: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut roots = Vec::new();
@@ -287,14 +286,14 @@ fn half_area(aabb: &Aabb) -> f64 {
 }
 
 /// The wide hierarchy in the making.
-struct Collapse<'a, P> {
+struct Collapse<'a> {
     binary: Binary<'a>,
     choices: Vec<Choice>,
     nodes: Vec<Node>,
-    pack: P,
+    pack: Pack<'a>,
 }
 
-impl<P: FnMut(Kind, &[u32]) -> Child> Collapse<'_, P> {
+impl Collapse<'_> {
     /// Makes the wide hierarchy; returns its root.
     fn emit(&mut self) -> Child {
         let (mut waiting, mut below, mut children) = (Vec::new(), Vec::new(), Vec::new());

@@ -78,7 +78,7 @@ impl Instances {
         };
         let boxes: Vec<_> = copies.iter().map(boxed).collect();
         let hierarchy =
-            build(&boxes, Leaves::BOXES, |kind, members| Child::block(kind, members[0] as usize, 1));
+            build(&boxes, Leaves::BOXES, &mut |kind, members| Child::block(kind, members[0] as usize, 1));
         Ok(Self { hierarchy, copies, models })
     }
 
@@ -96,7 +96,7 @@ impl Model {
         let boxed = |triangle| Boxed::triangle(mesh.corners(triangle));
         let boxes: Vec<_> = (0..count).into_par_iter().with_min_len(1024).map(boxed).collect();
         let mut packing = Packing::default();
-        let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| packing.add(kind, members));
+        let hierarchy = build(&boxes, Leaves::PRIMITIVES, &mut |kind, members| packing.add(kind, members));
         let triangles = packing.pack(Kind::Triangle, |triangle| {
             // Each copy is a shape of its own.
             Some((Name { shape: u32::MAX, triangle }, mesh.corners(triangle)))

@@ -38,7 +38,7 @@ impl SceneGeometry {
         }
         let boxes: Vec<_> = names.par_iter().with_min_len(1024).map(|name| name.boxed(&shapes)).collect();
         let mut packing = Packing::default();
-        let hierarchy = build(&boxes, Leaves::PRIMITIVES, |kind, members| packing.add(kind, members));
+        let hierarchy = build(&boxes, Leaves::PRIMITIVES, &mut |kind, members| packing.add(kind, members));
         let primitives = Primitives::new(&shapes, &names, &packing);
         let each = shapes.iter().map(Shape::aabb);
         let bounds = each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((Vec3::ZERO, Vec3::ZERO));
