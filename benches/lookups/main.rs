@@ -338,7 +338,7 @@ fn ends(segment: &Segment) -> (Vec3, Vec3) {
 }
 
 /// The tree of beams, with the splits that the renderer chooses for thin kernels.
-fn beam_tree(segments: Vec<(Segment, u32)>) -> SegmentTree<u32> {
+fn beam_tree(segments: Vec<(Segment, u32)>) -> SegmentTree {
     let split = SplitParams::choose(&segments, 1e-3);
     SegmentTree::build(segments, split)
 }

@@ -2,8 +2,7 @@
 
 use std::hint::black_box;
 
-use glam::Vec3;
-use upbp_accel::{PointTree, SearchRadius, Segment, SegmentTree, SplitParams};
+use upbp_accel::{PointTree, SegmentTree, SplitParams};
 use upbp_media::Lanes;
 
 use crate::iteration::IterationPlan;
@@ -18,11 +17,11 @@ pub struct LightMap<B, D: Densities = f64, L: Lanes = f64> {
     /// All photon beams.
     pub beams: Vec<PhotonBeam<D, L>>,
     /// Surface photons; the payload is an index into `vertices`.
-    pub(crate) surface: PointTree<u32>,
+    pub(crate) surface: PointTree,
     /// Photons in media.
-    pub(crate) medium: PointTree<u32>,
+    pub(crate) medium: PointTree,
     /// Photon beams; the payload is an index into `beams`.
-    pub(crate) beam_tree: SegmentTree<u32>,
+    pub(crate) beam_tree: SegmentTree,
 }
 
 impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
@@ -35,7 +34,7 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
     ) -> Self {
         let photons = |on: bool, keep: fn(&Interaction<B>) -> bool| {
             let chosen = vertices.iter().enumerate().filter(|(_, v)| on && keep(&v.interaction));
-            point_tree(chosen.map(|(i, v)| (v.position, i as u32)).collect())
+            PointTree::build(chosen.map(|(i, v)| (v.position, i as u32)).collect())
         };
         let surface = photons(plan.merges_by(Technique::Surf), |interaction| {
             matches!(interaction, Interaction::Surface(_))
@@ -47,7 +46,8 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
         // A technique that does not run has a radius of zero.
         let radius = plan.kernels.bb1d.radius().max(plan.kernels.bp2d.radius());
         let radius = plan.radius_field.search_radius(radius);
-        let beam_tree = segment_tree(segments, radius);
+        let split = SplitParams::choose(&segments, radius);
+        let beam_tree = SegmentTree::build(segments, split);
         Self { vertices, beams, surface, medium, beam_tree }
     }
 
@@ -57,9 +57,9 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
         Self {
             vertices: Vec::new(),
             beams: Vec::new(),
-            surface: point_tree(Vec::new()),
-            medium: point_tree(Vec::new()),
-            beam_tree: segment_tree(Vec::new(), SearchRadius::Constant(0.0)),
+            surface: PointTree::build(Vec::new()),
+            medium: PointTree::build(Vec::new()),
+            beam_tree: SegmentTree::build(Vec::new(), SplitParams::default()),
         }
     }
 
@@ -87,15 +87,4 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
             + self.medium.memory_bytes()
             + self.beam_tree.memory_bytes()
     }
-}
-
-/// [`PointTree::build`], compiled here once rather than for each type of scene.
-fn point_tree(points: Vec<(Vec3, u32)>) -> PointTree<u32> {
-    PointTree::build(points)
-}
-
-/// [`SegmentTree::build`] for queries within `radius`, likewise.
-fn segment_tree(segments: Vec<(Segment, u32)>, radius: SearchRadius) -> SegmentTree<u32> {
-    let split = SplitParams::choose(&segments, radius);
-    SegmentTree::build(segments, split)
 }

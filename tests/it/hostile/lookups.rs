@@ -62,17 +62,17 @@ proptest! {
     #[test]
     fn points(points in crowd(vector()), ray in ray(), radius in number()) {
         let finite = points.iter().filter(|p| p.is_finite()).count();
-        let tree = PointTree::build(points.iter().enumerate().map(|(i, p)| (*p, i)).collect());
+        let tree = PointTree::build(points.iter().copied().zip(0..).collect());
         prop_assert_eq!(tree.len(), finite);
         let mut found = vec![0; points.len()];
         tree.in_ball(ray.origin, radius, |index, distance2| {
-            found[index] += 1;
+            found[index as usize] += 1;
             assert!(distance2 >= 0.0 && distance2 < radius * radius, "{distance2} {radius}");
         });
         prop_assert!(found.iter().all(|count| *count <= 1));
         let mut found = vec![0; points.len()];
         tree.around_ray(&ray, radius, |index, t, distance2| {
-            found[index] += 1;
+            found[index as usize] += 1;
             assert!(t >= ray.t_min && t < ray.t_max && distance2 >= 0.0, "{t} {distance2}");
         });
         prop_assert!(found.iter().all(|count| *count <= 1));
@@ -80,13 +80,13 @@ proptest! {
 
     #[test]
     fn segments(segments in crowd(segment()), ray in ray(), radius in number()) {
-        let all = segments.iter().enumerate().map(|(i, s)| (*s, i)).collect();
+        let all = segments.iter().copied().zip(0..).collect();
         let tree = SegmentTree::build(all, SplitParams::default());
         prop_assert_eq!(tree.len() + tree.dropped(), segments.len());
         let mut found = vec![0; segments.len()];
         tree.around_ray(&ray, radius, |index, approach| {
-            found[index] += 1;
-            let segment = &segments[index];
+            found[index as usize] += 1;
+            let segment = &segments[index as usize];
             assert!(approach.t_ray >= ray.t_min && approach.t_ray < ray.t_max);
             assert!(approach.t_segment >= segment.start && approach.t_segment < segment.end);
             assert!(approach.distance >= 0.0 && approach.distance < radius);
@@ -95,8 +95,8 @@ proptest! {
         prop_assert!(found.iter().all(|count| *count <= 1));
         let mut found = vec![0; segments.len()];
         tree.around_point(ray.origin, radius, |index, t, distance2| {
-            found[index] += 1;
-            assert!(t >= segments[index].start && t < segments[index].end && distance2 >= 0.0);
+            found[index as usize] += 1;
+            assert!(t >= segments[index as usize].start && t < segments[index as usize].end && distance2 >= 0.0);
         });
         prop_assert!(found.iter().all(|count| *count <= 1));
     }

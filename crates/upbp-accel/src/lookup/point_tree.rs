@@ -12,17 +12,17 @@ use super::tree::PackedTree;
 use crate::ray::Ray;
 use crate::simd::{WIDTH, Wide};
 
-/// Eight points: two cache lines if payloads are small. An unused lane is NaN, which no comparison accepts.
+/// Eight points, in two cache lines. An unused lane is NaN, which no comparison accepts.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-struct Block<P> {
+struct Block {
     position: [[f32; WIDTH]; 3],
-    payload: [P; WIDTH],
+    payload: [u32; WIDTH],
 }
 
-impl<P: Copy> Block<P> {
+impl Block {
     /// Puts items into the first lanes.
-    fn fill(&mut self, items: &[Item<P>]) {
+    fn fill(&mut self, items: &[Item<u32>]) {
         for (lane, &(position, payload)) in items.iter().enumerate() {
             self.payload[lane] = payload;
             for axis in 0..3 {
@@ -32,44 +32,45 @@ impl<P: Copy> Block<P> {
     }
 }
 
-/// Points with a payload each, searched with any radius.
+/// Points with a payload each, searched with any radius. Payloads are numbers of one type, so that the build is
+/// compiled once.
 ///
 /// The same points give the same tree and the same order of visits, whatever the number of threads.
 ///
 /// A query returns the number of groups of eight boxes or points that it looked at, the nodes, leaves and
 /// blocks of the tree: a measure of its time, 0 if the radius is not positive.
 #[derive(Clone, Debug)]
-pub struct PointTree<P> {
-    tree: PackedTree<Rounded, Block<P>>,
+pub struct PointTree {
+    tree: PackedTree<Rounded, Block>,
     count: usize,
     dropped: usize,
 }
 
-impl<P: Copy + Send + Sync> PointTree<P> {
+impl PointTree {
     /// Builds the tree over points in scene units. Points that are not finite are dropped and
     /// [counted](PointTree::dropped).
     ///
     /// # Panics
     /// For more than `u32::MAX` points.
     #[must_use]
-    pub fn build(mut points: Vec<(Vec3, P)>) -> Self {
+    pub fn build(mut points: Vec<(Vec3, u32)>) -> Self {
         let count = points.len();
         if !points.par_iter().with_min_len(1 << 14).all(|(position, _)| position.is_finite()) {
             points.retain(|(position, _)| position.is_finite());
         }
         let dropped = count - points.len();
-        let Some(&(_, payload)) = points.first() else {
+        if points.is_empty() {
             return Self { tree: PackedTree::EMPTY, count: 0, dropped };
-        };
-        let empty = Block { position: [[f32::NAN; WIDTH]; 3], payload: [payload; WIDTH] };
-        let bounds = |&(position, _): &Item<P>| (position, position);
+        }
+        let empty = Block { position: [[f32::NAN; WIDTH]; 3], payload: [0; WIDTH] };
+        let bounds = |&(position, _): &Item<u32>| (position, position);
         let tree = PackedTree::build(points, bounds, empty, Block::fill);
         Self { tree, count: count - dropped, dropped }
     }
 
     /// Visits every point nearer than `radius` to `centre`, in scene units; `visit` gets the payload and the
     /// squared distance.
-    pub fn in_ball(&self, centre: Vec3, radius: f32, visit: impl FnMut(P, f32)) -> u32 {
+    pub fn in_ball(&self, centre: Vec3, radius: f32, visit: impl FnMut(u32, f32)) -> u32 {
         self.in_ball_ahead(centre, radius, |_| {}, visit)
     }
 
@@ -82,8 +83,8 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         &self,
         centre: Vec3,
         radius: f32,
-        ahead: impl Fn(P),
-        visit: impl FnMut(P, f32),
+        ahead: impl Fn(u32),
+        visit: impl FnMut(u32, f32),
     ) -> u32 {
         if !(radius > 0.0) {
             return 0;
@@ -100,7 +101,7 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         &self,
         ray: &Ray,
         radius: impl Into<SearchRadius>,
-        visit: impl FnMut(P, f32, f32),
+        visit: impl FnMut(u32, f32, f32),
     ) -> u32 {
         self.around_ray_ahead(ray, radius, |_| {}, visit)
     }
@@ -111,8 +112,8 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         &self,
         ray: &Ray,
         radius: impl Into<SearchRadius>,
-        ahead: impl Fn(P),
-        visit: impl FnMut(P, f32, f32),
+        ahead: impl Fn(u32),
+        visit: impl FnMut(u32, f32, f32),
     ) -> u32 {
         match radius.into() {
             SearchRadius::Constant(radius) => self.within(ray, radius, ahead, visit),
@@ -124,8 +125,8 @@ impl<P: Copy + Send + Sync> PointTree<P> {
         &self,
         ray: &Ray,
         radius: impl RadiusAlong,
-        ahead: impl Fn(P),
-        visit: impl FnMut(P, f32, f32),
+        ahead: impl Fn(u32),
+        visit: impl FnMut(u32, f32, f32),
     ) -> u32 {
         if !(radius.largest() > 0.0) {
             return 0;
@@ -143,11 +144,11 @@ struct InBall<A, V> {
     visit: V,
 }
 
-impl<P: Copy, A: Fn(P), V: FnMut(P, f32)> Query<Block<P>> for InBall<A, V> {
+impl<A: Fn(u32), V: FnMut(u32, f32)> Query<Block> for InBall<A, V> {
     type Found = [f32; WIDTH];
 
     #[inline(always)]
-    fn test<W: Wide>(&self, wide: W, block: &Block<P>) -> (u32, Self::Found) {
+    fn test<W: Wide>(&self, wide: W, block: &Block) -> (u32, Self::Found) {
         let offset = wide.sub3(wide.load3(&block.position), wide.splat3(self.centre.to_array()));
         let distance2 = wide.dot(offset, offset);
         (wide.less(distance2, wide.splat(self.radius2)), wide.store(distance2))
@@ -156,12 +157,12 @@ impl<P: Copy, A: Fn(P), V: FnMut(P, f32)> Query<Block<P>> for InBall<A, V> {
     const ANNOUNCES: bool = true;
 
     #[inline(always)]
-    fn announce(&self, block: &Block<P>, lane: usize) {
+    fn announce(&self, block: &Block, lane: usize) {
         (self.ahead)(block.payload[lane]);
     }
 
     #[inline(always)]
-    fn report(&mut self, block: &Block<P>, distance2: &Self::Found, lane: usize) {
+    fn report(&mut self, block: &Block, distance2: &Self::Found, lane: usize) {
         (self.visit)(block.payload[lane], distance2[lane]);
     }
 }
@@ -174,11 +175,11 @@ struct AroundRay<R, A, V> {
     visit: V,
 }
 
-impl<P: Copy, R: RadiusAlong, A: Fn(P), V: FnMut(P, f32, f32)> Query<Block<P>> for AroundRay<R, A, V> {
+impl<R: RadiusAlong, A: Fn(u32), V: FnMut(u32, f32, f32)> Query<Block> for AroundRay<R, A, V> {
     type Found = [[f32; WIDTH]; 2];
 
     #[inline(always)]
-    fn test<W: Wide>(&self, wide: W, block: &Block<P>) -> (u32, Self::Found) {
+    fn test<W: Wide>(&self, wide: W, block: &Block) -> (u32, Self::Found) {
         // Differences first: dot products of positions cancel far from the origin.
         let offset = wide.sub3(wide.load3(&block.position), wide.splat3(self.ray.origin.to_array()));
         let [t, distance2] = wide.perpendicular(offset, wide.splat3(self.ray.direction.to_array()));
@@ -192,17 +193,17 @@ impl<P: Copy, R: RadiusAlong, A: Fn(P), V: FnMut(P, f32, f32)> Query<Block<P>> f
     const ANNOUNCES: bool = true;
 
     #[inline(always)]
-    fn announce(&self, block: &Block<P>, lane: usize) {
+    fn announce(&self, block: &Block, lane: usize) {
         (self.ahead)(block.payload[lane]);
     }
 
     #[inline(always)]
-    fn report(&mut self, block: &Block<P>, [t, distance2]: &Self::Found, lane: usize) {
+    fn report(&mut self, block: &Block, [t, distance2]: &Self::Found, lane: usize) {
         (self.visit)(block.payload[lane], t[lane], distance2[lane]);
     }
 }
 
-impl<P> PointTree<P> {
+impl PointTree {
     /// The number of points.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -63,23 +63,23 @@ impl Block {
 /// A query returns the number of groups of eight boxes or pieces of segments that it looked at, the nodes,
 /// leaves and blocks of the tree: a measure of its time, 0 if the radius is not positive.
 #[derive(Clone, Debug)]
-pub struct SegmentTree<P> {
+pub struct SegmentTree {
     tree: PackedTree<Exact, Block>,
-    payloads: Vec<P>,
+    payloads: Vec<u32>,
     /// The greatest distance of an end from the origin of its segment, scene units.
     max_distance: f32,
     pieces: usize,
     dropped: usize,
 }
 
-impl<P: Copy + Send + Sync> SegmentTree<P> {
+impl SegmentTree {
     /// Builds the tree. Segments that are empty or not finite are dropped and
     /// [counted](SegmentTree::dropped): clip a beam without an end to the scene first.
     ///
     /// # Panics
     /// For more than `u32::MAX` pieces.
     #[must_use]
-    pub fn build(mut segments: Vec<(Segment, P)>, params: SplitParams) -> Self {
+    pub fn build(mut segments: Vec<(Segment, u32)>, params: SplitParams) -> Self {
         let count = segments.len();
         segments.retain(|(segment, _)| segment.is_usable());
         let dropped = count - segments.len();
@@ -118,7 +118,7 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
         &self,
         ray: &Ray,
         radius: impl Into<SearchRadius>,
-        visit: impl FnMut(P, ClosestApproach),
+        visit: impl FnMut(u32, ClosestApproach),
     ) -> u32 {
         match radius.into() {
             SearchRadius::Constant(radius) => self.within(ray, radius, visit),
@@ -126,7 +126,7 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
         }
     }
 
-    fn within(&self, ray: &Ray, radius: impl RadiusAlong, visit: impl FnMut(P, ClosestApproach)) -> u32 {
+    fn within(&self, ray: &Ray, radius: impl RadiusAlong, visit: impl FnMut(u32, ClosestApproach)) -> u32 {
         if !(radius.largest() > 0.0) {
             return 0;
         }
@@ -138,7 +138,7 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
     ///
     /// `visit` gets the payload, the distance along the segment from its origin to the foot of the
     /// perpendicular, in `[start, end)`, and the squared distance between foot and point, in scene units.
-    pub fn around_point(&self, point: Vec3, radius: f32, visit: impl FnMut(P, f32, f32)) -> u32 {
+    pub fn around_point(&self, point: Vec3, radius: f32, visit: impl FnMut(u32, f32, f32)) -> u32 {
         if !(radius > 0.0) {
             return 0;
         }
@@ -149,14 +149,14 @@ impl<P: Copy + Send + Sync> SegmentTree<P> {
 }
 
 /// Segments that a ray passes within a radius.
-struct AroundRay<'a, P, R, V> {
-    payloads: &'a [P],
+struct AroundRay<'a, R, V> {
+    payloads: &'a [u32],
     ray: Ray,
     radius: R,
     visit: V,
 }
 
-impl<P: Copy, R: RadiusAlong, V: FnMut(P, ClosestApproach)> Query<Block> for AroundRay<'_, P, R, V> {
+impl<R: RadiusAlong, V: FnMut(u32, ClosestApproach)> Query<Block> for AroundRay<'_, R, V> {
     type Found = ();
 
     /// Compares the distance between the lines with the radius, without a division if that is constant.
@@ -190,14 +190,14 @@ impl<P: Copy, R: RadiusAlong, V: FnMut(P, ClosestApproach)> Query<Block> for Aro
 }
 
 /// Segments nearer than a radius to a point; finds distances along them and squared distances from them.
-struct AroundPoint<'a, P, V> {
-    payloads: &'a [P],
+struct AroundPoint<'a, V> {
+    payloads: &'a [u32],
     point: Vec3,
     radius2: f32,
     visit: V,
 }
 
-impl<P: Copy, V: FnMut(P, f32, f32)> Query<Block> for AroundPoint<'_, P, V> {
+impl<V: FnMut(u32, f32, f32)> Query<Block> for AroundPoint<'_, V> {
     type Found = [[f32; WIDTH]; 2];
 
     #[inline(always)]
@@ -216,7 +216,7 @@ impl<P: Copy, V: FnMut(P, f32, f32)> Query<Block> for AroundPoint<'_, P, V> {
     }
 }
 
-impl<P> SegmentTree<P> {
+impl SegmentTree {
     /// The number of segments.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -244,7 +244,7 @@ impl<P> SegmentTree<P> {
     /// Memory in use, bytes.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
-        self.tree.memory_bytes() + self.payloads.capacity() * size_of::<P>()
+        self.tree.memory_bytes() + self.payloads.capacity() * size_of::<u32>()
     }
 }
 

@@ -24,7 +24,7 @@ impl SplitParams {
     /// nothing but the segments and the radius. The default, too, for fewer than 512 segments, and where rays
     /// find nothing to look at: without a positive radius, or if all segments are at one point.
     #[must_use]
-    pub fn choose<P>(segments: &[(Segment, P)], radius: impl Into<SearchRadius>) -> Self {
+    pub fn choose(segments: &[(Segment, u32)], radius: impl Into<SearchRadius>) -> Self {
         let radius = radius.into();
         let (least, most) = Self::SAMPLE;
         let count = (segments.len() / Self::SAMPLED).min(most);
@@ -35,8 +35,8 @@ impl SplitParams {
         let scattered =
             |i: usize, count: usize| ((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % count;
         let stride = segments.len() / count;
-        let sampled = |i: usize| (segments[i * stride + scattered(i, stride)].0, ());
-        let sample: Vec<_> = (0..count).map(sampled).filter(|(segment, ())| segment.is_usable()).collect();
+        let sampled = |i: usize| segments[i * stride + scattered(i, stride)];
+        let sample: Vec<_> = (0..count).map(sampled).filter(|(segment, _)| segment.is_usable()).collect();
         let place = |i: usize| {
             let segment = sample.get(scattered(i, count))?.0;
             let part = (scattered(i + 1, 256) as f32 + 0.5) / 256.0;
@@ -49,7 +49,7 @@ impl SplitParams {
         let rays: Vec<_> = (0..Self::RAYS).filter_map(ray).collect();
         let effort = |params| {
             let tree = SegmentTree::build(sample.clone(), params);
-            rays.iter().map(|ray| f64::from(tree.around_ray(ray, radius, |(), _| ()))).sum::<f64>()
+            rays.iter().map(|ray| f64::from(tree.around_ray(ray, radius, |_, _| ()))).sum::<f64>()
         };
         // The part of the work that pieces save grows about with this power of the number of segments. A
         // fifth, carried over from the sample to all, pays for their memory.

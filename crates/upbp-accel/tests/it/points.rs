@@ -10,11 +10,11 @@ use upbp_accel::{PointTree, Ray};
 /// A result that can be compared bit by bit, whatever the order.
 type Hits = Vec<(u32, u32, u32)>;
 
-fn tree(points: &[Vec3]) -> PointTree<u32> {
+fn tree(points: &[Vec3]) -> PointTree {
     PointTree::build(points.iter().zip(0..).map(|(&point, index)| (point, index)).collect())
 }
 
-fn ball(tree: &PointTree<u32>, centre: Vec3, radius: f32) -> Hits {
+fn ball(tree: &PointTree, centre: Vec3, radius: f32) -> Hits {
     let (mut hits, announced) = (Hits::new(), RefCell::new(Vec::new()));
     let ahead = |index| announced.borrow_mut().push(index);
     tree.in_ball_ahead(centre, radius, ahead, |index, distance2| {
@@ -31,7 +31,7 @@ fn brute_ball(points: &[Vec3], centre: Vec3, radius: f32) -> Hits {
     distance2.zip(0..).filter(|&(d, _)| d < radius * radius).map(|(d, i)| (i, d.to_bits(), 0)).collect()
 }
 
-fn around(tree: &PointTree<u32>, ray: &Ray, radius: f32) -> Hits {
+fn around(tree: &PointTree, ray: &Ray, radius: f32) -> Hits {
     let (mut hits, announced) = (Hits::new(), RefCell::new(Vec::new()));
     let ahead = |index| announced.borrow_mut().push(index);
     tree.around_ray_ahead(ray, radius, ahead, |index, t, distance2| {

@@ -7,7 +7,7 @@ use upbp_accel::{
     ClosestApproach, GrowingRadius, Ray, SearchRadius, Segment, SegmentTree, SplitParams, closest_approach,
 };
 
-fn tree(segments: &[Segment], pieces_per_segment: f32) -> SegmentTree<u32> {
+fn tree(segments: &[Segment], pieces_per_segment: f32) -> SegmentTree {
     let with_index = segments.iter().zip(0..).map(|(&segment, index)| (segment, index)).collect();
     SegmentTree::build(with_index, SplitParams { pieces_per_segment })
 }
@@ -16,7 +16,7 @@ fn bits(index: u32, hit: &ClosestApproach) -> (u32, [u32; 4]) {
     (index, [hit.t_ray, hit.t_segment, hit.distance, hit.sin_theta].map(f32::to_bits))
 }
 
-fn around_ray(tree: &SegmentTree<u32>, ray: &Ray, radius: f32) -> Vec<(u32, [u32; 4])> {
+fn around_ray(tree: &SegmentTree, ray: &Ray, radius: f32) -> Vec<(u32, [u32; 4])> {
     let mut hits = Vec::new();
     tree.around_ray(ray, radius, |index, hit| hits.push(bits(index, &hit)));
     hits.sort_unstable();
@@ -28,7 +28,7 @@ fn brute_around_ray(segments: &[Segment], ray: &Ray, radius: f32) -> Vec<(u32, [
     hits.filter_map(|(segment, index)| Some(bits(index, &closest_approach(ray, segment, radius)?))).collect()
 }
 
-fn around_point(tree: &SegmentTree<u32>, point: Vec3, radius: f32) -> Vec<(u32, u32, u32)> {
+fn around_point(tree: &SegmentTree, point: Vec3, radius: f32) -> Vec<(u32, u32, u32)> {
     let mut hits = Vec::new();
     tree.around_point(point, radius, |index, t, distance2| {
         hits.push((index, t.to_bits(), distance2.to_bits()));
@@ -196,10 +196,10 @@ fn the_number_of_pieces_is_bounded() {
 #[test]
 fn beams_are_split_where_it_pays() {
     let mut random = Random::new(7);
-    let mut beams = |count, lamp: Option<Vec3>| -> Vec<(Segment, ())> {
+    let mut beams = |count, lamp: Option<Vec3>| -> Vec<(Segment, u32)> {
         let origins = positions(Spread::Uniform, count, 1.0, Vec3::ZERO, &mut random);
         let mut beam = |origin| Segment { origin, direction: random.direction(), start: 0.0, end: 1.0 };
-        origins.into_iter().map(|origin| (beam(lamp.unwrap_or(origin)), ())).collect()
+        origins.into_iter().map(|origin| (beam(lamp.unwrap_or(origin)), 0)).collect()
     };
     assert_eq!(SplitParams::choose(&beams(10_000, None), 1e-3), SplitParams::default());
     // Queries as wide as beams are long look at all pieces, those without a width at none.
@@ -216,15 +216,15 @@ fn beams_are_split_where_it_pays() {
     let mut from_one_point = beams(10_000, Some(Vec3::ONE));
     assert_eq!(SplitParams::choose(&from_one_point, 1e-3), SplitParams::WHOLE);
     // Those that will be dropped do not matter.
-    for (beam, ()) in from_one_point.iter_mut().step_by(3) {
+    for (beam, _) in from_one_point.iter_mut().step_by(3) {
         beam.end = f32::NAN;
     }
     assert_eq!(SplitParams::choose(&from_one_point, 1e-3), SplitParams::WHOLE);
-    for (beam, ()) in &mut from_one_point {
+    for (beam, _) in &mut from_one_point {
         beam.end = f32::NAN;
     }
     assert_eq!(SplitParams::choose(&from_one_point, 1e-3), SplitParams::default());
-    assert_eq!(SplitParams::choose::<()>(&[], 1e-3), SplitParams::default());
+    assert_eq!(SplitParams::choose(&[], 1e-3), SplitParams::default());
 }
 
 #[test]

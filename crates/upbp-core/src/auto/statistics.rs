@@ -222,13 +222,19 @@ impl LightPaths {
         let (near, near_paths) = first_paths(&self.photons, paths);
         let [surface, medium] = [false, true].map(|in_medium| tree(near, in_medium));
         // Split in any case: so memory is enough whether or not the beams of an iteration are.
-        let segments = self.beams.iter().map(|segment| (*segment, ())).collect();
+        let segments = self.beams.iter().map(|segment| (*segment, 0)).collect();
         let beams = SegmentTree::build(segments, SplitParams::default());
         let near = Nearest { paths: near_paths, scale };
         let near_beams = Nearest { paths: beam_paths, scale };
         // Distances in terms of radii: divided by what those are multiplied by.
         let of = |technique, found: &dyn Fn() -> Option<Neighbours>| {
             plan.techniques.has(technique).then(found).flatten()
+        };
+        let around_points = |queries: &[Vec3], photons: &PointTree, dimension: f64| {
+            near.of(queries, photons.len(), dimension, &|point, radius, found| {
+                let scale = field.at(*point);
+                photons.in_ball(*point, scale * radius, |_, distance2| found(distance2.sqrt() / scale));
+            })
         };
         Statistics {
             lanes: None,
@@ -241,21 +247,11 @@ impl LightPaths {
             medium_per_path: per_path(plan.stores_medium_photons(), true),
             pieces_per_path: beams.pieces() as f64 / beam_paths,
             beams_per_path: self.beams.len() as f64 / beam_paths,
-            surf: of(Technique::Surf, &|| {
-                near.of(&queries.surfaces, surface.len(), 2.0, &|point, radius, found| {
-                    let scale = field.at(*point);
-                    surface.in_ball(*point, scale * radius, |(), distance2| found(distance2.sqrt() / scale));
-                })
-            }),
-            pp3d: of(Technique::Pp3d, &|| {
-                near.of(&queries.media, medium.len(), 3.0, &|point, radius, found| {
-                    let scale = field.at(*point);
-                    medium.in_ball(*point, scale * radius, |(), distance2| found(distance2.sqrt() / scale));
-                })
-            }),
+            surf: of(Technique::Surf, &|| around_points(&queries.surfaces, &surface, 2.0)),
+            pp3d: of(Technique::Pp3d, &|| around_points(&queries.media, &medium, 3.0)),
             pb2d: of(Technique::Pb2d, &|| {
                 near.of(&queries.edges, medium.len(), 2.0, &|edge, radius, found| {
-                    medium.around_ray(edge, field.search_radius(radius), |(), t, distance2| {
+                    medium.around_ray(edge, field.search_radius(radius), |_, t, distance2| {
                         found(distance2.sqrt() / field.at(edge.at(t)));
                     });
                 })
@@ -263,14 +259,14 @@ impl LightPaths {
             bp2d: of(Technique::Bp2d, &|| {
                 near_beams.of(&queries.media, self.beams.len(), 2.0, &|point, radius, found| {
                     let scale = field.at(*point);
-                    beams.around_point(*point, scale * radius, |(), _, distance2| {
+                    beams.around_point(*point, scale * radius, |_, _, distance2| {
                         found(distance2.sqrt() / scale);
                     });
                 })
             }),
             // Tells how many beams are enough, too.
             bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, &|edge, radius, found| {
-                beams.around_ray(edge, field.search_radius(radius), |(), approach| {
+                beams.around_ray(edge, field.search_radius(radius), |_, approach| {
                     found(approach.distance / field.at(edge.at(approach.t_ray)));
                 });
             }),
@@ -295,9 +291,9 @@ fn first_paths(photons: &[Photon], paths: f64) -> (&[Photon], f64) {
 }
 
 /// The photons in media, or those on surfaces.
-fn tree(photons: &[Photon], in_medium: bool) -> PointTree<()> {
+fn tree(photons: &[Photon], in_medium: bool) -> PointTree {
     let chosen = photons.iter().filter(|photon| photon.in_medium == in_medium);
-    PointTree::build(chosen.map(|photon| (photon.position, ())).collect())
+    PointTree::build(chosen.map(|photon| (photon.position, 0)).collect())
 }
 
 /// Queries that camera sub-paths make.
