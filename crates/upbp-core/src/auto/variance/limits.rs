@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// The largest part that a sample may have in the whole.
+/// The largest part that a sample may have in the whole, where at least some 70 have any.
 pub(super) const LARGEST_PART: f64 = 0.03;
 /// Part of the squared mean of the picture that is added to the squared radiance which errors are relative
 /// to: for a picture of mean 0.5 the 0.01 of relMSE.
@@ -36,10 +36,13 @@ pub(super) fn reductions(parts: &[f64]) -> Vec<f32> {
     parts.iter().map(|part| if *part > most { (most / part).sqrt() as f32 } else { 1.0 }).collect()
 }
 
-/// The limit of parts such that none is more than [`LARGEST_PART`] of the sum of all that are so limited.
+/// The limit of parts such that none is more than [`LARGEST_PART`], or than twice an even share if that is
+/// more, of the sum of all that are so limited. Parts of nothing, as black pixels have, do not count.
 pub(super) fn largest(mut parts: Vec<f64>) -> f64 {
     /// No more parts are above the limit.
     const ABOVE: usize = (1.0 / LARGEST_PART) as usize + 1;
+    parts.retain(|part| *part > 0.0);
+    let largest_part = LARGEST_PART.max(2.0 / parts.len() as f64);
     let mut rest: f64 = parts.iter().sum();
     let descending = |a: &f64, b: &f64| b.total_cmp(a);
     if parts.len() > ABOVE {
@@ -48,9 +51,9 @@ pub(super) fn largest(mut parts: Vec<f64>) -> f64 {
     }
     parts.sort_unstable_by(descending);
     for (above, part) in parts.iter().enumerate() {
-        // With `above` parts limited to `most`: most = LARGEST_PART (above most + rest).
-        let most = LARGEST_PART * rest / (1.0 - LARGEST_PART * above as f64);
-        if *part <= most || LARGEST_PART * (above as f64 + 1.0) >= 1.0 {
+        // With `above` parts limited to `most`: most = largest_part (above most + rest).
+        let most = largest_part * rest / (1.0 - largest_part * above as f64);
+        if *part <= most || largest_part * (above as f64 + 1.0) >= 1.0 {
             return most.max(*part);
         }
         rest -= part;

@@ -335,8 +335,16 @@ fn no_part_is_more_than_the_largest() {
     let most = largest(parts.clone());
     let sum: f64 = parts.iter().map(|part: &f64| part.min(most)).sum();
     assert!((most / sum - LARGEST_PART).abs() < 1e-9, "{most} of {sum}");
-    // Nothing to limit.
+    // Nothing to limit, in a picture that is mostly black, too.
     assert!(largest(vec![1.0; 1000]) >= 1.0);
+    for lit in [1, 2, 10, 33, 34, 100] {
+        let mut parts = vec![0.0; 4096];
+        parts[..lit].fill(1.0);
+        assert!(largest(parts) >= 1.0, "{lit}");
+    }
+    // Few are limited against each other.
+    let most = largest(vec![1e9, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
+    assert!(most > 1.0 && most < 10.0, "{most}");
 }
 
 /// A sample under a plan.
