@@ -39,8 +39,7 @@ fn settings(light_paths: u32, beams: f64, memory: u32) -> Settings {
     }
 }
 
-/// Calls a function with a shipped scene of `side` x `side` pixels, on one thread: how many have buffers of
-/// their own at the same time is up to the system's scheduler.
+/// Calls a function with a shipped scene of `side` x `side` pixels.
 fn with_scene<R: Send>(name: &str, side: u32, function: impl FnOnce(&ReadyScene) -> R + Send) -> R {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes").join(name);
     let side = Count::new(side).expect("a positive count");
@@ -49,8 +48,13 @@ fn with_scene<R: Send>(name: &str, side: u32, function: impl FnOnce(&ReadyScene)
         description.film.height = side;
     })
     .expect("a shipped scene");
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
-    pool.install(|| function(&scene))
+    on_one_thread(|| function(&scene))
+}
+
+/// Calls a function on one thread: how many have buffers of their own at the same time is up to the system's
+/// scheduler.
+fn on_one_thread<R: Send>(function: impl FnOnce() -> R + Send) -> R {
+    rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool").install(function)
 }
 
 /// The file of the plan that a case is rendered by.
@@ -150,20 +154,39 @@ fn memory_is_what_was_expected() {
     close([150.0 * MIB, measured]);
 }
 
+/// Milk in a ball of glass, of hundreds of mean free paths, under a small lamp: a few sub-paths are very long
+/// and merge very often.
+const MILK: &str = r#"(version: 1,
+  camera: Perspective(origin: (0, 0, 5), target: (0, 0, 0), fov_degrees: 30), film: (width: 64, height: 64),
+  media: { "milk": Homogeneous(sigma_s: 340) },
+  materials: { "glass": Dielectric(1.5), "white": Lambert(0.7) },
+  shapes: [
+    (material: "glass", interior: "milk", geometry: Sphere(centre: (0, 0, 0), radius: 1)),
+    (material: "white", geometry: Quad(origin: (-5, -1.2, -5), edge_u: (0, 0, 10), edge_v: (10, 0, 0))),
+  ],
+  lights: [Point(position: (2, 3, 3), intensity: 50)])"#;
+
 #[test]
 fn preparations_take_what_is_allowed() {
-    // Thick clusters of photons: without a limit the preparation takes 108 MiB.
     const MEMORY: u32 = 60;
-    if own_process::case().is_some() {
-        return with_scene("suite/dense_marble.ron", 200, |scene| {
-            let before = status("VmRSS");
-            let settings = Settings { memory: Some(MEMORY), ..Settings::default() };
-            let renderer = scene.renderer(settings.validate().expect("valid settings")).expect("a renderer");
-            let taken = (status("VmHWM") - before) / MIB;
-            println!("{taken:.1} MiB");
-            assert!(taken < f64::from(MEMORY), "{taken} MiB of {MEMORY}");
-            assert!(renderer.report().plan.light_paths > 0, "techniques are chosen all the same");
-        });
+    fn prepare(scene: &ReadyScene) {
+        let before = status("VmRSS");
+        let settings = Settings { memory: Some(MEMORY), ..Settings::default() };
+        let renderer = scene.renderer(settings.validate().expect("valid settings")).expect("a renderer");
+        let taken = (status("VmHWM") - before) / MIB;
+        println!("{taken:.1} MiB");
+        assert!(taken < f64::from(MEMORY), "{taken} MiB of {MEMORY}");
+        assert!(renderer.report().plan.light_paths > 0, "techniques are chosen all the same");
     }
-    own_process::run("runs::memory::preparations_take_what_is_allowed", "prepare", &GIVE_BACK);
+    match own_process::case().as_deref() {
+        // Thick clusters of photons: without a limit the preparation takes 108 MiB.
+        Some("clusters") => with_scene("suite/dense_marble.ron", 200, prepare),
+        // Emitters are measured: without a limit up to 500 MiB.
+        Some(_) => on_one_thread(|| prepare(&ReadyScene::from_ron_str(MILK, ".").expect("a valid scene"))),
+        None => {
+            for case in ["clusters", "milk"] {
+                own_process::run("runs::memory::preparations_take_what_is_allowed", case, &GIVE_BACK);
+            }
+        }
+    }
 }

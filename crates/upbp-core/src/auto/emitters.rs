@@ -22,7 +22,7 @@ use upbp_media::Lanes;
 use super::full_plan::{full_plan, iteration_plan, plan_with};
 use super::guides::{self, Evidence, Starts};
 use super::memory_limit::Room;
-use super::parallel_walks::{PilotRun, camera_path, in_pieces, light_path, pixel};
+use super::parallel_walks::{PilotRun, SampleRoom, camera_path, in_pieces, light_path, pixel};
 use super::statistics::{self, PATHS_PER_BEAM_PATH};
 use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
@@ -184,7 +184,8 @@ fn second_moment<S: Scene>(scene: &PreparedScene<'_, S>, seen: &[NextEvent]) -> 
     seen.iter().map(moment).sum()
 }
 
-/// As [`measure`], but no larger a part than brings enough contributions.
+/// As [`measure`], but no larger a part than brings enough contributions. A part that brings far more, since
+/// a few sub-paths merge very often, is broken off.
 fn measure_enough<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
@@ -193,25 +194,36 @@ fn measure_enough<S: Scene, L: Lanes>(
     enough: f64,
     halt: &Halt<'_>,
 ) -> Option<Measured> {
-    let mut next = part.min(FEW);
+    /// How many times as many as are enough a run may bring.
+    const FAR_MORE: f64 = 2.0;
+    let (mut next, mut best) = (part.min(FEW), None);
     loop {
-        let seen = measure::<S, L>(scene, plan, paths, next, halt)?;
+        let room = SampleRoom::new((FAR_MORE * enough) as usize);
+        let Some(seen) = measure::<S, L>(scene, plan, paths, next, &room, halt) else {
+            match best {
+                _ if halt.now() => return None,
+                Some(best) => return Some(best),
+                None => next *= FEW,
+            }
+            continue;
+        };
         let most = next * enough / (seen.contributions as f64).max(1.0);
         let affordable = part.min(most);
         if affordable < 2.0 * next {
             return Some(seen);
         }
-        next = affordable;
+        (next, best) = (affordable, Some(seen));
     }
 }
 
 /// Traces numbers of light and camera sub-paths, or a part of both. Light is weighted as under `plan`.
-/// `None` if it was halted.
+/// `None` if it was halted, or if there is no room for what is seen.
 fn measure<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
     paths: [u32; 2],
     part: f64,
+    room: &SampleRoom,
     halt: &Halt<'_>,
 ) -> Option<Measured> {
     let [light_paths, camera_paths] = paths.map(|count| (part * f64::from(count)).ceil() as u32);
@@ -244,13 +256,15 @@ fn measure<S: Scene, L: Lanes>(
 
     let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
         let (index, counters) = (u64::from(index), &mut Counters::default());
-        let before = (seen.light, seen.emission.len(), seen.next_event.len());
+        let before = (seen.light, seen.emission.len(), seen.next_event.len(), seen.contributions);
+        seen.most = before.3 + room.most();
         camera_path(&context, &map, pixel(film, index), index, scratch, counters, seen);
         let pixel = seen.light - before.0;
         let emission = seen.emission[before.1..].iter_mut().map(|(_, contribution)| contribution);
         let next_events = seen.next_event[before.2..].iter_mut().map(|(.., contribution)| contribution);
         emission.chain(next_events).for_each(|contribution| contribution.pixel = pixel);
-        true
+        // A run of single sub-paths has no smaller one.
+        room.take(seen.contributions - before.3) || light_paths.max(camera_paths) == 1
     })?;
     // Light tracing fills the whole picture, camera sub-paths a part of it.
     let scale = pixels as f64 / f64::from(camera_paths);
@@ -304,6 +318,8 @@ fn light_sub_paths<S: Scene, L: Lanes>(
     let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
     let pieces =
         in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_, ByTechnique, L>, Seen)| {
+            // They contribute by light tracing alone.
+            seen.most = usize::MAX;
             light_path(context, index, scratch, out, seen);
             true
         })?;
@@ -331,6 +347,9 @@ struct Seen {
     next_event: Vec<(LightEnd, Vec3, Contribution)>,
     /// Light that arrived in all.
     light: f64,
+    /// Number of contributions, those included that are not kept since there were more than `most`.
+    contributions: usize,
+    most: usize,
     /// Places where camera sub-paths were reflected or refracted in one direction.
     specular: Vec<Vec3>,
 }
@@ -396,6 +415,10 @@ impl<B> Observer<B> for Seen {
         let (technique, pixel) = (sample.technique, value * weight);
         let seen = |together| Contribution { technique, value, weight, together, pixel };
         self.light += pixel;
+        self.contributions += 1;
+        if self.contributions > self.most {
+            return;
+        }
         match sample.completion {
             Completion::Emission | Completion::Hit(_) | Completion::Lens { .. } => {}
             Completion::Nee { light, camera: (receiver, _) } => {

@@ -1,5 +1,7 @@
 //! Sub-paths of pilots, traced in parallel with a result that does not depend on the number of threads.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use upbp_estimators::mis::ByTechnique;
 use upbp_estimators::observer::DynObserver;
 use upbp_estimators::path::{Context, LightChunk, Scratch};
@@ -55,6 +57,34 @@ pub(super) fn in_pieces<B: Copy, L: Lanes, O: Default + Send>(
         piece.all(|path| !halt.now() && trace(path, scratch, out))
     });
     done.then_some(outs)
+}
+
+/// Room for samples, common to all pieces of a run. Whether it suffices does not depend on the order
+/// of the pieces.
+pub(super) struct SampleRoom {
+    taken: AtomicUsize,
+    most: usize,
+}
+
+impl SampleRoom {
+    pub(super) const fn new(most: usize) -> Self {
+        Self { taken: AtomicUsize::new(0), most }
+    }
+
+    /// The number of samples that there is room for.
+    pub(super) const fn most(&self) -> usize {
+        self.most
+    }
+
+    /// The part of it that is taken.
+    pub(super) fn taken(&self) -> f64 {
+        self.taken.load(Ordering::Relaxed) as f64 / self.most as f64
+    }
+
+    /// Takes room for more samples; whether there was enough.
+    pub(super) fn take(&self, samples: usize) -> bool {
+        samples <= self.most && self.taken.fetch_add(samples, Ordering::Relaxed) + samples <= self.most
+    }
 }
 
 /// The observer of all pilots: their walks carry the densities of every technique, even where only places

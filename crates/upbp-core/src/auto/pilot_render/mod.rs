@@ -18,13 +18,13 @@ use upbp_media::Lanes;
 
 use super::full_plan::iteration_plan;
 use super::memory_limit;
-use super::parallel_walks::{PIECE, PilotRun, camera_path, in_pieces, light_path};
+use super::parallel_walks::{PIECE, PilotRun, SampleRoom, camera_path, in_pieces, light_path};
 use super::roulette;
 use crate::deadline::Halt;
 use crate::plan::Plan;
 use crate::settings::{CheckedSettings, Settings};
 use grid::Grid;
-use recorder::{ByRoulette, ByTechnique, Recorder, Room, Sample, TECHNIQUES, add, passed};
+use recorder::{ByRoulette, ByTechnique, Recorder, Sample, TECHNIQUES, add, passed};
 
 /// Looks at each pixel: enough to tell what they have in common.
 pub(super) const PASSES: u32 = 2;
@@ -181,7 +181,7 @@ impl PilotRender {
         // Parts in weights tell densities with this heuristic alone, whichever the render has.
         let settings = Settings { heuristic: Heuristic::Balance, ..Settings::clone(settings) };
         let mut thinned = iteration_plan(scene, &settings, plan, 0).thinned(paths, beam_paths);
-        let room = Room::new(limits.samples);
+        let room = SampleRoom::new(limits.samples);
         let mut passes = (0..PASSES)
             .map(|pass| {
                 thinned.iteration = PilotRun::Render { pass }.iteration();
@@ -371,7 +371,7 @@ impl Pass {
     fn trace<S: Scene, L: Lanes>(
         context: &Context<'_, S>,
         grid: &Grid,
-        room: &Room,
+        room: &SampleRoom,
         with_partners: bool,
         halt: &Halt<'_>,
     ) -> Option<Self> {
@@ -484,7 +484,7 @@ mod tests {
         let mut expected = 0.0;
         for count in [3, 0, 1, 2, 9] {
             let first = splats.len();
-            let room = Room::new(1);
+            let room = SampleRoom::new(1);
             recorder.record(&room, |recorder| {
                 for i in first..first + count {
                     let value = Vec3::splat(1.0 + i as f32);

@@ -2,7 +2,6 @@
 //! render make them.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{Vec2, Vec3};
 use upbp_estimators::Technique;
@@ -11,6 +10,7 @@ use upbp_estimators::mis::Densities;
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::scene::CameraRay;
 
+use crate::auto::parallel_walks::SampleRoom;
 use crate::auto::roulette;
 
 /// The least part of a technique that can find a path. A connection through a hundred mean free paths has
@@ -110,9 +110,9 @@ pub(crate) fn shares(densities: &mis::ByTechnique) -> ByTechnique<f32> {
 
 impl Recorder {
     /// Traces a sub-path under the eyes of this recorder; whether there is room for its samples.
-    pub(super) fn record(&mut self, room: &Room, trace: impl FnOnce(&mut Self)) -> bool {
+    pub(super) fn record(&mut self, room: &SampleRoom, trace: impl FnOnce(&mut Self)) -> bool {
         let before = self.seen;
-        self.most = room.most;
+        self.most = room.most();
         trace(self);
         self.ends.push(self.samples.len() as u32);
         room.take(self.seen - before)
@@ -149,28 +149,5 @@ pub(super) fn passed(albedos: f32) -> ByRoulette {
 pub(super) fn add(sum: &mut ByRoulette, more: &ByRoulette) {
     for (sum, more) in sum.iter_mut().zip(more) {
         *sum += more;
-    }
-}
-
-/// Room for samples, common to all pieces of a pilot render. Whether it suffices does not depend on the order
-/// of the pieces.
-pub(super) struct Room {
-    taken: AtomicUsize,
-    most: usize,
-}
-
-impl Room {
-    pub(super) const fn new(most: usize) -> Self {
-        Self { taken: AtomicUsize::new(0), most }
-    }
-
-    /// The part of it that is taken.
-    pub(super) fn taken(&self) -> f64 {
-        self.taken.load(Ordering::Relaxed) as f64 / self.most as f64
-    }
-
-    /// Takes room for more samples; whether there was enough.
-    fn take(&self, samples: usize) -> bool {
-        samples <= self.most && self.taken.fetch_add(samples, Ordering::Relaxed) + samples <= self.most
     }
 }
