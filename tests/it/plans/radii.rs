@@ -83,6 +83,24 @@ fn radii_that_are_given_are_the_same_everywhere() {
     assert_eq!((plan.radii.surf, plan.radii.field), (0.01, RadiusField::Uniform));
 }
 
+/// Half of what the picture shows scatters first where coordinates have no digits for any kernel.
+#[test]
+fn radii_that_are_given_may_be_below_what_coordinates_tell_apart() {
+    let text = r#"(version: 1, camera: Perspective(origin: (0, 1, 6), target: (0, 1, 0), fov_degrees: 60),
+        film: (width: 16, height: 16), outside: "haze", media: { "haze": Homogeneous(sigma_s: 1e-18) },
+        materials: { "white": Lambert(0.7) },
+        shapes: [(geometry: Quad(origin: (-1, 0, -1), edge_u: (0, 0, 2), edge_v: (2, 0, 0)), material: "white")],
+        lights: [Point(position: (0, 2, 0), intensity: 5)])"#;
+    let scene = ReadyScene::from_ron_str(text, ".").expect("a valid scene");
+    for radius in [Radius::Scene(0.001), Radius::Absolute(0.01)] {
+        let techniques = "bpt+surf+pp3d".parse().expect("technique names");
+        let settings = Settings { techniques, radii: Radii::all(radius), ..settings() };
+        let mut renderer = renderer(&scene, settings);
+        assert!(renderer.iterate());
+        assert!(renderer.film().image().mean().iter().all(|mean| *mean > 0.0), "{radius:?}");
+    }
+}
+
 #[test]
 fn a_field_is_part_of_plans_and_states() {
     let scene = landscape();

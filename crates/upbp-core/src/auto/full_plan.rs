@@ -173,13 +173,15 @@ fn first_radii<S: Scene>(
     let scene_radius = scene.bounds.radius;
     let size = size(scene, statistics);
     let floor = 2.0 * LEAST_RADIUS * statistics.largest_coordinate;
+    // Where coordinates have no digits for it, the least radius may be beyond the largest one.
+    let given = |radius: f32| radius.max(floor.max(LEAST_GIVEN)).min(LARGEST_GIVEN);
     let radius = |technique, choice, found: Option<Neighbours>, count: f64, paths: u32, most: f32| {
         if !techniques.has(technique) {
             return 0.0;
         }
         match choice {
-            Radius::Absolute(radius) => radius.clamp(floor.max(LEAST_GIVEN), LARGEST_GIVEN),
-            Radius::Scene(fraction) => (fraction * scene_radius).clamp(floor.max(LEAST_GIVEN), LARGEST_GIVEN),
+            Radius::Absolute(radius) => given(radius),
+            Radius::Scene(fraction) => given(fraction * scene_radius),
             Radius::Auto => found
                 .map_or(most * size, |n| n.radius(count, f64::from(paths)))
                 .clamp(SMALLEST * most * size, most * size)
