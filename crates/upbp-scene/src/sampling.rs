@@ -73,7 +73,7 @@ pub(crate) fn sphere_inverse(direction: Vec3) -> [f32; 2] {
     cone_local_inverse(2.0, direction)
 }
 
-/// The pair of numbers with which [`cone`] gives a direction; the first is above 1 outside of the cone.
+/// The pair of numbers with which [`fine::cone`] gives a direction; the first is above 1 outside of the cone.
 pub(crate) fn cone_inverse(axis: Vec3, height: f32, direction: Vec3) -> [f32; 2] {
     cone_local_inverse(height, to_local(axis, direction))
 }
@@ -96,11 +96,6 @@ pub(crate) fn to_local(axis: Vec3, direction: Vec3) -> Vec3 {
 /// A direction, uniform over the sphere: density `1 / 4π`.
 pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {
     cone_local(2.0, u)
-}
-
-/// A direction around `axis`, uniform over the cone with `1 − cos θ_max = height`: density `1 / (2π height)`.
-pub(crate) fn cone(axis: Vec3, height: f32, u: [f32; 2]) -> Vec3 {
-    to_world(axis, cone_local(height, u))
 }
 
 /// Turns a direction of the frame in which `axis` is z into a direction of the world.
@@ -129,12 +124,12 @@ pub(crate) mod fine {
         cone_local(2.0, u).as_vec3().normalize()
     }
 
-    /// A direction around `axis`, as by [`cone`](super::cone).
-    pub(crate) fn cone(axis: Vec3, height: f32, u: [f64; 2]) -> Vec3 {
-        let (tangent, bitangent) = orthonormal_basis(axis);
-        let local = cone_local(f64::from(height), u);
-        let [tangent, bitangent, axis] = [tangent, bitangent, axis].map(Vec3::as_dvec3);
-        (local.x * tangent + local.y * bitangent + local.z * axis).as_vec3().normalize()
+    /// A direction around `axis`, uniform over the cone with `1 − cos θ_max = height`: density
+    /// `1 / (2π height)`.
+    pub(crate) fn cone(axis: DVec3, height: f64, u: [f64; 2]) -> DVec3 {
+        let (tangent, bitangent) = orthonormal_basis(axis.as_vec3());
+        let local = cone_local(height, u);
+        (local.x * tangent.as_dvec3() + local.y * bitangent.as_dvec3() + local.z * axis).normalize()
     }
 }
 
@@ -162,10 +157,8 @@ mod tests {
             assert!(precise.iter().all(|u| *u < 1.0), "{u:?} {digits:?}");
             assert!(fine::disc(precise).as_vec2().distance(disc(u)) < 1e-6, "{u:?} {digits:?}");
             assert!(fine::sphere(precise).distance(sphere(u)) < bound, "{u:?} {digits:?}");
-            assert!(
-                fine::cone(axis, 0.01, precise).distance(cone(axis, 0.01, u)) < bound,
-                "{u:?} {digits:?}"
-            );
+            let in_cone = fine::cone(axis.as_dvec3(), 0.01, precise).as_vec3();
+            assert!(in_cone.distance(to_world(axis, cone_local(0.01, u))) < bound, "{u:?} {digits:?}");
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Scenes far from the origin of their coordinates, and scenes of any size.
 
-use upbp_core::{LightPaths, Settings, TechniqueSet};
+use upbp_core::{LightPaths, Radii, Radius, Roulette, Settings, TechniqueSet};
 use upbp_scene::ReadyScene;
-use upbp_testing::render;
+use upbp_testing::{render, render_channels};
 
-fn scene(scale: f32, offset: f32) -> ReadyScene {
+/// A glass ball in a box of fog under a lamp, and perhaps another light.
+fn scene(scale: f32, offset: f32, light: &str) -> ReadyScene {
     let p = |x: f32, y: f32, z: f32| {
         format!("({:?}, {:?}, {:?})", scale * (x + offset), scale * (y + offset), scale * (z + offset))
     };
@@ -19,7 +20,7 @@ fn scene(scale: f32, offset: f32) -> ReadyScene {
             (geometry: Quad(origin: {}, edge_u: {}, edge_v: {}), material: \"grey\"),
             (geometry: Mesh(positions: [{}, {}, {}], indices: [(0, 1, 2)]), material: \"grey\", emission: 1.0),
         ],
-        lights: [Point(position: {}, intensity: {:?})])",
+        lights: [{light}])",
         p(0.0, 0.5, 4.0),
         p(0.0, 0.0, 0.0),
         0.25 / scale,
@@ -34,8 +35,6 @@ fn scene(scale: f32, offset: f32) -> ReadyScene {
         p(-1.0, 2.0, -1.0),
         p(1.0, 2.0, -1.0),
         p(0.0, 2.0, 1.0),
-        p(2.0, 1.5, 1.0),
-        scale * scale
     );
     match ReadyScene::from_ron_str(&text, "") {
         Ok(scene) => scene,
@@ -51,11 +50,67 @@ fn a_translation_by_a_million_radii_changes_no_bit() {
         max_length: 50,
         ..Settings::default()
     };
-    let (_, expected) = render(&scene(1.0, 0.0), &settings, 2);
+    let at = |offset: f32| {
+        let [x, y, z] = [offset + 2.0, offset + 1.5, offset + 1.0];
+        scene(1.0, offset, &format!("Point(position: ({x:?}, {y:?}, {z:?}), intensity: 1)"))
+    };
+    let (_, expected) = render(&at(0.0), &settings, 2);
     for offset in [1024.0, 1_048_576.0] {
-        let far = scene(1.0, offset);
+        let far = at(offset);
         assert_ne!(far.origin(), glam::Vec3::ZERO);
         assert!(render(&far, &settings, 2).1 == expected, "offset {offset}");
+    }
+}
+
+#[test]
+fn a_scene_of_any_size_has_the_same_light() {
+    for techniques in ["bpt", "pp3d+pb2d+hit+nee"] {
+        let settings = Settings {
+            techniques: techniques.parse().expect("technique names"),
+            light_paths: LightPaths::Count(1000),
+            max_length: 50,
+            roulette: Some(Roulette::Below(0.5)),
+            radii: Radii::all(Radius::Scene(0.01)),
+            ..Settings::default()
+        };
+        let mean = |exponent| render_channels(&scene(2_f32.powi(exponent), 0.0, ""), &settings, 20);
+        let expected = mean(0);
+        for exponent in [-36, -20, 20, 36] {
+            let found = mean(exponent);
+            for (found, expected) in found.iter().zip(&expected) {
+                let sigmas = found.sigmas(expected);
+                assert!(sigmas.abs() < 4.0, "{techniques}, 2^{exponent}: {found:?}, {expected:?}");
+            }
+        }
+    }
+}
+
+/// A lamp over a floor, its cover of glass a millimetre before it, all else `distance` away.
+fn under_a_cover(distance: f32) -> ReadyScene {
+    let (floor, side) = (-distance, 2.0 * distance);
+    let text = format!(
+        "(version: 1, camera: Perspective(origin: (0, {:?}, {:?}), target: (0, {floor:?}, 0), fov_degrees: 10),
+        film: (width: 8, height: 8),
+        materials: {{\"black\": Lambert(0), \"white\": Lambert(0.7), \"glass\": Dielectric(1.5)}},
+        shapes: [
+            (geometry: Quad(origin: ({floor:?}, {floor:?}, {floor:?}), edge_u: (0, 0, {side:?}), edge_v: ({side:?}, 0, 0)),
+             material: \"white\"),
+            (geometry: Quad(origin: (-0.1, 0, -0.1), edge_u: (0.2, 0, 0), edge_v: (0, 0, 0.2)),
+             material: \"black\", emission: 100),
+            (geometry: Box(min: (-0.15, -0.0025, -0.15), max: (0.15, -0.0015, 0.15)), material: \"glass\"),
+        ])",
+        0.5 * floor,
+        0.3 * distance,
+    );
+    ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+#[test]
+fn what_is_just_before_a_lamp_blocks_at_any_distance() {
+    let settings = Settings { techniques: "nee".parse().expect("a technique"), ..Settings::default() };
+    for distance in [5.0, 50.0, 500.0, 1000.0] {
+        let (_, image) = render(&under_a_cover(distance), &settings, 4);
+        assert_eq!(image.mean(), [0.0; 3], "{distance}: next events go straight through glass");
     }
 }
 

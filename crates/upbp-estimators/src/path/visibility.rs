@@ -39,14 +39,20 @@ pub fn clear_edge<S: Scene, L: Lanes>(
     target: &Target,
     crossings: &mut Vec<Crossing>,
 ) -> Option<EdgeDensity<L>> {
+    /// The far end of a ray is off by less than this part of its length, by the roundings of its direction.
+    const OFF: f32 = 4.0 * f32::EPSILON;
+    /// Surfaces that are met at smaller cosines count as met at this one.
+    const LEAST_COSINE: f32 = 0.04;
     crossings.clear();
     let ray = match target.surface {
         Some((position, normal)) => {
             // Both ends stand off their surfaces, so that neither blocks the view; the ray ends before it
-            // could, by rounding, meet a surface that it grazes.
+            // could, by rounding, meet the surface that it leads to.
             let between = offset_origin(position, normal, -target.direction) - origin;
             let length = between.length();
-            Ray { origin, direction: between / length, t_min: 0.0, t_max: length * (1.0 - 1e-5) }
+            let direction = between / length;
+            let short = OFF / direction.dot(normal).abs().max(LEAST_COSINE);
+            Ray { origin, direction, t_min: 0.0, t_max: length * (1.0 - short) }
         }
         None => Ray { origin, direction: target.direction, t_min: 0.0, t_max: target.distance },
     };

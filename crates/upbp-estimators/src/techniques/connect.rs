@@ -62,8 +62,10 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Some(light_side) = light.evaluate(context, -direction) else {
         return;
     };
-    let scattering = camera_side.value * light_side.value;
-    if scattering.is_black() {
+    // Each end by itself: the product of two throughputs alone, in a medium as large as its mean free path
+    // squared, may exceed single precision where the whole does not.
+    let ends = [vertex.throughput * camera_side.value, light.throughput * light_side.value];
+    if ends.iter().any(|end| end.is_black()) {
         return;
     }
     out.counters.shadow_rays += 1;
@@ -103,11 +105,7 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     );
     let weight = mis.connect_weight(light_end, camera_end);
     let geometry = camera_side.cos * light_side.cos / distance2;
-    let value = vertex.throughput
-        * light.throughput
-        * scattering
-        * density.transmittance
-        * (geometry * factor) as f32;
+    let value = ends[0] * ends[1] * density.transmittance * (geometry * factor) as f32;
     out.record(&ObservedSample {
         technique: Technique::Connect,
         camera_depth: vertex.depth,

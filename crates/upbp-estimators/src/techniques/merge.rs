@@ -29,7 +29,8 @@ pub(super) fn merge<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     // The merge takes place at the camera vertex: its radii are those of all techniques there.
     let scale = f64::from(camera.scale);
     let per_photon = kernel * plan.per_photon(technique);
-    let mut value = camera.throughput * light.throughput * scattering.value * per_photon;
+    // Not the product of two throughputs, which may exceed single precision where the whole does not.
+    let mut value = (camera.throughput * scattering.value) * (light.throughput * per_photon);
     let (factor, merges) = match camera.interaction {
         Interaction::Surface(_) => {
             // The value is corrected by the cosine of the camera vertex's facet, but photons are as dense as

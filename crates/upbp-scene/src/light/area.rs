@@ -5,7 +5,7 @@
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use upbp_accel::{Shape, Sphere, TriangleMesh};
 use upbp_estimators::scene::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
@@ -18,7 +18,7 @@ use crate::sampling;
 
 /// Nearer to the centre of a sphere than this many radii (squared), the cone of directions is too close to a
 /// hemisphere: points are chosen by area.
-const NEAR_SPHERE: f32 = 1.001;
+const NEAR_SPHERE: f64 = 1.001;
 
 /// A surface that shines on one side.
 #[derive(Clone, Debug)]
@@ -43,34 +43,33 @@ impl AreaLight {
         self.radiance
     }
 
-    /// The cone of directions in which `receiver` sees the light, if points are chosen by it: its axis, and
-    /// one minus the cosine of its half angle.
-    fn cone(&self, receiver: Vec3) -> Option<(&Sphere, Vec3, f32)> {
+    /// The cone of directions in which `receiver` sees the light, if points are chosen by it: the sphere, the
+    /// way to its centre, and one minus the cosine of the half angle.
+    fn cone(&self, receiver: Vec3) -> Option<(&Sphere, DVec3, f64)> {
         let Shape::Sphere(sphere) = &self.shape else { return None };
-        let to_centre = sphere.centre() - receiver;
-        let sin2 = sphere.radius() * sphere.radius() / to_centre.length_squared();
+        let to_centre = sphere.centre().as_dvec3() - receiver.as_dvec3();
+        let sin2 = f64::from(sphere.radius()).powi(2) / to_centre.length_squared();
         if sin2 * NEAR_SPHERE >= 1.0 {
             return None;
         }
-        let axis = to_centre.try_normalize()?;
         // 1 − cos without cancellation for a small sphere.
         let height = sin2 / (1.0 + (1.0 - sin2).sqrt());
-        (height > 0.0).then_some((sphere, axis, height))
+        // As a density it is of single precision.
+        (height as f32).is_normal().then_some((sphere, to_centre, height))
     }
 
     fn sample_point(&self, receiver: Vec3, u: [f32; 2]) -> Option<EmitterPoint> {
-        let Some((sphere, axis, height)) = self.cone(receiver) else {
+        let Some((sphere, to_centre, height)) = self.cone(receiver) else {
             let (position, normal) = self.shape.sample_area(u);
             return Some(EmitterPoint { position, normal });
         };
-        let towards = sampling::cone(axis, height, u);
+        // In double precision: a small sphere far away is narrower than the last digits of a direction.
+        let towards = sampling::fine::cone(to_centre.try_normalize()?, height, u.map(f64::from));
         // Where that ray enters the sphere; a ray on the rim may miss by rounding, and touches.
-        let to_centre = (sphere.centre() - receiver).as_dvec3();
-        let along = to_centre.dot(towards.as_dvec3());
-        let across = to_centre - towards.as_dvec3() * along;
+        let across = to_centre - towards * to_centre.dot(towards);
         let radius = f64::from(sphere.radius());
         let half_chord = (radius * radius - across.length_squared()).max(0.0).sqrt();
-        let normal = (towards.as_dvec3() * -half_chord - across).try_normalize()?;
+        let normal = (towards * -half_chord - across).try_normalize()?;
         let position = (sphere.centre().as_dvec3() + normal * radius).as_vec3();
         Some(EmitterPoint { position, normal: normal.as_vec3() })
     }
@@ -160,7 +159,7 @@ impl Emitter for AreaLight {
     ) -> f32 {
         let Some((_, _, height)) = self.cone(receiver) else { return pdf_position };
         // p_area = p_ω cos θ / d²: zero on the far side, which the receiver does not see.
-        let pdf_solid_angle = 1.0 / (TAU * height);
+        let pdf_solid_angle = 1.0 / (TAU * height as f32);
         let pdf = pdf_solid_angle * direction.dot(point.normal).max(0.0)
             / receiver.distance_squared(point.position);
         if pdf.is_finite() { pdf } else { 0.0 }

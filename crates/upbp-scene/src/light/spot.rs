@@ -103,7 +103,8 @@ impl Emitter for SpotLight {
         u_direction: [f32; 2],
     ) -> Option<Emission> {
         let u = sampling::fine::numbers(u_direction, digits);
-        let direction = sampling::fine::cone(self.cone.axis, self.cone.height(), u);
+        let (axis, height) = (self.cone.axis.as_dvec3(), f64::from(self.cone.height()));
+        let direction = sampling::fine::cone(axis, height, u).as_vec3().normalize();
         let falloff = self.cone.falloff(direction);
         (falloff > 0.0).then(|| Emission {
             point: EmitterPoint { position: self.position, normal: direction },

@@ -93,7 +93,8 @@ fn the_density_of_next_events_to_a_sphere_integrates_to_one() {
             let mut sum = 0.0;
             for i in 0..directions * directions {
                 let at = |i: i32| ((i % directions) as f32 + 0.5) / directions as f32;
-                let direction = sampling::cone(axis, height, [at(i), at(i / directions)]);
+                let u = [at(i), at(i / directions)].map(f64::from);
+                let direction = sampling::fine::cone(axis.as_dvec3(), f64::from(height), u).as_vec3();
                 for k in 0..distances {
                     let distance = nearest + (k as f32 + 0.5) * step;
                     let position = receiver + distance * direction;
@@ -123,6 +124,29 @@ fn a_volume_that_positions_cannot_tell_apart_is_never_chosen() {
     assert_eq!(light(0.5, 1e5), 0.0, "too dense");
     assert_eq!(light(1e-5, 1.0), 0.0, "too small");
     assert_eq!(light(1e15, 0.0), 0.0, "too large");
+}
+
+#[test]
+fn next_events_to_a_sphere_far_away_lose_nothing() {
+    let sphere = Sphere::new(Vec3::new(0.2, 0.5, 0.0), 1.0).unwrap();
+    let light = area(sphere);
+    let steps = 300;
+    for distance in [10.0, 1e3, 1e5, 1e6, 3e6, 1e7] {
+        let receiver = sphere.centre() + distance * Vec3::new(0.48, 0.6, 0.64);
+        let mut sum = 0.0;
+        for i in 0..steps * steps {
+            let u = [i % steps, i / steps].map(|i| (i as f32 + 0.5) / steps as f32);
+            // Radiance over the density per solid angle: the solid angle times the radiance.
+            let Some(found) = light.sample_incident(&BOUNDS, receiver, u) else { continue };
+            let cosine = found.point.normal.dot(-found.towards_light);
+            let pdf = found.pdf * found.distance * found.distance / cosine;
+            sum += f64::from(found.radiance.mean() / pdf);
+        }
+        let sine = 1.0 / f64::from(sphere.centre().distance(receiver));
+        let solid_angle = f64::from(TAU) * sine * sine / (1.0 + (1.0 - sine * sine).sqrt());
+        let found = sum / f64::from(steps * steps) / (2.0 * solid_angle);
+        assert!((found - 1.0).abs() < 1e-3, "{distance}: {found}");
+    }
 }
 
 #[test]

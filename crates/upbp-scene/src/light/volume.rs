@@ -67,11 +67,11 @@ impl VolumeLight {
         let Some(sphere) = self.inside.as_sphere() else { return Some(self.inside.sample(three(u))) };
         let [_, _, u_distance] = three(u);
         let direction = match cone(sphere, receiver) {
-            Some((axis, height)) => sampling::cone(axis, height, u),
-            None => sampling::sphere(u),
+            Some((axis, height)) => sampling::fine::cone(axis, height, u.map(f64::from)),
+            None => sampling::sphere(u).as_dvec3().normalize(),
         };
         // A ray on the rim of the cone may miss by rounding.
-        let (from, direction) = (receiver.as_dvec3(), direction.as_dvec3().normalize());
+        let from = receiver.as_dvec3();
         let [start, end] = chord(sphere, from, direction)?;
         let t = self.medium.sample_emitted(&stretch(end - start), u_distance as f32)?;
         Some((from + direction * (start + f64::from(t))).as_vec3())
@@ -93,15 +93,15 @@ fn three([u, v]: [f32; 2]) -> [f64; 3] {
 
 /// The cone of directions in which `receiver` sees a sphere: its axis, and one minus the cosine of its half
 /// angle. `None` if it is inside, or so near that the cone is almost a hemisphere.
-fn cone(sphere: &Sphere, receiver: Vec3) -> Option<(Vec3, f32)> {
+fn cone(sphere: &Sphere, receiver: Vec3) -> Option<(DVec3, f64)> {
     let to_centre = sphere.centre().as_dvec3() - receiver.as_dvec3();
     let sin2 = f64::from(sphere.radius()).powi(2) / to_centre.length_squared();
     if sin2 * NEAR_SPHERE >= 1.0 {
         return None;
     }
     // 1 − cos without cancellation for a small sphere.
-    let height = (sin2 / (1.0 + (1.0 - sin2).sqrt())) as f32;
-    (height > 0.0).then_some((to_centre.try_normalize()?.as_vec3(), height))
+    let height = sin2 / (1.0 + (1.0 - sin2).sqrt());
+    (height as f32 > 0.0).then_some((to_centre.try_normalize()?, height))
 }
 
 /// Distances at which a ray from `from` is in the sphere first and last.
@@ -191,7 +191,7 @@ impl Emitter for VolumeLight {
         let Some(direction) = between.try_normalize() else { return 0.0 };
         let Some([start, end]) = chord(sphere, from, direction) else { return 0.0 };
         let pdf_solid_angle =
-            cone(sphere, receiver).map_or(PDF_DIRECTION, |(_, height)| 1.0 / (TAU * height));
+            cone(sphere, receiver).map_or(PDF_DIRECTION, |(_, height)| 1.0 / (TAU * height as f32));
         let segment = stretch(end - start);
         let distance = (between.length() - start) as f32;
         let pdf_distance = self.medium.pdf_emitted(&segment, distance.clamp(0.0, segment.end));
