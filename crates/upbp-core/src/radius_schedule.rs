@@ -6,9 +6,9 @@ use upbp_estimators::{Kernel, Kernels, RadiusField, Technique, TechniqueSet};
 /// The first radius of a kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Radius {
-    /// From a few sub-paths: as many photons in a kernel as smooth well, within bounds relative to what the picture
-    /// shows, and over the scene as the width of a pixel. All techniques have the same radius everywhere if
-    /// one of them has another setting.
+    /// From a few sub-paths: as many photons in a kernel as smooth well, within bounds relative to what the
+    /// picture shows, and over the scene as the width of a pixel. All techniques have the same radius
+    /// everywhere if one of them has another setting.
     #[default]
     Auto,
     /// A fraction of the radius of the scene's bounding sphere.

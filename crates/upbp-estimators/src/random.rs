@@ -25,9 +25,9 @@ const STRATIFIED_DRAWS: u32 = 24;
 const SQUARE: u32 = 1 << LEVELS;
 /// Times that a square is divided into four to get to a pixel.
 const LEVELS: u32 = 4;
-/// Draws that camera sub-paths of pilot renders with one index have in common: the place on the film, that on the
-/// lens, the first distance in a medium, and the next event there, an emitter and a point on it. In lanes the
-/// channel takes the place of that point; without a medium, it is what is drawn next.
+/// Draws that camera sub-paths of pilot renders with one index have in common: the place on the film, that
+/// on the lens, the first distance in a medium, and the next event there, an emitter and a point on it. In
+/// lanes the channel takes the place of that point; without a medium, it is what is drawn next.
 const COMMON_DRAWS: u32 = 5;
 
 /// The purpose of a stream.
@@ -41,9 +41,9 @@ pub enum StreamKind {
     Camera,
     /// Light sub-paths of the preparation, which sets radii and counts before the first iteration.
     PilotLight,
-    /// Camera sub-paths of pilot renders. Those with the same index, of different iterations, begin alike and are
-    /// independent after a few draws: what they differ in is what stratification leaves of the variance of a
-    /// pixel, since it takes away what their common decisions make.
+    /// Camera sub-paths of pilot renders. Those with the same index, of different iterations, begin alike and
+    /// are independent after a few draws: what they differ in is what stratification leaves of the variance
+    /// of a pixel, since it takes away what their common decisions make.
     PilotCamera,
     /// The turns in which pixels make photon queries.
     MergePeriods,

@@ -32,8 +32,8 @@ impl Block {
     }
 }
 
-/// Points with a payload each, searched with any radius. Payloads are numbers of one type, so that the build is
-/// compiled once.
+/// Points with a payload each, searched with any radius. Payloads are numbers of one type, so that the build
+/// is compiled once.
 ///
 /// The same points give the same tree and the same order of visits, whatever the number of threads.
 ///
