@@ -19,6 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The choice of techniques has to know how much time there is.
     let start = Start { stop, ..Start::default() };
     let mut renderer = Renderer::start(&room, settings.validate()?, start)?;
+    // Room::new(256): what its content depends on.
+    renderer.identify_scene("host room", &256_u32.to_le_bytes());
     renderer.render(&stop, |now| {
         println!("{:3.0} %, estimated relMSE {}", 100.0 * now.fraction, now.estimated_error);
         ControlFlow::Continue(())

@@ -18,6 +18,7 @@ pub(crate) fn prepare(
     seconds: f64,
 ) -> Result<Renderer<'_>, Box<dyn Error>> {
     let stop = Stop { seconds: Some(seconds), ..Stop::default() };
+    // For the check of its size: errors are taken below.
     let start = Start { stop, reference: Some(subject.reference.clone()), ..Start::default() };
     let renderer = subject.scene.start_renderer(settings.validate()?, start);
     Ok(renderer.map_err(|error| format!("{}: {error}", subject.name))?)

@@ -54,10 +54,10 @@ pub struct Stop {
     /// Number of iterations on the film.
     pub iterations: Option<u64>,
     /// Seconds of rendering, those before a resumption and those of the preparation included. The last
-    /// iteration ends in its middle, unless it takes no longer than a hundredth more; one of which little
-    /// more than its light sub-paths could be done is not begun. The light sub-paths of the first iteration
-    /// are traced to the end, since without them there is no picture: a
-    /// [count](crate::LightPaths::Count) that is given may take any time.
+    /// iteration ends in its middle if it is not done a hundredth after the limit; one of which little more
+    /// than its light sub-paths could be done is not begun. The first iteration has half a second, or a
+    /// fortieth of the limit, in any case, and its light sub-paths are traced to the end, since without them
+    /// there is no picture: a [count](crate::LightPaths::Count) that is given may take any time.
     pub seconds: Option<f64>,
     /// Largest upper end of [`Film::estimated_error`](crate::Film::estimated_error). Asked for after 8, 10,
     /// 12, 14, 16, 20, 24, 28, 32, 40 iterations and so on: who asks after each stops at the luckiest answer.

@@ -70,13 +70,13 @@ pub enum RenderError {
         /// The techniques that are not ruled out.
         techniques: TechniqueSet,
     },
-    /// A reference image of another size than what is rendered.
-    #[error("expected a reference of {} x {} pixels, found {} x {}", expected[0], expected[1], found[0], found[1])]
+    /// A reference image of another size than what is rendered, or without all of its pixels.
+    #[error("expected a reference of {} x {} pixels, found {found}", expected[0], expected[1])]
     Reference {
         /// Width and height of what is rendered.
         expected: [u32; 2],
-        /// Width and height of the reference.
-        found: [u32; 2],
+        /// The size of the reference, or the number of its pixels.
+        found: String,
     },
     /// The render was cancelled before there was anything to show.
     #[error("cancelled before the first iteration")]

@@ -1,7 +1,7 @@
 //! Pieces of work on all threads of the current pool.
 //!
-//! Iterators of rayon would be compiled for each kind of piece, thus for each type of scene, where they were
-//! a fifth of all that the compiler was given. What is compiled here for each of them is a loop.
+//! Iterators of rayon are compiled for each kind of piece, thus for each type of scene, and take the compiler
+//! long. Of this only a loop is.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -14,9 +14,19 @@ pub(crate) fn do_all<T, S: Default>(
     pieces: impl Iterator<Item = T> + Send,
     work: impl Fn(&mut S, T) -> bool + Sync,
 ) -> bool {
+    /// Halts the other threads if its own panics.
+    struct HaltOnPanic<'a>(&'a AtomicBool);
+    impl Drop for HaltOnPanic<'_> {
+        fn drop(&mut self) {
+            if std::thread::panicking() {
+                self.0.store(true, Ordering::Relaxed);
+            }
+        }
+    }
     let (pieces, is_halted) = (Mutex::new(pieces), AtomicBool::new(false));
     let next = || pieces.lock().unwrap_or_else(PoisonError::into_inner).next();
     on_all_threads(&|| {
+        let _guard = HaltOnPanic(&is_halted);
         let mut scratch = S::default();
         while !is_halted.load(Ordering::Relaxed)
             && let Some(piece) = next()
@@ -55,6 +65,22 @@ mod tests {
             });
             assert!(done && counts.iter().all(|count| *count == 1));
         }
+    }
+
+    #[test]
+    fn few_are_begun_after_one_that_panics() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let mut counts = vec![0; 1_000_000];
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            pool.install(|| {
+                do_all(counts.iter_mut().enumerate(), |(): &mut (), (index, count)| {
+                    *count += 1;
+                    assert!(index != 30, "a piece that fails");
+                    true
+                })
+            })
+        }));
+        assert!(result.is_err() && counts.iter().sum::<i32>() < 1_000_000);
     }
 
     #[test]

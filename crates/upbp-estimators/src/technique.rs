@@ -117,7 +117,7 @@ impl<T> PerMerge<T> {
         }
     }
 
-    /// A function of each value.
+    /// Applies a function to each value.
     #[must_use]
     pub fn map<U>(self, mut function: impl FnMut(T) -> U) -> PerMerge<U> {
         PerMerge {

@@ -6,7 +6,8 @@
 
 use std::f32::consts::{FRAC_PI_4, TAU};
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use upbp_accel::Sphere;
 use upbp_media::orthonormal_basis;
 
 /// The maps whose formulas both precisions have in common.
@@ -96,6 +97,22 @@ pub(crate) fn to_local(axis: Vec3, direction: Vec3) -> Vec3 {
 /// A direction, uniform over the sphere: density `1 / 4π`.
 pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {
     cone_local(2.0, u)
+}
+
+/// The cone of directions in which `receiver` sees a sphere: its axis, and one minus the cosine of its half
+/// angle. `None` if it is inside, or so near that the cone is almost a hemisphere, or too far for a density
+/// in single precision.
+pub(crate) fn cone_of(sphere: &Sphere, receiver: Vec3) -> Option<(DVec3, f64)> {
+    /// Least distance from the centre, in radii, squared.
+    const NEAR: f64 = 1.001;
+    let to_centre = sphere.centre().as_dvec3() - receiver.as_dvec3();
+    let sin2 = f64::from(sphere.radius()).powi(2) / to_centre.length_squared();
+    if sin2 * NEAR >= 1.0 {
+        return None;
+    }
+    // 1 − cos without cancellation for a small sphere.
+    let height = sin2 / (1.0 + (1.0 - sin2).sqrt());
+    (height as f32).is_normal().then_some((to_centre.try_normalize()?, height))
 }
 
 /// Turns a direction of the frame in which `axis` is z into a direction of the world.

@@ -85,8 +85,8 @@ fn a_scene_of_any_size_has_the_same_light() {
     }
 }
 
-/// A lamp over a floor, its cover of glass a millimetre before it, all else `distance` away.
-fn under_a_cover(distance: f32) -> ReadyScene {
+/// A lamp over a floor, with what is a millimetre before it, all else `distance` away.
+fn under_a_lamp(distance: f32, cover: &str) -> ReadyScene {
     let (floor, side) = (-distance, 2.0 * distance);
     let text = format!(
         "(version: 1, camera: Perspective(origin: (0, {:?}, {:?}), target: (0, {floor:?}, 0), fov_degrees: 10),
@@ -97,7 +97,7 @@ fn under_a_cover(distance: f32) -> ReadyScene {
              material: \"white\"),
             (geometry: Quad(origin: (-0.1, 0, -0.1), edge_u: (0.2, 0, 0), edge_v: (0, 0, 0.2)),
              material: \"black\", emission: 100),
-            (geometry: Box(min: (-0.15, -0.0025, -0.15), max: (0.15, -0.0015, 0.15)), material: \"glass\"),
+            {cover}
         ])",
         0.5 * floor,
         0.3 * distance,
@@ -107,10 +107,13 @@ fn under_a_cover(distance: f32) -> ReadyScene {
 
 #[test]
 fn what_is_just_before_a_lamp_blocks_at_any_distance() {
+    const COVER: &str =
+        "(geometry: Box(min: (-0.15, -0.0025, -0.15), max: (0.15, -0.0015, 0.15)), material: \"glass\"),";
     let settings = Settings { techniques: "nee".parse().expect("a technique"), ..Settings::default() };
     for distance in [5.0, 50.0, 500.0, 1000.0] {
-        let (_, image) = render(&under_a_cover(distance), &settings, 4);
-        assert_eq!(image.mean(), [0.0; 3], "{distance}: next events go straight through glass");
+        let mean = |cover| render(&under_a_lamp(distance, cover), &settings, 4).1.mean();
+        assert!(mean("").iter().all(|mean| *mean > 0.0), "{distance}");
+        assert_eq!(mean(COVER), [0.0; 3], "{distance}: next events go straight through glass");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use upbp_core::{Renderer, Settings, Start, Stop, StopReason};
+use upbp_core::{Image, Renderer, Settings, Start, Stop, StopReason};
 use upbp_scene::ReadyScene;
 
 fn renderer(room: &ReadyScene) -> Renderer<'_> {
@@ -51,6 +51,20 @@ fn each_rule_stops() {
     });
     assert_eq!(reason, StopReason::Cancelled);
     assert_eq!(by_handle.film().iterations(), 2, "an abandoned iteration leaves no trace");
+}
+
+#[test]
+fn references_of_another_size_are_refused() {
+    let room = upbp_testing::room(4);
+    for (width, height, pixels, message) in [
+        (5, 4, 20, "expected a reference of 4 x 4 pixels, found 5 x 4"),
+        (4, 4, 15, "expected a reference of 4 x 4 pixels, found 15 in all"),
+    ] {
+        let settings = Settings::default().validate().expect("valid settings");
+        let reference = Some(Image { width, height, pixels: vec![[0.0; 3]; pixels] });
+        let error = room.start_renderer(settings, Start { reference, ..Start::default() }).map(|_| ());
+        assert_eq!(error.expect_err("another size").to_string(), message);
+    }
 }
 
 #[test]

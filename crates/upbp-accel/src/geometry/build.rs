@@ -62,7 +62,7 @@ impl Boxed {
     }
 }
 
-/// What makes a block of some primitives of a kind. Not a type parameter, so that the build is compiled once.
+/// Makes a block of some primitives of a kind. Not a type parameter, so that the build is compiled once.
 type Pack<'a> = &'a mut dyn FnMut(Kind, &[u32]) -> Child;
 
 /// Builds over primitives.

@@ -194,7 +194,7 @@ fn measure_enough<S: Scene, L: Lanes>(
     enough: f64,
     halt: &Halt<'_>,
 ) -> Option<Measured> {
-    /// How many times as many as are enough a run may bring.
+    /// Most contributions that a run may bring, relative to those that are enough.
     const FAR_MORE: f64 = 2.0;
     let (mut next, mut best) = (part.min(FEW), None);
     loop {
@@ -415,6 +415,10 @@ impl<B> Observer<B> for Seen {
         let (technique, pixel) = (sample.technique, value * weight);
         let seen = |together| Contribution { technique, value, weight, together, pixel };
         self.light += pixel;
+        // What depends on no choice of an emitter is not kept.
+        if matches!(sample.completion, Completion::Emission | Completion::Hit(_) | Completion::Lens { .. }) {
+            return;
+        }
         self.contributions += 1;
         if self.contributions > self.most {
             return;

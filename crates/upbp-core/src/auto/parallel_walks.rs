@@ -76,7 +76,7 @@ impl SampleRoom {
         self.most
     }
 
-    /// The part of it that is taken.
+    /// The part of the room that is taken.
     pub(super) fn taken(&self) -> f64 {
         self.taken.load(Ordering::Relaxed) as f64 / self.most as f64
     }

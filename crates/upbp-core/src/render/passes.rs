@@ -1,7 +1,7 @@
 //! The passes of one iteration, in parallel, with a result that does not depend on the number of threads.
 //!
-//! Work is cut into pieces of fixed size, and what pieces return is put together in their order: a reduction
-//! by work stealing would change the last bits with the schedule.
+//! Work is cut into pieces whose size does not depend on the number of threads, and what pieces return is put
+//! together in their order: a reduction by work stealing would change the last bits with the schedule.
 
 use std::iter::repeat_with;
 use std::ops::Range;
@@ -130,7 +130,7 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
     // Integers: the same in whatever order they are added.
     let sum = Mutex::new(Counters::default());
     let done = do_all(chunks, |scratch: &mut Scratch<S::Bsdf, L>, (chunk, (pixels, features))| {
-        let mut counters = Counters::default();
+        let (mut counters, mut traced) = (Counters::default(), false);
         for (i, pixel) in pixels.iter_mut().enumerate() {
             let place = chunk * CAMERA_CHUNK + i;
             let (column, row) = (place % width, place / width);
@@ -140,6 +140,7 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
             if halt.now() {
                 return false;
             }
+            traced = true;
             let place = [rect.x + column as u32, rect.y + row as u32];
             let (kind, index, counters) = (StreamKind::Camera, pixel_index(place), &mut counters);
             let walk =
@@ -152,7 +153,10 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
                 *own = walk.features;
             }
         }
-        sum.lock().unwrap_or_else(PoisonError::into_inner).add(&counters);
+        // Of few sets most pieces have no pixel.
+        if traced {
+            sum.lock().unwrap_or_else(PoisonError::into_inner).add(&counters);
+        }
         true
     });
     done.then(|| sum.into_inner().unwrap_or_else(PoisonError::into_inner))

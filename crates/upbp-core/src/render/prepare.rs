@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use upbp_estimators::scene::{Camera, Scene};
+use upbp_estimators::scene::{Camera, PixelRect, Scene};
 use upbp_estimators::{LightMap, PreparedScene};
 
 use super::engine::{Engine, SceneEngine};
@@ -38,11 +38,22 @@ pub struct Start<'a> {
     /// few light sub-paths that there are several iterations. If choices are to be
     /// [deterministic](crate::Settings::deterministic), all limits are ignored.
     pub stop: Stop,
-    /// An image to compare with after each iteration, of the size of what is rendered: the errors are a
-    /// [series](crate::ErrorSeries) of the state and its report.
+    /// An image of the size of what is rendered: [`render`](crate::Renderer::render) compares with it after
+    /// each iteration, and the errors are a [series](crate::ErrorSeries) of the state and its report.
     pub reference: Option<Image>,
     /// Is told what comes next, before each step of the preparation.
     pub progress: Option<&'a mut (dyn FnMut(Preparing) + Send)>,
+}
+
+fn check_reference(image: &Image, rect: PixelRect) -> Result<(), RenderError> {
+    let found = if (image.width, image.height) != (rect.width, rect.height) {
+        format!("{} x {}", image.width, image.height)
+    } else if !image.is_whole() {
+        format!("{} in all", image.pixels.len())
+    } else {
+        return Ok(());
+    };
+    Err(RenderError::Reference { expected: [rect.width, rect.height], found })
 }
 
 /// Prepares the scene, and chooses the plan unless one is given.
@@ -55,10 +66,8 @@ pub(super) fn prepare<'a, S: Scene>(
     let Start { plan, canceller, stop, reference, progress } = start;
     stop.check()?;
     let rect = scene.camera().crop();
-    if let Some(Image { width, height, .. }) = reference
-        && (width, height) != (rect.width, rect.height)
-    {
-        return Err(RenderError::Reference { expected: [rect.width, rect.height], found: [width, height] });
+    if let Some(image) = &reference {
+        check_reference(image, rect)?;
     }
     let stop = if settings.deterministic { Stop::default() } else { stop };
     let mut budget = Budget { start: begun, canceller: canceller.clone(), stop, progress };

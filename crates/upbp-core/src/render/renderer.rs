@@ -16,7 +16,7 @@ use crate::error::{RenderError, StateError};
 use crate::film::{ErrorEstimate, Film, Image, MAX_ITERATIONS, Pixel};
 use crate::report::Report;
 use crate::settings::CheckedSettings;
-use crate::state::{Identity, PassTimes, State, fingerprint};
+use crate::state::{Identity, PassSeconds, PassTimes, State, fingerprint};
 
 /// A render of one scene.
 ///
@@ -94,7 +94,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// Says which scene this is, so that states of different scenes are told apart: a name for people, and a
-    /// fingerprint of all that the scene's content depends on. It comes before a state is
+    /// fingerprint of all that the scene's content depends on. To be called before a state is
     /// [resumed](Self::resume).
     pub fn identify_scene(&mut self, name: &str, content: &[u8]) {
         name.clone_into(&mut self.state.identity.scene);
@@ -174,7 +174,8 @@ impl<'a> Renderer<'a> {
         let mut clock = Clock::start();
         let mut done = missing.start;
         while done < missing.end {
-            let portion = halt.time_left().map_or(PORTION, |left| left.min(PORTION));
+            // Half of what is left: a portion that does not end in time is lost.
+            let portion = halt.time_left().map_or(PORTION, |left| PORTION.min(left / 2));
             let fit = self.set_time.map_or(1.0, |time| portion.as_secs_f64() / time.as_secs_f64().max(1e-9));
             let sets = done..done.saturating_add((fit as u32).max(1)).min(missing.end);
             let camera_halt = if film.is_empty() && done == 0 { &unlimited } else { &halt };
@@ -232,9 +233,12 @@ impl<'a> Renderer<'a> {
             if let Some(reason) = self.reason_to_stop(stop) {
                 return reason;
             }
+            let before = self.seconds();
             if !self.iterate_until(stop) {
-                // With what is done of the iteration.
-                self.compare();
+                // With what is done of the iteration, if anything.
+                if self.seconds() > before {
+                    self.compare();
+                }
                 let cancelled = self.canceller.is_cancelled();
                 return if cancelled { StopReason::Cancelled } else { StopReason::Time };
             }
@@ -257,15 +261,8 @@ impl<'a> Renderer<'a> {
 
     /// Moment at which an iteration that begins now has to end.
     fn deadline(&self, stop: &Stop) -> Option<Instant> {
-        /// Part of the limit by which an iteration may exceed it, so that short ones stay whole.
-        const PATIENCE: f64 = 0.01;
-        /// Seconds, and part of the limit, that the first iteration has however long the preparation took:
-        /// there is always a picture.
-        const FIRST: (f64, f64) = (0.5, 0.025);
-        let limit = stop.seconds?;
-        let left = (1.0 + PATIENCE) * limit - self.seconds() - self.film_time.as_secs_f64();
-        let least = if self.state.film.is_empty() { FIRST.0.max(FIRST.1 * limit) } else { 0.0 };
-        let left = left.max(least);
+        let film_time = self.film_time.as_secs_f64();
+        let left = seconds_left(stop.seconds?, self.seconds(), film_time, self.state.film.is_empty());
         // What is longer than a clock can tell is no limit.
         Instant::now().checked_add(Duration::try_from_secs_f64(left).ok()?)
     }
@@ -277,20 +274,12 @@ impl<'a> Renderer<'a> {
         }
         if let Some(limit) = stop.seconds
             && !self.state.film.is_empty()
-            && self.seconds() + self.seconds_until_it_pays() > limit
+            && self.seconds() + seconds_until_it_pays(&self.state.seconds(), done) > limit
         {
             return Some(StopReason::Time);
         }
         let reached = |target| ErrorEstimate::is_due(done) && self.estimated_error.reached(target);
         stop.error.is_some_and(reached).then_some(StopReason::Error)
-    }
-
-    /// Time that an iteration takes until there is something to show for it: its light sub-paths, and a tenth
-    /// of its camera sub-paths.
-    fn seconds_until_it_pays(&self) -> f64 {
-        let times = self.state.seconds();
-        let done = self.state.film.iterations().max(1);
-        (times.light + times.build + 0.1 * times.camera) / done as f64
     }
 
     /// Estimates the error when a stop rule asks for it, and now and then before, for those who watch.
@@ -347,5 +336,51 @@ impl<'a> Renderer<'a> {
     #[must_use]
     pub fn report(&self) -> Report {
         self.state.report()
+    }
+}
+
+/// Seconds that an iteration may take, the adding to the film not included, after so many `seconds` of a
+/// render with a limit; `is_first` if there is nothing on the film.
+fn seconds_left(limit: f64, seconds: f64, film_time: f64, is_first: bool) -> f64 {
+    /// Part of the limit by which an iteration may exceed it, so that short ones stay whole.
+    const PATIENCE: f64 = 0.01;
+    /// Seconds, and part of the limit, that the first iteration has however long the preparation took: there
+    /// is always a picture.
+    const FIRST: (f64, f64) = (0.5, 0.025);
+    let least = if is_first { FIRST.0.max(FIRST.1 * limit) } else { 0.0 };
+    ((1.0 + PATIENCE) * limit - seconds - film_time).max(least)
+}
+
+/// Seconds that an iteration takes until its light sub-paths have paid, by the times of some.
+fn seconds_until_it_pays(times: &PassSeconds, iterations: u64) -> f64 {
+    /// Part of its camera sub-paths from which on they have.
+    const LEAST_PART: f64 = 0.1;
+    (times.light + times.build + LEAST_PART * times.camera) / iterations.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two iterations of 8 s, a quarter of them light sub-paths, after a preparation of a second.
+    const TIMES: PassSeconds =
+        PassSeconds { preparation: 1.0, light: 3.0, build: 1.0, camera: 11.0, film: 1.0 };
+
+    #[test]
+    fn an_iteration_is_begun_if_some_of_it_fits() {
+        let until_it_pays = seconds_until_it_pays(&TIMES, 2);
+        assert!((until_it_pays - 2.55).abs() < 1e-12, "{until_it_pays}");
+        // After 17 s of 20 it is, although less than half of it fits; after 18 s it is not.
+        assert!(TIMES.total() + until_it_pays < 20.0);
+        assert!(TIMES.total() + 1.0 + until_it_pays > 20.0);
+    }
+
+    #[test]
+    fn an_iteration_ends_at_the_limit() {
+        assert!((seconds_left(20.0, 17.0, 0.5, false) - 2.7).abs() < 1e-12);
+        assert_eq!(seconds_left(20.0, 21.0, 0.5, false), 0.0);
+        // There is always a picture.
+        assert_eq!(seconds_left(1.0, 3.0, 0.5, true), 0.5);
+        assert_eq!(seconds_left(100.0, 120.0, 0.5, true), 2.5);
     }
 }

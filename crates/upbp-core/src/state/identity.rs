@@ -27,7 +27,7 @@ pub struct Identity {
     pub fingerprint: String,
     /// Width and height of the whole film in pixels.
     pub film: (u32, u32),
-    /// The part of it that is rendered.
+    /// The part of the film that is rendered.
     pub part: PixelRect,
     /// Settings as they were given.
     pub settings: Settings,

@@ -113,7 +113,7 @@ fn check_enclosure<B: Bsdf>(hit: &Hit<B>) -> Check {
     match &hit.boundary {
         Boundary::Opaque(bsdf) => require(
             !refracts(bsdf),
-            "a surface that refracts encloses a body: its hits have an interior",
+            "a surface that refracts encloses a body: its boundary is not opaque",
             hit.position,
         ),
         Boundary::Refracting(..) | Boundary::Null(_) => Ok(()),

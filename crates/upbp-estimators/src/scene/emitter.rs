@@ -185,9 +185,9 @@ impl EmitterBounds {
 /// that they bring; the walks multiply that probability in. The radiance of an emitter that is given here and
 /// the one that [`hit`](Self::hit) returns must be the same function.
 ///
-/// `sphere` is what light from infinity starts in front of: it holds the scene, and is
-/// [its bounds](super::Scene::bounds) or a larger one around a point that matters to the picture. Within a
-/// render it may change, so that nothing is to be remembered of it.
+/// `sphere` holds the scene: light from infinity starts on a disc in front of it. It is
+/// [the bounds of the scene](super::Scene::bounds), or a larger sphere around a point that matters to the
+/// picture. It may change within a render, so an emitter must not keep anything that it worked out from it.
 pub trait Emitter: Send + Sync {
     /// The kind of the light.
     fn kind(&self) -> EmitterKind;

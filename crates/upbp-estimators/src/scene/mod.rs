@@ -42,6 +42,9 @@ pub trait Scene: Sync {
     type Camera: Camera;
 
     /// The nearest surface with `t` in `(ray.t_min, ray.t_max)`, null boundaries included.
+    ///
+    /// Distance and position are to be right to a rounding or two of the distance: a connection ends four of
+    /// them, over the cosine, before the surface that it leads to.
     fn intersect(&self, ray: &Ray) -> Option<Hit<Self::Bsdf>>;
 
     /// A sphere around all finite geometry and lights.

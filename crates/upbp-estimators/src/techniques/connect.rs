@@ -62,10 +62,10 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Some(light_side) = light.evaluate(context, -direction) else {
         return;
     };
-    // Each end by itself: the product of two throughputs alone, in a medium as large as its mean free path
-    // squared, may exceed single precision where the whole does not.
-    let ends = [vertex.throughput * camera_side.value, light.throughput * light_side.value];
-    if ends.iter().any(|end| end.is_black()) {
+    // Each end by itself: in media both throughputs hold 1/σ, and their product alone may leave the range of
+    // single precision where the whole does not.
+    let ends = (vertex.throughput * camera_side.value) * (light.throughput * light_side.value);
+    if ends.is_black() {
         return;
     }
     out.counters.shadow_rays += 1;
@@ -105,7 +105,7 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     );
     let weight = mis.connect_weight(light_end, camera_end);
     let geometry = camera_side.cos * light_side.cos / distance2;
-    let value = ends[0] * ends[1] * density.transmittance * (geometry * factor) as f32;
+    let value = ends * density.transmittance * (geometry * factor) as f32;
     out.record(&ObservedSample {
         technique: Technique::Connect,
         camera_depth: vertex.depth,

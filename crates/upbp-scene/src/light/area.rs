@@ -16,10 +16,6 @@ use upbp_media::Spectrum;
 use super::finite::{direction_and_distance, incident};
 use crate::sampling;
 
-/// Nearer to the centre of a sphere than this many radii (squared), the cone of directions is too close to a
-/// hemisphere: points are chosen by area.
-const NEAR_SPHERE: f64 = 1.001;
-
 /// A surface that shines on one side.
 #[derive(Clone, Debug)]
 pub struct AreaLight {
@@ -43,29 +39,23 @@ impl AreaLight {
         self.radiance
     }
 
-    /// The cone of directions in which `receiver` sees the light, if points are chosen by it: the sphere, the
-    /// way to its centre, and one minus the cosine of the half angle.
+    /// The sphere that the light is, with the cone of directions in which `receiver` sees it, if points are
+    /// chosen by it.
     fn cone(&self, receiver: Vec3) -> Option<(&Sphere, DVec3, f64)> {
         let Shape::Sphere(sphere) = &self.shape else { return None };
-        let to_centre = sphere.centre().as_dvec3() - receiver.as_dvec3();
-        let sin2 = f64::from(sphere.radius()).powi(2) / to_centre.length_squared();
-        if sin2 * NEAR_SPHERE >= 1.0 {
-            return None;
-        }
-        // 1 − cos without cancellation for a small sphere.
-        let height = sin2 / (1.0 + (1.0 - sin2).sqrt());
-        // As a density it is of single precision.
-        (height as f32).is_normal().then_some((sphere, to_centre, height))
+        let (axis, height) = sampling::cone_of(sphere, receiver)?;
+        Some((sphere, axis, height))
     }
 
     fn sample_point(&self, receiver: Vec3, u: [f32; 2]) -> Option<EmitterPoint> {
-        let Some((sphere, to_centre, height)) = self.cone(receiver) else {
+        let Some((sphere, axis, height)) = self.cone(receiver) else {
             let (position, normal) = self.shape.sample_area(u);
             return Some(EmitterPoint { position, normal });
         };
         // In double precision: a small sphere far away is narrower than the last digits of a direction.
-        let towards = sampling::fine::cone(to_centre.try_normalize()?, height, u.map(f64::from));
+        let towards = sampling::fine::cone(axis, height, u.map(f64::from));
         // Where that ray enters the sphere; a ray on the rim may miss by rounding, and touches.
+        let to_centre = sphere.centre().as_dvec3() - receiver.as_dvec3();
         let across = to_centre - towards * to_centre.dot(towards);
         let radius = f64::from(sphere.radius());
         let half_chord = (radius * radius - across.length_squared()).max(0.0).sqrt();

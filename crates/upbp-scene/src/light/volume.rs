@@ -17,9 +17,6 @@ use upbp_media::{BodyId, Homogeneous, Medium, RaySegment};
 use super::finite::{direction_and_distance, incident};
 use crate::sampling;
 
-/// Nearer to the centre of a sphere than this many radii (squared), directions are chosen from all.
-const NEAR_SPHERE: f64 = 1.001;
-
 /// Density of a uniform direction, sr⁻¹.
 const PDF_DIRECTION: f32 = 0.25 * FRAC_1_PI;
 
@@ -66,7 +63,7 @@ impl VolumeLight {
     fn sample_point(&self, receiver: Vec3, u: [f32; 2]) -> Option<Vec3> {
         let Some(sphere) = self.inside.as_sphere() else { return Some(self.inside.sample(three(u))) };
         let [_, _, u_distance] = three(u);
-        let direction = match cone(sphere, receiver) {
+        let direction = match sampling::cone_of(sphere, receiver) {
             Some((axis, height)) => sampling::fine::cone(axis, height, u.map(f64::from)),
             None => sampling::sphere(u).as_dvec3().normalize(),
         };
@@ -89,19 +86,6 @@ fn three([u, v]: [f32; 2]) -> [f64; 3] {
     let part = |shift: u32, bits: u32| (z >> shift & ((1 << bits) - 1)) as f32 / (1_u32 << bits) as f32;
     let [u, v] = sampling::fine::numbers([u, v], [part(0, 20), part(20, 20)]);
     [u, v, f64::from(part(40, 24))]
-}
-
-/// The cone of directions in which `receiver` sees a sphere: its axis, and one minus the cosine of its half
-/// angle. `None` if it is inside, or so near that the cone is almost a hemisphere.
-fn cone(sphere: &Sphere, receiver: Vec3) -> Option<(DVec3, f64)> {
-    let to_centre = sphere.centre().as_dvec3() - receiver.as_dvec3();
-    let sin2 = f64::from(sphere.radius()).powi(2) / to_centre.length_squared();
-    if sin2 * NEAR_SPHERE >= 1.0 {
-        return None;
-    }
-    // 1 − cos without cancellation for a small sphere.
-    let height = sin2 / (1.0 + (1.0 - sin2).sqrt());
-    (height as f32 > 0.0).then_some((to_centre.try_normalize()?, height))
 }
 
 /// Distances at which a ray from `from` is in the sphere first and last.
@@ -190,8 +174,8 @@ impl Emitter for VolumeLight {
         let between = to - from;
         let Some(direction) = between.try_normalize() else { return 0.0 };
         let Some([start, end]) = chord(sphere, from, direction) else { return 0.0 };
-        let pdf_solid_angle =
-            cone(sphere, receiver).map_or(PDF_DIRECTION, |(_, height)| 1.0 / (TAU * height as f32));
+        let pdf_solid_angle = sampling::cone_of(sphere, receiver)
+            .map_or(PDF_DIRECTION, |(_, height)| 1.0 / (TAU * height as f32));
         let segment = stretch(end - start);
         let distance = (between.length() - start) as f32;
         let pdf_distance = self.medium.pdf_emitted(&segment, distance.clamp(0.0, segment.end));

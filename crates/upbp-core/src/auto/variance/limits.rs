@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// The largest part that a sample may have in the whole, where at least some 70 have any.
+/// The largest part that a sample may have in the whole, where 67 or more have any ([`largest`]).
 pub(super) const LARGEST_PART: f64 = 0.03;
 /// Part of the squared mean of the picture that is added to the squared radiance which errors are relative
 /// to: for a picture of mean 0.5 the 0.01 of relMSE.
@@ -29,8 +29,7 @@ pub(super) fn relative_to(means: &[DVec3]) -> Vec<DVec3> {
     means.iter().map(|mean| (3.0 * (mean * mean + dark)).map(|square| square.sqrt().recip())).collect()
 }
 
-/// Factors of values, by the parts that their squares have: none is to be more than [`LARGEST_PART`] of the
-/// whole.
+/// Factors of values, by the parts that their squares have: none is to be above the [limit](largest).
 pub(super) fn reductions(parts: &[f64]) -> Vec<f32> {
     let most = largest(parts.to_vec());
     parts.iter().map(|part| if *part > most { (most / part).sqrt() as f32 } else { 1.0 }).collect()
