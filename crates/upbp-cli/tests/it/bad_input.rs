@@ -70,6 +70,10 @@ fn a_good_scene_renders_and_writes_its_files() {
     assert_eq!(series.len(), 2);
     assert_eq!(series[1]["relative_mse"], 0.0);
     assert!(series[0]["relative_mse"].as_f64() > Some(0.0));
+    let other = render("other.exr", &["--reference", "out.exr", "--size", "5x7"]);
+    assert_eq!(other.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&other.stderr);
+    assert!(message.contains("out.exr: expected a reference of 5 x 7 pixels, found "), "{message}");
 }
 
 /// A likely mistake is told, and rendered all the same.
