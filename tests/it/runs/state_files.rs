@@ -102,7 +102,7 @@ fn sizes_in_a_header_cost_no_memory() {
 
     let huge = header
         .replace("film:(5,5)", "film:(4294967295,4294967295)")
-        .replace("part:(0,0,5,5)", "part:(0,0,4294967295,4294967295)");
+        .replace("part:(x:0,y:0,width:5,height:5)", "part:(x:0,y:0,width:4294967295,height:4294967295)");
     assert_ne!(huge, header);
     let error = State::read(forged(&huge).as_slice()).expect_err("no sums follow");
     assert!(error.to_string().contains("row 0 of 4294967295"), "{error}");
@@ -113,9 +113,9 @@ fn sizes_in_a_header_cost_no_memory() {
     assert!(State::read(bytes.as_slice()).expect_err("a cut file").to_string().contains("ends here"));
 
     for (from, to) in [
-        ("part:(0,0,5,5)", "part:(1,0,5,5)"),
-        ("part:(0,0,5,5)", "part:(4294967295,0,5,5)"),
-        ("part:(0,0,5,5)", "part:(0,0,0,5)"),
+        ("part:(x:0,y:0,width:5,height:5)", "part:(x:1,y:0,width:5,height:5)"),
+        ("part:(x:0,y:0,width:5,height:5)", "part:(x:4294967295,y:0,width:5,height:5)"),
+        ("part:(x:0,y:0,width:5,height:5)", "part:(x:0,y:0,width:0,height:5)"),
         ("[(0,2),(7,8)]", "[(7,8),(0,2)]"),
         ("[(0,2),(7,8)]", "[(0,99999999999)]"),
         ("parts:{}", "parts:{7:1}"),
