@@ -1,7 +1,9 @@
 //! Kernel radii that are a function of place: what the plan gives to a picture of near and far things.
 
 use upbp_core::glam::Vec3;
-use upbp_core::{FrozenPlan, Identity, Plan, Radii, Radius, RadiusField, Settings, State, StateError};
+use upbp_core::{
+    FrozenPlan, Identity, LightPaths, Plan, Radii, Radius, RadiusField, Settings, State, StateError,
+};
 use upbp_scene::ReadyScene;
 use upbp_testing::renderer;
 
@@ -92,13 +94,15 @@ fn radii_that_are_given_may_be_below_what_coordinates_tell_apart() {
         shapes: [(geometry: Quad(origin: (-1, 0, -1), edge_u: (0, 0, 2), edge_v: (2, 0, 0)), material: "white")],
         lights: [Point(position: (0, 2, 0), intensity: 5)])"#;
     let scene = ReadyScene::from_ron_str(text, ".").expect("a valid scene");
-    for radius in [Radius::Scene(0.001), Radius::Absolute(0.01)] {
-        let techniques = "bpt+surf+pp3d".parse().expect("technique names");
-        let settings = Settings { techniques, radii: Radii::all(radius), ..settings() };
-        let mut renderer = renderer(&scene, settings);
-        assert!(renderer.iterate());
-        assert!(renderer.film().image().mean().iter().all(|mean| *mean > 0.0), "{radius:?}");
-    }
+    let settings = Settings {
+        techniques: "nee+surf".parse().expect("technique names"),
+        light_paths: LightPaths::Count(100),
+        radii: Radii::all(Radius::Scene(0.001)),
+        ..settings()
+    };
+    let mut renderer = renderer(&scene, settings);
+    assert!(renderer.iterate());
+    assert!(renderer.film().image().mean().iter().all(|mean| *mean > 0.0));
 }
 
 #[test]

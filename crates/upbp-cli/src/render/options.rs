@@ -276,7 +276,10 @@ pub(crate) fn names() -> String {
     let layers = [
         ("R, G, B", "the picture"),
         ("bpt, surf, ...", "what each technique adds to it, weighted; of all that ran"),
-        ("variance", "variance of the mean, by the spread of the iterations"),
+        (
+            "variance",
+            "variance of the mean, by the spread of the iterations; from two iterations on, as the next two",
+        ),
         ("half0, half1", "two independent halves of the render, for denoisers"),
         ("error", "estimated squared error of each pixel, relative to the converged value"),
         ("albedo", "with --features: albedo of what the camera sees first, not counting mirrors and glass"),
