@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 /// Does `pieces` of work on all threads; each thread takes the next one when it is done with its last, and
 /// has a scratch of its own. Whether all were done: none is begun after one that has returned `false`.
 ///
-/// What pieces leave has to be put in their order: which thread does which is a matter of chance.
+/// Which thread does which piece is a matter of chance: the caller puts what they leave in their order.
 pub(crate) fn do_all<T, S: Default>(
     pieces: impl Iterator<Item = T> + Send,
     work: impl Fn(&mut S, T) -> bool + Sync,

@@ -355,6 +355,12 @@ struct Seen {
 }
 
 impl Seen {
+    /// Counts a contribution; whether it is to be kept.
+    fn has_room(&mut self) -> bool {
+        self.contributions += 1;
+        self.contributions <= self.most
+    }
+
     fn append(&mut self, mut more: Self) {
         self.starts.append(&mut more.starts);
         self.emission.append(&mut more.emission);
@@ -415,23 +421,20 @@ impl<B> Observer<B> for Seen {
         let (technique, pixel) = (sample.technique, value * weight);
         let seen = |together| Contribution { technique, value, weight, together, pixel };
         self.light += pixel;
-        // What depends on no choice of an emitter is not kept.
-        if matches!(sample.completion, Completion::Emission | Completion::Hit(_) | Completion::Lens { .. }) {
-            return;
-        }
-        self.contributions += 1;
-        if self.contributions > self.most {
-            return;
-        }
         match sample.completion {
+            // No choice of an emitter has part in it.
             Completion::Emission | Completion::Hit(_) | Completion::Lens { .. } => {}
             Completion::Nee { light, camera: (receiver, _) } => {
-                self.next_event.push((light, receiver, seen(weight)));
+                if self.has_room() {
+                    self.next_event.push((light, receiver, seen(weight)));
+                }
             }
             Completion::Connect { path, .. }
             | Completion::LightTracing { path, .. }
             | Completion::Merge { path, .. } => {
-                self.emission.push((path, seen(of_light / all.total())));
+                if self.has_room() {
+                    self.emission.push((path, seen(of_light / all.total())));
+                }
             }
         }
     }

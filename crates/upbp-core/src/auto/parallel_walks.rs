@@ -59,8 +59,8 @@ pub(super) fn in_pieces<B: Copy, L: Lanes, O: Default + Send>(
     done.then_some(outs)
 }
 
-/// Room for samples, common to all pieces of a run. Whether it suffices does not depend on the order
-/// of the pieces.
+/// Room for samples, common to all pieces of a run. Whether it suffices does not depend on the order of the
+/// pieces.
 pub(super) struct SampleRoom {
     taken: AtomicUsize,
     most: usize,
