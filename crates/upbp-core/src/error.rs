@@ -52,7 +52,7 @@ impl From<ron::error::SpannedError> for TextError {
 #[non_exhaustive]
 pub enum RenderError {
     /// A plan whose light sub-paths leave more than the memory budget has room for.
-    #[error("plan: needs {needed} MiB, the setting `memory` allows {budget}")]
+    #[error("plan: needs {needed} MiB, {budget} are free or allowed by the setting `memory`")]
     PlanMemory {
         /// MiB that an iteration needs.
         needed: u64,

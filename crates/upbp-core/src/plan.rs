@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use upbp_estimators::{EmitterChoice, FootprintField, MergePeriods, Roulette, Technique, TechniqueSet};
+use upbp_estimators::{
+    EmitterChoice, FootprintField, Kernel, MergePeriods, Roulette, Technique, TechniqueSet,
+};
 
 use crate::error::TextError;
 use crate::radius_schedule::RadiusSchedule;
@@ -73,6 +75,7 @@ impl Plan {
     pub(crate) fn validate(&self) -> Result<(), String> {
         let radii = &self.radii;
         let lengths = [radii.surf, radii.pp3d, radii.pb2d, radii.bp2d, radii.bb1d];
+        let kernels = radii.kernels(0);
         let finite = |x: &f32| (0.0..f32::INFINITY).contains(x);
         if self.techniques.is_empty() {
             Err("techniques: expected at least one".into())
@@ -96,6 +99,8 @@ impl Plan {
             Err(format!("vertices_per_light_path: expected a number, found {}", self.vertices_per_light_path))
         } else if !(lengths.iter().all(finite) && finite(&radii.floor)) {
             Err(format!("radii: expected lengths, found {radii:?}"))
+        } else if !Technique::ALL.iter().filter_map(|t| kernels.get(*t)).all(Kernel::is_representable) {
+            Err(format!("radii: expected kernels whose values single precision can hold, found {radii:?}"))
         } else if !radii.field.is_valid(lengths.into_iter().fold(0.0, f32::max)) {
             Err(format!(
                 "radii.field: expected positive factors, of which the greatest is at most {} times the least, \
@@ -251,6 +256,8 @@ pub(crate) mod tests {
         assert!(wrong(|p| p.light_paths = 0).contains("light_paths"));
         assert!(wrong(|p| p.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|p| p.radii.pb2d = f32::NAN).contains("radii"));
+        assert!(wrong(|p| p.radii.pp3d = 1e16).contains("radii: expected kernels"));
+        assert!(wrong(|p| p.radii.pp3d = 1e-14).contains("radii: expected kernels"));
         assert!(wrong(|p| p.lanes = Some([0.5; 3])).contains("lanes: expected None, or"));
         let message = wrong(|p| p.connections = 1e9);
         assert!(message.contains(": connections, next_events: expected 0.001"), "{message}");

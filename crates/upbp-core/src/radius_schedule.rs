@@ -11,9 +11,11 @@ pub enum Radius {
     /// everywhere if one of them has another setting.
     #[default]
     Auto,
-    /// A fraction of the radius of the scene's bounding sphere.
+    /// A fraction of the radius of the scene's bounding sphere; what comes of it is bounded as an
+    /// [absolute](Self::Absolute) radius is.
     Scene(f32),
-    /// In scene units.
+    /// In scene units. Radii from 1e-12 to 1e12 are used as they are, and none below what single precision
+    /// tells apart where the picture is; others are moved to the nearest of these.
     Absolute(f32),
 }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 use upbp_estimators::{Counters, PerMerge, Technique};
 
 use crate::auto::technique_support::TechniqueSupport;
-use crate::film::{ErrorEstimate, IterationSet};
+use crate::film::{ErrorEstimate, ErrorMap, IterationSet};
 use crate::plan::Plan;
 use crate::state::{ErrorPoint, ErrorSeries, PassSeconds, State};
 
@@ -40,7 +40,7 @@ pub struct Report {
     pub counters: Counters,
     /// Part of the image's mean luminance that each layer holds.
     pub shares: Vec<(&'static str, f64)>,
-    /// Largest number of bytes that light vertices, beams and look-up structures took.
+    /// Largest number of bytes that light vertices, beams and their trees took.
     pub map_bytes: u64,
     /// Bytes that the render was expected to need: the film, and an iteration or the writing of an image.
     pub expected_bytes: u64,
@@ -58,16 +58,17 @@ impl State {
     /// A summary of all that was done so far.
     #[must_use]
     pub fn report(&self) -> Report {
-        Report::new(self)
+        Report::new(self, self.film.error_map().as_ref())
     }
 }
 
 impl Report {
-    fn new(state: &State) -> Self {
+    /// The report with an estimate of the error that is there already.
+    pub(crate) fn new(state: &State, error: Option<&ErrorMap>) -> Self {
         let State { identity, record, film } = state;
         let last = film.iteration_set().last().unwrap_or(0);
         let radii = identity.plan.radii.kernels(last);
-        let error = film.error_map().map(|map| map.estimate());
+        let error = error.map(ErrorMap::estimate);
         Self {
             version: identity.version.clone(),
             support: identity.support.clone(),

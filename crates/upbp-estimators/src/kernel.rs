@@ -92,6 +92,13 @@ impl Kernel {
         self.effective_volume
     }
 
+    /// Whether single precision holds the kernel's values: too wide a kernel would be zero, too narrow a one
+    /// infinite.
+    #[must_use]
+    pub const fn is_representable(&self) -> bool {
+        self.radius == 0.0 || self.peak.is_normal()
+    }
+
     /// Value at a squared distance below `radius²`.
     #[must_use]
     pub fn value(&self, distance_squared: f32) -> f32 {

@@ -25,9 +25,9 @@ const STRATIFIED_DRAWS: u32 = 24;
 const SQUARE: u32 = 1 << LEVELS;
 /// Times that a square is divided into four to get to a pixel.
 const LEVELS: u32 = 4;
-/// Draws that camera sub-paths of pilot renders with one index have in common: the place on the film, that
-/// on the lens, the first distance in a medium, and the next event there, an emitter and a point on it. In
-/// lanes the channel takes the place of that point; without a medium, it is what is drawn next.
+/// Draws that camera sub-paths with one index have in common in a run of the preparation: the place on the
+/// film, that on the lens, the first distance in a medium, and the next event there, an emitter and a point
+/// on it. In lanes the channel takes the place of that point; without a medium, it is what is drawn next.
 const COMMON_DRAWS: u32 = 5;
 
 /// The purpose of a stream.
@@ -41,9 +41,10 @@ pub enum StreamKind {
     Camera,
     /// Light sub-paths of the preparation, which sets radii and counts before the first iteration.
     PilotLight,
-    /// Camera sub-paths of pilot renders. Those with the same index, of different iterations, begin alike and
-    /// are independent after a few draws: what they differ in is what stratification leaves of the variance
-    /// of a pixel, since it takes away what their common decisions make.
+    /// Camera sub-paths of the preparation. Those with the same index, of iterations that differ in their
+    /// lower 32 bits only, begin alike and are independent after a few draws: what they differ in is what
+    /// stratification leaves of the variance of a pixel, since it takes away what their common decisions
+    /// make.
     PilotCamera,
     /// The turns in which pixels make photon queries.
     MergePeriods,
@@ -88,7 +89,10 @@ impl Stream {
                 place = Some(place_in_square(pixel));
                 (point as u32, mix(common ^ of(square)) ^ of_half, STRATIFIED_DRAWS)
             }
-            StreamKind::PilotCamera => (0, mix(common ^ of(index)), COMMON_DRAWS),
+            StreamKind::PilotCamera => {
+                let of_run = (iteration >> 32).wrapping_mul(0xd1b5_4a32_d192_ed03);
+                (0, mix(mix(common ^ of_run) ^ of(index)), COMMON_DRAWS)
+            }
             StreamKind::MergePeriods => (0, 0, 0),
         };
         // The finaliser of SplitMix64 between the words: streams of neighbouring addresses have nothing in
@@ -438,6 +442,8 @@ mod tests {
             for draw in 0..12 {
                 assert_eq!(first.pair() == second.pair(), draw < COMMON_DRAWS, "draw {draw}");
             }
+            let runs = [0, 1].map(|run| Stream::new(7, run << 32, StreamKind::PilotCamera, index).pair());
+            assert_ne!(runs[0], runs[1], "runs have nothing in common");
         }
         for draws in [0, COMMON_DRAWS] {
             let after = |mut stream: Stream| {

@@ -78,13 +78,6 @@ impl Spectrum {
         self.r().max(self.g()).max(self.b())
     }
 
-    /// The smallest channel; a NaN beside a number is ignored.
-    #[inline]
-    #[must_use]
-    pub const fn min_component(self) -> f32 {
-        self.r().min(self.g()).min(self.b())
-    }
-
     /// The unweighted mean of the channels.
     #[inline]
     #[must_use]
@@ -264,7 +257,7 @@ mod tests {
 
     #[test]
     fn summaries_see_the_right_channels() {
-        assert_eq!((COLOUR.max_component(), COLOUR.min_component()), (2.0, -4.0));
+        assert_eq!(COLOUR.max_component(), 2.0);
         assert_eq!((COLOUR[0], COLOUR[1], COLOUR[2]), (COLOUR.r(), COLOUR.g(), COLOUR.b()));
         assert!((COLOUR.mean() + 1.75 / 3.0).abs() < 1e-6);
         assert!((Spectrum::ONE.luminance() - 1.0).abs() < 1e-6);

@@ -234,7 +234,7 @@ fn lights_that_are_never_hit() {
 }
 
 #[test]
-fn seldom_look_ups_and_other_counts() {
+fn periods_and_other_counts() {
     let scene = ClosedForm::new(OUTSIDE, SIZE);
     let usual = choices("all", PathLengths { min: 1, max: 6 }, 200);
     let other = IterationChoices {

@@ -1,8 +1,8 @@
 //! The choice of techniques.
 
 mod adaptation;
-mod census;
 mod emitters;
 mod guides;
 mod radii;
 mod receivers;
+mod technique_support;

@@ -8,7 +8,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use upbp_core::{FrozenPlan, LightPaths, Settings, Start};
+use upbp_core::{FrozenPlan, LightPaths, Settings, Start, write_exr};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
 
@@ -167,6 +167,46 @@ const MILK: &str = r#"(version: 1,
   lights: [Point(position: (2, 3, 3), intensity: 50)])"#;
 
 #[test]
+fn films_take_what_was_expected() {
+    /// Pixels of each side: so many that nothing else is of any size.
+    const SIDE: u32 = 1000;
+    let render = |side: u32| {
+        with_scene("suite/bare_surfaces.ron", side, |scene| {
+            let settings =
+                Settings { techniques: "pt".parse().expect("technique names"), ..Settings::default() };
+            let mut renderer =
+                scene.renderer(settings.validate().expect("valid settings")).expect("a renderer");
+            assert!(renderer.iterate() && renderer.iterate());
+            let report = renderer.report();
+            assert!(report.estimated_over_scales.is_some(), "two halves are compared");
+            let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("memory_film.exr");
+            write_exr(&path, renderer.state()).expect("a folder for tests");
+            report.expected_bytes as f64
+        })
+    };
+    if own_process::case().is_none() {
+        own_process::run("runs::memory::films_take_what_was_expected", "film", &GIVE_BACK);
+        return;
+    }
+    // The program's own pages come into memory where they are used.
+    render(10);
+    let before = status("VmRSS");
+    let expected = render(SIDE);
+    let measured = status("VmHWM") - before;
+    println!("expected {:.1} MiB, measured {:.1} MiB", expected / MIB, measured / MIB);
+    // Less, since pages of sums that nothing was added to are never touched.
+    assert!((0.6..1.1).contains(&(measured / expected)), "expected {expected} bytes, measured {measured}");
+}
+
+/// Fog that absorbs nothing, around everything: no sub-path ever leaves it.
+const FOG: &str = r#"(version: 1,
+  camera: Perspective(origin: (0, 0, 5), target: (0, 0, 0), fov_degrees: 30), film: (width: 64, height: 64),
+  media: { "fog": Homogeneous(sigma_s: 1) }, outside: "fog",
+  materials: { "white": Lambert(1.0) },
+  shapes: [(material: "white", geometry: Sphere(centre: (0, 0, 0), radius: 1))],
+  lights: [Point(position: (2, 3, 3), intensity: 50)])"#;
+
+#[test]
 fn preparations_take_what_is_allowed() {
     const MEMORY: u32 = 60;
     fn prepare(scene: &ReadyScene) {
@@ -178,13 +218,17 @@ fn preparations_take_what_is_allowed() {
         assert!(taken < f64::from(MEMORY), "{taken} MiB of {MEMORY}");
         assert!(renderer.report().plan.light_paths > 0, "techniques are chosen all the same");
     }
+    let prepare_text =
+        |text| on_one_thread(|| prepare(&ReadyScene::from_ron_str(text, ".").expect("a valid scene")));
     match own_process::case().as_deref() {
         // Thick clusters of photons: without a limit the preparation takes 108 MiB.
         Some("clusters") => with_scene("suite/dense_marble.ron", 200, prepare),
         // Emitters are measured: without a limit up to 500 MiB.
-        Some(_) => on_one_thread(|| prepare(&ReadyScene::from_ron_str(MILK, ".").expect("a valid scene"))),
+        Some("milk") => prepare_text(MILK),
+        // Walks of 16384 edges: without a limit their queries take 738 MiB.
+        Some(_) => prepare_text(FOG),
         None => {
-            for case in ["clusters", "milk"] {
+            for case in ["clusters", "milk", "fog"] {
                 own_process::run("runs::memory::preparations_take_what_is_allowed", case, &GIVE_BACK);
             }
         }

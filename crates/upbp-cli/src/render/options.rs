@@ -137,7 +137,7 @@ pub(crate) struct Resources {
     /// Threads, at most 16 per core; the image does not depend on it [default: one per core]
     #[arg(long, value_name = "T", value_parser = threads)]
     threads: Option<NonZeroUsize>,
-    /// Memory for film, light vertices, photon beams and their look-ups, MiB [default: half of what is free]
+    /// Memory for film, light vertices, photon beams and their trees, MiB [default: half of what is free]
     #[arg(long, value_name = "MIB")]
     memory: Option<u32>,
 }

@@ -47,8 +47,9 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// The candidates beside a full plan, with at most `most` light sub-paths if these are more than its own,
-    /// and more beams than it has if there `is_room` for so many sub-paths and beams.
+    /// The candidates beside a full plan. More light sub-paths than it has are candidates up to `most`; more
+    /// with beams than it has, if there `is_room` for such numbers of light sub-paths and of those with
+    /// beams.
     pub(super) fn new<S: Scene>(
         scene: &PreparedScene<'_, S>,
         settings: &CheckedSettings,

@@ -28,33 +28,32 @@ use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
 use crate::settings::CheckedSettings;
 
-/// Camera sub-paths, if there are many emitters.
+/// Camera sub-paths of a round with [many](MANY) emitters, or with guides.
 const CAMERA_PATHS: u32 = 2048;
-/// Light sub-paths, unless they are long or emitters are few.
+/// Light sub-paths of a round with [many](MANY) emitters, at most.
 const LIGHT_PATHS: u32 = 4096;
-/// The same, if starts are guided: few of them bring light.
+/// Light sub-paths of a round with guides, at most: few of them bring light.
 const GUIDED_LIGHT_PATHS: u32 = 16384;
 /// Emitters from which on the number of sub-paths does not grow any more.
 const MANY: usize = 8;
-/// Contributions that are enough.
+/// Contributions of a round, at most, about: more tell nothing new.
 const CONTRIBUTIONS: f64 = 1e6;
 /// The part of the sub-paths that tells how many contributions there are going to be, and that a run has
 /// without time: fewer see nothing of what is small in the picture.
 const FEW: f64 = 1.0 / 16.0;
-/// Light vertices that are enough.
+/// Light vertices of a round, at most, about: more tell nothing new.
 const LIGHT_VERTICES: f64 = 2e5;
-/// Camera sub-paths per one of these, if many emitters are to be chosen by receiver: there is more to learn.
+/// Factor of the camera sub-paths if [many](MANY) emitters are chosen by receiver: there is more to learn.
 const MORE_CAMERA_PATHS: u32 = 4;
-/// The most that a choice by receiver may leave of the second moment of next events.
+/// Second moment of next events with a choice by receiver, over that without, up to which it is made.
 const WORTH: f64 = 0.9;
-/// Runs, if starts are guided: one that looks for places, and two that are guided there. Each has a part of
-/// the time, and at most so many times as many sub-paths, as far as the plan has: the guide of the last
-/// one stays.
+/// Rounds with guides, each by its part of the time and the most that its sub-paths may be multiplied by: one
+/// that looks for places, and two that are guided there. The guide of the last one stays.
 const GUIDED_ROUNDS: [(f64, u32); 3] = [(0.25, 1), (0.25, 1), (0.5, 4)];
 
-/// Part of the time of a preparation that this may take.
+/// Part of the time of a preparation that the choice of emitters may take.
 const PART: f64 = 0.2;
-/// Part of this that a quick look at the length of light sub-paths may take.
+/// Part of that time for a quick look at the length of light sub-paths.
 const QUICK_LOOK: f64 = 0.2;
 
 /// Lets the scene choose its emitters, and the starts of light sub-paths on them, by what they contribute
@@ -80,8 +79,8 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         scene.choose_by_receiver(&[]);
     }
     let quick = budget.part(QUICK_LOOK * PART);
-    let statistics =
-        statistics::measure::<S, L>(scene, settings, techniques, lanes, statistics::FEW_LIGHT_PATHS, &quick)?;
+    let few = statistics::FEW_LIGHT_PATHS;
+    let statistics = statistics::measure::<S, L>(scene, settings, techniques, lanes, few, room, &quick)?;
     let rounds: &[_] = if is_guided { &GUIDED_ROUNDS } else { &[(1.0, 1)] };
     let most_times = f64::from(rounds.iter().map(|(_, times)| *times).max().unwrap_or(1));
     let vertices =

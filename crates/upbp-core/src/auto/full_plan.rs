@@ -18,15 +18,19 @@ use crate::settings::{CheckedSettings, LightPaths, Settings};
 /// The techniques with photon beams.
 pub(super) const BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Bp2d).with(Technique::Bb1d);
 
-/// The largest first radii, relative to the [size](size) of what the picture shows.
+/// Largest automatic first radius of surface merging, relative to the [size](size) of what the picture shows.
 const LARGEST_SURF_RADIUS: f32 = 3e-3;
+/// Largest automatic first radius of photon points around points, relative to that size.
 const LARGEST_PP3D_RADIUS: f32 = 5e-3;
+/// Largest automatic first radius of photon points around query beams, relative to that size.
 const LARGEST_PB2D_RADIUS: f32 = 3e-3;
+/// Largest automatic first radius of photon beams, relative to that size.
 const LARGEST_BEAM_RADIUS: f32 = 3e-3;
-/// The smallest first radii, relative to the largest.
+/// The smallest automatic first radii, relative to the largest ones.
 const SMALLEST: f32 = 0.1;
-/// Bounds of first radii that settings give, scene units: single precision holds the values of all kernels.
+/// The least first radius that settings give, scene units: single precision holds the values of all kernels.
 const LEAST_GIVEN: f32 = 1e-12;
+/// The largest first radius that settings give, scene units.
 const LARGEST_GIVEN: f32 = 1e12;
 /// Part of the render's time that the light sub-paths of an iteration may take: a quick look need not wait
 /// for a light sub-path per pixel.

@@ -1,7 +1,7 @@
 //! Memory that a render may take, and that its light sub-paths need.
 //!
 //! Everything large has a size that follows from counts: the film and the buffer of an iteration from pixels;
-//! vertices, beams, their look-up structures, and what building those takes for a moment, from light
+//! vertices, beams, their trees, and what building those takes for a moment, from light
 //! sub-paths. Statistics tell the numbers per sub-path. Sizes that do not grow are not counted: the program,
 //! the scene, the threads.
 
@@ -21,12 +21,15 @@ const LIGHT_BYTES: u64 = 2 << 30;
 /// Bytes that a render may take, and needs for its film.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Room {
-    /// Memory that the render may take, in bytes.
-    total: u64,
     film: u64,
+    /// An estimate of the error.
+    estimate: u64,
     /// The writing of an image, when light vertices have gone.
     output: u64,
-    /// Light vertices, beams, and their look-up structures.
+    /// What a render by a plan that is given may take: all that is free if no setting says otherwise, so
+    /// that it can go on where less is free than where it was begun.
+    given: u64,
+    /// Light vertices, beams, and their trees.
     pub(crate) light_bytes: u64,
 }
 
@@ -43,8 +46,9 @@ impl Room {
         let rect = scene.scene.camera().crop();
         let total = budget(settings.memory);
         let film = Film::memory_bytes(rect, techniques, settings.features);
+        let estimate = Film::estimate_bytes(rect);
         let output = Film::output_bytes(rect, techniques, settings.features);
-        let needed = film.saturating_add(output);
+        let needed = film.saturating_add(output.max(estimate));
         if needed > total {
             return Err(RenderError::Memory {
                 width: rect.width,
@@ -56,9 +60,10 @@ impl Room {
         let light_bytes = match settings.memory {
             // The memory that is free now says nothing of other machines.
             None if settings.deterministic => LIGHT_BYTES,
-            _ => total - film,
+            _ => total - film - estimate,
         };
-        Ok(Self { total, film, output, light_bytes })
+        let given = if settings.memory.is_some() { total } else { total.saturating_mul(2) };
+        Ok(Self { film, estimate, output, given, light_bytes })
     }
 
     /// Checks that the iterations of a plan fit, and returns it.
@@ -66,11 +71,11 @@ impl Room {
     /// # Errors
     /// [`RenderError::PlanMemory`].
     pub(crate) fn fits<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Result<Plan, RenderError> {
-        let needed = self.film + LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>() as u64;
-        if needed > self.total {
+        let needed = self.iteration_bytes::<S>(plan, statistics);
+        if needed > self.given {
             return Err(RenderError::PlanMemory {
                 needed: needed.div_ceil(1 << 20),
-                budget: self.total >> 20,
+                budget: self.given >> 20,
             });
         }
         Ok(*plan)
@@ -91,7 +96,12 @@ impl Room {
 
     /// Bytes that a render by a plan is expected to take.
     pub(crate) fn expected_bytes<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> u64 {
-        self.film + self.output.max(LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>() as u64)
+        (self.film + self.output).max(self.iteration_bytes::<S>(plan, statistics))
+    }
+
+    /// Bytes that an iteration takes, with an estimate of the error after it.
+    fn iteration_bytes<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> u64 {
+        self.film + self.estimate + LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>() as u64
     }
 }
 

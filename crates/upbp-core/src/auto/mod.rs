@@ -59,20 +59,22 @@ pub(crate) use full_plan::iteration_plan;
 
 /// Part of the render's work that pilot renders may take, unless the first one takes more.
 const PILOT_PART: f64 = 0.02;
-/// Factors by which a pilot render grows at most: the pixels of one that is too small to be trusted, as the
-/// first ones are where time is limited; those of one that leaves candidates in doubt; and the light
-/// sub-paths for each pixel, since what was not met at all leaves nothing in doubt.
+/// The most by which the pixels of a pilot render grow that is too small to be trusted, as the first ones are
+/// where time is limited.
 const GROWTH_AT_FIRST: u32 = 8;
+/// The most by which the pixels of a pilot render grow that leaves candidates in doubt.
 const GROWTH_IN_DOUBT: u32 = 2;
+/// The most by which the light sub-paths for each pixel grow: what was not met at all leaves nothing in
+/// doubt.
 const GROWTH_OF_LIGHT: u32 = 4;
 /// Part of what is left of the time, and of all room for samples, that the next pilot render is planned to
 /// take: both grow faster than its size.
 const PLANNED: f64 = 0.7;
 /// Part of the time of a preparation that the statistics may take, if there is a limit of time.
 const TIME_FOR_STATISTICS: f64 = 0.2;
-/// Part that pilot renders may take at least: they have what the steps before them leave.
+/// Part of that time that pilot renders may take at least: they have what the steps before them leave.
 const TIME_FOR_PILOT: f64 = 0.4;
-/// Part that is kept for what may come after them, another choice of emitters.
+/// Part of that time that is kept for what may come after pilot renders, another choice of emitters.
 const TIME_AFTER_PILOT: f64 = 0.2;
 
 /// A plan, with what was learnt on the way to it.
@@ -130,7 +132,8 @@ fn choose_in<S: Scene, L: Lanes>(
     budget.step("looking around", 0.3)?;
     let allowance = budget.part(TIME_FOR_STATISTICS);
     let most = statistics::LIGHT_PATHS;
-    let statistics = statistics::measure::<S, L>(scene, settings, techniques, lanes, most, &allowance)?;
+    let statistics =
+        statistics::measure::<S, L>(scene, settings, techniques, lanes, most, &room, &allowance)?;
     budget.step("choosing techniques", 0.5)?;
     let plan = if let Some(frozen) = given {
         room.fits::<S>(&frozen.plan, &statistics)?

@@ -17,7 +17,7 @@ use crate::parallel::do_all;
 pub(super) const PIECE: usize = 16;
 
 /// A run before the first iteration. Each has random numbers of its own, so that none is judged by those that
-/// what it uses was made of.
+/// what it uses was made of; passes of a pilot render begin alike.
 #[derive(Clone, Copy)]
 pub(super) enum PilotRun {
     /// [Statistics](super::statistics).
@@ -31,15 +31,16 @@ pub(super) enum PilotRun {
 }
 
 impl PilotRun {
-    /// The iteration that its random numbers are those of.
+    /// The iteration that its random numbers are those of. Camera sub-paths of iterations that differ in
+    /// their lower 32 bits only [begin alike](upbp_estimators::StreamKind::PilotCamera).
     pub(super) const fn iteration(self) -> u64 {
-        let (run, part) = match self {
-            Self::Statistics => (0, 0),
-            Self::Emitters { round } => (1, round),
-            Self::Volumes { pass } => (2, pass),
-            Self::Render { pass } => (3, pass),
+        let [kind, part, pass] = match self {
+            Self::Statistics => [0, 0, 0],
+            Self::Emitters { round } => [1, round, 0],
+            Self::Volumes { pass } => [2, pass, 0],
+            Self::Render { pass } => [3, 0, pass],
         };
-        run << 32 | part as u64
+        (part as u64) << 34 | (kind as u64) << 32 | pass as u64
     }
 }
 

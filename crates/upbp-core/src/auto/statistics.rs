@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use upbp_accel::{PointTree, Ray, Segment, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Heuristic};
 use upbp_estimators::observer::{NoObserver, ObservedVertex, Observer};
-use upbp_estimators::path::{Context, Interaction, LightChunk};
+use upbp_estimators::path::{Context, Interaction, LightChunk, LightVertex};
 use upbp_estimators::scene::{Camera, CameraRay, Scene};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
@@ -13,6 +13,7 @@ use upbp_estimators::{
 };
 use upbp_media::Lanes;
 
+use super::memory_limit::Room;
 use super::parallel_walks::{PIECE, PilotRun, camera_path, in_pieces, pixel};
 use super::photon_distances::{Nearest, Neighbours, median};
 use super::pixel_footprint::{self, FAR};
@@ -27,14 +28,16 @@ pub(crate) const FEW_LIGHT_PATHS: u32 = 1024;
 pub(crate) const LIGHT_PATHS: u32 = 8192;
 /// Light vertices that are enough: sub-paths are added until there are about as many.
 const ENOUGH_VERTICES: f64 = 24_576.0;
-/// Light vertices at most: fewer sub-paths than a few, if theirs are more.
-const MOST_VERTICES: f64 = 1e6;
+/// Light vertices at most, if there is room for so many: fewer sub-paths than a few, if theirs are more.
+const MOST_VERTICES: u64 = 1_000_000;
 /// Light sub-paths for each one that leaves beams.
 pub(super) const PATHS_PER_BEAM_PATH: u32 = 8;
 /// Camera sub-paths.
 const CAMERA_PATHS: u32 = 1024;
 /// Queries of each kind that are measured.
 const QUERIES: usize = 96;
+/// Queries of each kind that a piece of the work keeps, an even number.
+const QUERIES_OF_PIECE: usize = 512;
 /// Light vertices that distances are measured to: those of the first light sub-paths.
 const NEIGHBOURS: usize = 16384;
 
@@ -86,6 +89,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
     techniques: TechniqueSet,
     lanes: Option<[f64; 3]>,
     light_paths: u32,
+    room: &Room,
     allowance: &Allowance<'_>,
 ) -> Result<Statistics, RenderError> {
     let use_nothing = [Technique::Hit, Technique::Nee, Technique::LightTracing].into_iter().collect();
@@ -97,7 +101,8 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
         let light_paths = (part * f64::from(light_paths)).ceil() as u32;
         let camera_paths = (part * f64::from(CAMERA_PATHS)).ceil() as u32;
         let plan = |paths| nominal_plan(scene, settings, techniques, lanes, paths);
-        let light = LightPaths::trace::<_, L>(scene, plan, light_paths, halt)?;
+        let most_vertices = room.items::<LightVertex<S::Bsdf, f64, L>>().min(MOST_VERTICES);
+        let light = LightPaths::trace::<_, L>(scene, plan, light_paths, most_vertices as f64, halt)?;
         let plan = plan(light.paths);
         let queries = Queries::trace::<_, L>(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?;
         let field = if settings.radii.are_auto(techniques) {
@@ -172,6 +177,7 @@ impl LightPaths {
         scene: &PreparedScene<'_, S>,
         plan: impl Fn(u32) -> IterationPlan,
         most: u32,
+        most_vertices: f64,
         halt: &Halt<'_>,
     ) -> Option<Self> {
         let trace = |paths| {
@@ -196,9 +202,10 @@ impl LightPaths {
         let mut found = trace(1)?;
         // Walks that hardly ever end would fill all memory.
         for (paths, vertices) in
-            [(PIECE as u32, MOST_VERTICES), (FEW_LIGHT_PATHS, MOST_VERTICES), (LIGHT_PATHS, ENOUGH_VERTICES)]
+            [(PIECE as u32, most_vertices), (FEW_LIGHT_PATHS, most_vertices), (LIGHT_PATHS, ENOUGH_VERTICES)]
         {
-            let enough = vertices / found.photons.len().max(1) as f64 * f64::from(found.paths);
+            let enough =
+                vertices.min(most_vertices) / found.photons.len().max(1) as f64 * f64::from(found.paths);
             let paths = (enough as u32).min(paths).min(most);
             if paths > found.paths {
                 found = trace(paths)?;
@@ -306,6 +313,16 @@ struct Queries {
     first: Vec<Vec3>,
     /// Widths of pixels there.
     footprints: Vec<f32>,
+}
+
+/// Writes down the queries of a piece of the work.
+#[derive(Default)]
+struct QueryRecorder {
+    surfaces: Thinned<Vec3>,
+    media: Thinned<Vec3>,
+    edges: Thinned<Ray>,
+    first: Vec<Vec3>,
+    footprints: Vec<f32>,
     last: Vec3,
     /// Length of the sub-path so far.
     travelled: f32,
@@ -313,7 +330,7 @@ struct Queries {
     pixel: Option<f32>,
 }
 
-impl<B> Observer<B> for Queries {
+impl<B> Observer<B> for QueryRecorder {
     type Densities = ByTechnique;
 
     fn camera_end(&mut self, _: Vec2, ray: &CameraRay) {
@@ -355,32 +372,102 @@ impl Queries {
     fn trace<S: Scene, L: Lanes>(context: &Context<'_, S>, paths: u32, halt: &Halt<'_>) -> Option<Self> {
         let crop = context.prepared.scene.camera().crop();
         let map = LightMap::<_, _, L>::empty();
-        let pieces = in_pieces(paths, halt, |index, scratch, queries: &mut Self| {
+        let pieces = in_pieces(paths, halt, |index, scratch, recorder: &mut QueryRecorder| {
             let (index, counters) = (u64::from(index), &mut Counters::default());
-            camera_path(context, &map, pixel(crop, index), index, scratch, counters, queries);
+            camera_path(context, &map, pixel(crop, index), index, scratch, counters, recorder);
             true
         })?;
         let mut queries = Self::default();
+        let (mut surfaces, mut media, mut edges) = (Vec::new(), Vec::new(), Vec::new());
         for piece in pieces {
-            queries.surfaces.extend(piece.surfaces);
-            queries.media.extend(piece.media);
-            queries.edges.extend(piece.edges);
+            surfaces.push(piece.surfaces);
+            media.push(piece.media);
+            edges.push(piece.edges);
             queries.first.extend(piece.first);
             queries.footprints.extend(piece.footprints);
         }
-        thin(&mut queries.surfaces);
-        thin(&mut queries.media);
-        thin(&mut queries.edges);
+        queries.surfaces = Thinned::evenly(surfaces);
+        queries.media = Thinned::evenly(media);
+        queries.edges = Thinned::evenly(edges);
         Some(queries)
     }
 }
 
-/// Keeps at most `QUERIES` elements, evenly.
-fn thin<T>(elements: &mut Vec<T>) {
-    let step = elements.len().div_ceil(QUERIES).max(1);
-    let mut index = 0;
-    elements.retain(|_| {
-        index += 1;
-        (index - 1) % step == 0
-    });
+/// A list of which every second element is left out whenever it is [full](QUERIES_OF_PIECE): walks that
+/// hardly ever end would fill all memory.
+struct Thinned<T> {
+    kept: Vec<T>,
+    /// Elements for each that is kept, a power of two.
+    step: usize,
+    count: usize,
+}
+
+impl<T> Default for Thinned<T> {
+    fn default() -> Self {
+        Self { kept: Vec::new(), step: 1, count: 0 }
+    }
+}
+
+impl<T> Thinned<T> {
+    fn push(&mut self, element: T) {
+        if self.count.is_multiple_of(self.step) {
+            if self.kept.len() == QUERIES_OF_PIECE {
+                self.thin_to(2 * self.step);
+            }
+            self.kept.push(element);
+        }
+        self.count += 1;
+    }
+
+    /// Keeps one of `step` elements, a multiple of the step so far.
+    fn thin_to(&mut self, step: usize) {
+        let ratio = step / self.step;
+        let mut index = 0;
+        self.kept.retain(|_| {
+            index += 1;
+            (index - 1) % ratio == 0
+        });
+        self.step = step;
+    }
+
+    /// At most [`QUERIES`] elements of all lists, evenly.
+    fn evenly(mut lists: Vec<Self>) -> Vec<T> {
+        let step = lists.iter().map(|list| list.step).max().unwrap_or(1);
+        for list in &mut lists {
+            list.thin_to(step);
+        }
+        let all: Vec<T> = lists.into_iter().flat_map(|list| list.kept).collect();
+        let step = all.len().div_ceil(QUERIES).max(1);
+        all.into_iter().step_by(step).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The numbers from 0 up to a count, pushed one by one.
+    fn numbers(count: usize) -> Thinned<usize> {
+        let mut list = Thinned::default();
+        for number in 0..count {
+            list.push(number);
+        }
+        list
+    }
+
+    #[test]
+    fn lists_are_thinned_evenly() {
+        for count in [0, 1, QUERIES_OF_PIECE, QUERIES_OF_PIECE + 1, 100_000] {
+            let list = numbers(count);
+            assert!(
+                list.kept.len() <= QUERIES_OF_PIECE && 2 * list.kept.len() >= count.min(QUERIES_OF_PIECE)
+            );
+            assert!(list.kept.iter().copied().eq((0..count).step_by(list.step)), "of {count}");
+        }
+        // A list that was thinned has no less weight than one that was not.
+        let found = Thinned::evenly(vec![numbers(QUERIES_OF_PIECE), numbers(4 * QUERIES_OF_PIECE)]);
+        assert!(found.len() <= QUERIES && 2 * found.len() > QUERIES, "{}", found.len());
+        let second = found.iter().skip(1).position(|number| *number == 0).map_or(0, |i| i + 1);
+        assert!((3..6).contains(&((found.len() - second) / second)), "{second} of {}", found.len());
+    }
 }

@@ -48,29 +48,34 @@ impl Image {
     pub(super) fn difference_over(&self, sides: &[u32], other: &Self, reference: &Self) -> f64 {
         let of_side = |side: &u32| {
             let [x, y, r] = [self, other, reference].map(|image| image.block_sums(*side as usize));
-            let term = |((x, y), r): ((&[f64; 4], &[f64; 4]), &[f64; 4])| {
+            let term = |((x, y), r): (([f64; 4], [f64; 4]), [f64; 4])| {
                 let n = x[3];
                 let squares = (0..3).map(|c| ((x[c] - y[c]) / n).powi(2) / ((r[c] / n).powi(2) + DARK));
                 n * n * squares.sum::<f64>()
             };
-            let sum: f64 = x.iter().zip(&y).zip(&r).map(term).sum();
+            let sum: f64 = x.zip(y).zip(r).map(term).sum();
             sum / (3 * self.pixels.len().max(1)) as f64
         };
         sides.iter().map(of_side).sum::<f64>() / sides.len() as f64
     }
 
-    /// Sums over square blocks of pixels, with the number of pixels behind.
-    fn block_sums(&self, side: usize) -> Vec<[f64; 4]> {
-        let width = self.width as usize;
-        let columns = width.div_ceil(side);
-        let mut sums = vec![[0.0; 4]; columns * (self.height as usize).div_ceil(side)];
-        for (i, pixel) in self.pixels.iter().enumerate() {
-            let sum = &mut sums[i / width / side * columns + i % width / side];
-            for (sum, value) in sum.iter_mut().zip(pixel.iter().chain(&[1.0])) {
-                *sum += f64::from(*value);
+    /// Sums over square blocks of pixels, with the number of pixels behind: row by row of blocks, so that
+    /// there is no second picture in memory.
+    fn block_sums(&self, side: usize) -> impl Iterator<Item = [f64; 4]> + '_ {
+        let width = (self.width as usize).max(1);
+        self.pixels.chunks(width * side).flat_map(move |rows| {
+            let mut sums = vec![[0.0; 4]; width.div_ceil(side)];
+            for row in rows.chunks(width) {
+                for (sum, block) in sums.iter_mut().zip(row.chunks(side)) {
+                    for pixel in block {
+                        for (sum, value) in sum.iter_mut().zip(pixel.iter().chain(&[1.0])) {
+                            *sum += f64::from(*value);
+                        }
+                    }
+                }
             }
-        }
-        sums
+            sums
+        })
     }
 
     /// Root of the mean squared difference to a reference; NaN if it has another size.

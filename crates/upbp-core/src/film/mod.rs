@@ -109,6 +109,13 @@ impl Film {
         (pixels(rect) as u64).saturating_mul((pixel + features) as u64)
     }
 
+    /// Bytes that an estimate of the error takes besides: both halves with what is seen directly in them, and
+    /// for each pixel the error by channel, the largest it may be, and whether both have seen light there.
+    pub(crate) const fn estimate_bytes(rect: PixelRect) -> u64 {
+        let pixel = 5 * size_of::<[f32; 3]>() + size_of::<f32>() + size_of::<bool>();
+        (pixels(rect) as u64).saturating_mul(pixel as u64)
+    }
+
     /// Bytes that writing a film as an image takes besides: the picture, the layers, two halves, variance and
     /// error in single precision, and one more while it is copied or compressed.
     pub(crate) fn output_bytes(rect: PixelRect, techniques: TechniqueSet, features: bool) -> u64 {

@@ -35,6 +35,13 @@ pub fn write_exr(path: &Path, state: &State) -> std::result::Result<(), OutputEr
     let fail = |reason: String| OutputError::Encode { path: path.to_owned(), reason };
     let film = state.film();
     let mut channels = SmallVec::<[AnyChannel<FlatSamples>; 4]>::new();
+    // First what takes memory besides.
+    let error = film.error_map();
+    let report = Report::new(state, error.as_ref());
+    if let Some(error) = error {
+        let (width, height) = (film.rect().width, film.rect().height);
+        push(&mut channels, "error.", &Picture { width, height, pixels: error.relative });
+    }
     push(&mut channels, "", &film.image());
     for layer in film.layers() {
         if let Some(image) = film.layer(layer) {
@@ -49,11 +56,6 @@ pub fn write_exr(path: &Path, state: &State) -> std::result::Result<(), OutputEr
             push(&mut channels, name, half);
         }
     }
-    if let Some(error) = film.error_map() {
-        let (width, height) = (film.rect().width, film.rect().height);
-        push(&mut channels, "error.", &Picture { width, height, pixels: error.relative });
-    }
-
     if let Some(FeatureImages { albedo, normal, depth }) = film.features() {
         push(&mut channels, "albedo.", &albedo);
         push_as(&mut channels, ["normal.X", "normal.Y", "normal.Z"], &normal);
@@ -63,7 +65,7 @@ pub fn write_exr(path: &Path, state: &State) -> std::result::Result<(), OutputEr
 
     let mut attributes = LayerAttributes::default();
     let Identity { scene, settings, .. } = state.identity();
-    let metadata = Metadata { scene, settings, report: &state.report() };
+    let metadata = Metadata { scene, settings, report: &report };
     let text = ron::to_string(&metadata).map_err(|error| fail(error.to_string()))?;
     // Not `Text::from`, which takes nothing but Latin-1.
     let text = Text::from_slice_unchecked(text.as_bytes());

@@ -163,8 +163,12 @@ impl<'a> Renderer<'a> {
         // There is always a picture, however late.
         let unlimited = Halt { deadline: None, ..halt };
         let light_halt = if film.is_empty() { &unlimited } else { &halt };
+        let start = Instant::now();
         let light = self.engine.trace_light(&plan, rect, &mut self.pixels, light_halt);
-        let Some(light) = light else { return false };
+        let Some(light) = light else {
+            record.times.add(&PassTimes { light: start.elapsed(), ..PassTimes::default() });
+            return false;
+        };
         let missing = film.missing(iteration);
         let (mut counters, mut times) = (light.counters, light.times);
         if missing.start > 0 {

@@ -65,7 +65,7 @@ pub struct Settings {
     /// Whether the film has [albedo, normal and depth](crate::FeatureImages) besides the picture, for
     /// denoisers and compositing.
     pub features: bool,
-    /// Memory for light vertices, beams, look-up structures and the film, MiB; `None` for half of what the
+    /// Memory for light vertices, beams, their trees and the film, MiB; `None` for half of what the
     /// machine has free. If choices are [deterministic](Self::deterministic), light vertices, beams and
     /// look-ups then take at most 2048 MiB on any machine.
     pub memory: Option<u32>,

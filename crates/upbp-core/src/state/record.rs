@@ -12,7 +12,7 @@ pub struct PassSeconds {
     pub preparation: f64,
     /// Light sub-paths.
     pub light: f64,
-    /// Building look-up structures.
+    /// Building the trees of photons and beams.
     pub build: f64,
     /// Camera sub-paths, with all look-ups.
     pub camera: f64,
@@ -110,7 +110,7 @@ impl ErrorSeries {
 pub(crate) struct Record {
     pub(crate) times: PassTimes,
     pub(crate) counters: Counters,
-    /// Largest number of bytes that light vertices, beams and look-up structures took.
+    /// Largest number of bytes that light vertices, beams and their trees took.
     pub(crate) map_bytes: u64,
     /// Bytes that the render is expected to need.
     pub(crate) expected_bytes: u64,

@@ -7,7 +7,7 @@
 use std::cmp::Reverse;
 
 use glam::Vec3;
-use upbp_accel::{Shape, ShapeId, offset_origin};
+use upbp_accel::{BoxTree, GeometryError, Shape, ShapeId, offset_origin};
 use upbp_media::{BodyId, Interior};
 
 use super::builder::Builder;
@@ -24,25 +24,52 @@ fn drafts_of_bodies(drafts: &[ShapeDraft]) -> Vec<BodyDraft<'_>> {
 }
 
 /// Puts bodies in order, the lowest first: a body's [`Interior::priority`] is its place.
-pub(super) fn rank(drafts: &[ShapeDraft]) -> Vec<Body> {
+///
+/// # Errors
+/// Shapes without finite bounds, or too many.
+pub(super) fn rank(drafts: &[ShapeDraft]) -> Result<Vec<Body>, GeometryError> {
     let mut drafts = drafts_of_bodies(drafts);
     // Stable, so that the later in the file comes last. No volume is negative, so that its bits are in order.
     drafts.sort_by_cached_key(|(_, shape, inside)| (inside.priority, Reverse(shape.volume().to_bits())));
+    let boxes = BoxTree::new(drafts.iter().map(|(_, shape, _)| shape.aabb()))?;
     let mut bodies: Vec<Body> = Vec::with_capacity(drafts.len());
     for ((place, (index, shape, inside)), priority) in drafts.iter().enumerate().zip(0..) {
-        let ior = inside.ior.unwrap_or_else(|| surrounding_ior(shape, &drafts[..place], &bodies));
+        let ior = inside.ior.unwrap_or_else(|| {
+            let around = shapes_around(&boxes, centre(shape)).into_iter().rev();
+            let mut lower = around.filter(|other| *other < place);
+            let surrounding = lower.find(|other| surrounds(drafts[*other].1, shape));
+            surrounding.map_or(1.0, |other| bodies[other].interior.ior)
+        });
         let interior = Interior { body: BodyId(place as u32), medium: inside.medium, priority, ior };
         bodies.push(Body { shape: ShapeId(*index as u32), interior });
     }
-    bodies
+    Ok(bodies)
+}
+
+/// The shapes whose boxes hold a point, in their order: whatever lies inside of a shape has the centre of its
+/// box in that of the shape. In a scene of a million there is no time to ask each about each.
+pub(super) fn shapes_around(boxes: &BoxTree, point: Vec3) -> Vec<usize> {
+    let mut around = Vec::new();
+    boxes.for_each_around(point, |index| around.push(index));
+    around.sort_unstable();
+    around
+}
+
+/// The centre of a shape's box.
+fn centre(shape: &Shape) -> Vec3 {
+    let (min, max) = shape.aabb();
+    0.5 * min + 0.5 * max
 }
 
 impl Builder<'_> {
     /// Reports surfaces that shine all inside of an opaque shape, where they would light nothing.
-    pub(super) fn check_lamps_are_free(&mut self, drafts: &[ShapeDraft]) {
+    pub(super) fn check_lamps_are_free(&mut self, drafts: &[ShapeDraft], boxes: &BoxTree) {
         for (index, lamp) in drafts.iter().enumerate().filter(|(_, draft)| !draft.emission.is_black()) {
-            let mut opaque = drafts.iter().enumerate().filter(|(_, draft)| draft.boundary.inside().is_none());
-            if let Some((outer, _)) = opaque.find(|(_, draft)| is_buried(&lamp.shape, &draft.shape)) {
+            let is_around = |outer: &usize| {
+                let draft = &drafts[*outer];
+                draft.boundary.inside().is_none() && is_buried(&lamp.shape, &draft.shape)
+            };
+            if let Some(outer) = shapes_around(boxes, centre(&lamp.shape)).into_iter().find(is_around) {
                 let message =
                     format!("lies inside of the opaque {} (a room is made of quads)", self.shape_item(outer));
                 self.problem(self.shape_item(index), message);
@@ -52,13 +79,15 @@ impl Builder<'_> {
 
     /// Reports bodies that lie all inside of an opaque shape, or of a body with a higher priority: they would
     /// be nowhere.
-    pub(super) fn check_bodies_count(&mut self, drafts: &[ShapeDraft]) {
+    pub(super) fn check_bodies_count(&mut self, drafts: &[ShapeDraft], boxes: &BoxTree) {
         let mut bodies = drafts_of_bodies(drafts);
+        let around = |shape: &Shape| -> Vec<_> {
+            let around = shapes_around(boxes, centre(shape)).into_iter();
+            around.filter(|outer| is_inside(shape, &drafts[*outer].shape)).collect()
+        };
         for (index, shape, _) in &bodies {
-            let is_around = |(_, draft): &(usize, &ShapeDraft)| {
-                draft.boundary.inside().is_none() && is_inside(shape, &draft.shape)
-            };
-            if let Some((outer, _)) = drafts.iter().enumerate().find(is_around) {
+            let is_opaque = |outer: &usize| drafts[*outer].boundary.inside().is_none();
+            if let Some(outer) = around(shape).into_iter().find(is_opaque) {
                 let outer = self.shape_item(outer);
                 let message = format!(
                     "lies inside of the opaque {outer}: it would be nowhere (a basin is made of quads)"
@@ -68,13 +97,12 @@ impl Builder<'_> {
         }
         bodies.sort_by_key(|(.., inside)| inside.priority);
         for (index, shape, Inside { priority, .. }) in &bodies {
-            let mut higher = bodies.iter().filter(|(.., other)| other.priority > *priority);
-            if let Some((outer, _, Inside { priority: other, .. })) =
-                higher.find(|(_, other, _)| is_inside(shape, other))
-            {
+            let priority_of = |outer: usize| Some((drafts[outer].boundary.inside()?.priority, outer));
+            let outer = around(shape).into_iter().filter_map(priority_of);
+            if let Some((other, outer)) = outer.filter(|(other, _)| other > priority).min() {
                 let message = format!(
                     "lies inside of {}, whose priority {other} is higher than its own {priority}: it would be nowhere",
-                    self.shape_item(*outer)
+                    self.shape_item(outer)
                 );
                 self.problem(self.shape_item(*index), message);
             }
@@ -114,23 +142,14 @@ fn is_buried(shape: &Shape, other: &Shape) -> bool {
     boxed && points_on(shape).all(|(point, _)| other.contains(point) == Some(true))
 }
 
-/// The index of refraction around an index-matched body: that of the highest body below it that contains
-/// points all over its surface. A cloud in a glass block has the index of the glass, or a bubble in the
+/// Whether a body contains points all over the surface of an index-matched one, which has the index of
+/// refraction of the highest that does: a cloud in a glass block has that of the glass, or a bubble in the
 /// cloud would refract wrongly.
-fn surrounding_ior(shape: &Shape, lower: &[BodyDraft<'_>], placed: &[Body]) -> f32 {
-    let (min, max) = shape.aabb();
+fn surrounds(outer: &Shape, shape: &Shape) -> bool {
+    let [(min, max), (outer_min, outer_max)] = [shape, outer].map(Shape::aabb);
+    let boxed = outer_min.cmple(min).all() && max.cmple(outer_max).all();
     // By points just inside of it, so that a body that fills another is surrounded by it.
-    let contains = |other: &Shape| {
-        let (outer_min, outer_max) = other.aabb();
-        let boxed = outer_min.cmple(min).all() && max.cmple(outer_max).all();
-        boxed
-            && points_on(shape)
-                .all(|(point, normal)| other.contains(offset_origin(point, normal, -normal)) == Some(true))
-    };
-    lower
-        .iter()
-        .zip(placed)
-        .rev()
-        .find(|((_, other, _), _)| contains(other))
-        .map_or(1.0, |(_, body)| body.interior.ior)
+    boxed
+        && points_on(shape)
+            .all(|(point, normal)| outer.contains(offset_origin(point, normal, -normal)) == Some(true))
 }

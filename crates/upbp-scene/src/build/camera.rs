@@ -1,8 +1,10 @@
 //! The camera and its film.
 
 use glam::Vec3;
+use upbp_accel::BoxTree;
 use upbp_estimators::scene::PixelRect;
 
+use super::bodies::shapes_around;
 use super::builder::Builder;
 use super::surfaces::ShapeDraft;
 use crate::camera::{PerspectiveCamera, PerspectiveView};
@@ -47,9 +49,15 @@ impl Builder<'_> {
     }
 
     /// Reports a camera or a light inside of an opaque shape, which would see or light nothing.
-    pub(super) fn check_is_free(&mut self, item: &str, position: Vec3, drafts: &[Option<ShapeDraft>]) {
-        for (index, draft) in drafts.iter().enumerate() {
-            let Some(draft) = draft else { continue };
+    pub(super) fn check_is_free(
+        &mut self,
+        item: &str,
+        position: Vec3,
+        drafts: &[Option<ShapeDraft>],
+        boxes: &BoxTree,
+    ) {
+        for index in shapes_around(boxes, position) {
+            let Some(draft) = &drafts[index] else { continue };
             if draft.boundary.inside().is_none() && draft.shape.contains(position) == Some(true) {
                 let message =
                     format!("lies inside of the opaque {} (a room is made of quads)", self.shape_item(index));

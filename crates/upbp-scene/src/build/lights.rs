@@ -5,6 +5,7 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::Vec3;
+use upbp_accel::BoxTree;
 use upbp_media::{Homogeneous, Medium as _, MediumId};
 
 use super::builder::Builder;
@@ -95,10 +96,10 @@ impl Builder<'_> {
     }
 
     /// Reports lights inside of an opaque shape, which would light nothing.
-    pub(super) fn check_lights_are_free(&mut self, drafts: &[Option<ShapeDraft>]) {
+    pub(super) fn check_lights_are_free(&mut self, drafts: &[Option<ShapeDraft>], boxes: &BoxTree) {
         for (index, light) in self.description.lights.iter().enumerate() {
             if let Description::Point { position, .. } | Description::Spot { position, .. } = light {
-                self.check_is_free(&item(index, light), position.get(), drafts);
+                self.check_is_free(&item(index, light), position.get(), drafts, boxes);
             }
         }
     }
@@ -120,25 +121,21 @@ impl Builder<'_> {
     pub(super) fn check_shines(&mut self, media: &[Homogeneous], ids: &BTreeMap<&str, MediumId>) {
         let description = self.description;
         let medium_of = |name: &String| ids.get(name.as_str()).and_then(|id| media.get(id.0 as usize));
-        if let Some(outside) = &description.outside
-            && medium_of(outside).is_some_and(is_closed)
-        {
-            for (index, light) in description.lights.iter().enumerate() {
-                if is_infinite(light) {
-                    let message = format!(
-                        "comes from infinitely far away and does not reach into the medium `{outside}` around everything; instead of `outside`, let it be the interior of a body with a `Null` material"
-                    );
-                    self.problem(item(index, light), message);
-                }
+        let outside = description.outside.as_ref().and_then(|name| Some((name, medium_of(name)?)));
+        if let Some((outside, medium)) = outside {
+            let lights = description.lights.iter().enumerate();
+            for (index, light) in lights.filter(|(_, light)| is_closed(medium) && is_infinite(light)) {
+                let message = format!(
+                    "comes from infinitely far away and does not reach into the medium `{outside}` around everything; instead of `outside`, let it be the interior of a body with a `Null` material"
+                );
+                self.problem(item(index, light), message);
             }
-        }
-        if let Some(outside) = &description.outside
-            && medium_of(outside).is_some_and(is_infinitely_bright)
-        {
-            self.problem(
-                "scene, outside",
-                format!("the medium `{outside}` glows in a channel that it does not attenuate: without an end it is infinitely bright"),
-            );
+            if is_infinitely_bright(medium) {
+                self.problem(
+                    "scene, outside",
+                    format!("the medium `{outside}` glows in a channel that it does not attenuate: without an end it is infinitely bright"),
+                );
+            }
         }
         let emits = |name: &String| medium_of(name).is_some_and(Homogeneous::emits);
         let named =

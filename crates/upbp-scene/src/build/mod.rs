@@ -103,20 +103,26 @@ impl Builder<'_> {
         if let Some(media) = &media {
             self.check_shines(media, &medium_ids);
         }
+        // Where a shape could not be made there is a box of nothing.
+        let aabb = |draft: &Option<ShapeDraft>| {
+            draft.as_ref().map_or_else(Default::default, |draft| draft.shape.aabb())
+        };
+        let boxes = drafts.iter().map(aabb);
+        let boxes = BoxTree::new(boxes).map_err(|error| self.problem("shapes", error)).ok()?;
         if let Some(camera) = &camera {
-            self.check_is_free("camera", camera.origin(), &drafts);
+            self.check_is_free("camera", camera.origin(), &drafts, &boxes);
         }
-        self.check_lights_are_free(&drafts);
+        self.check_lights_are_free(&drafts, &boxes);
         if !self.problems.is_empty() {
             return None;
         }
         let (media, mut camera) = (media?, camera?);
         let mut drafts: Vec<_> = drafts.into_iter().collect::<Option<_>>()?;
-        self.check_bodies_count(&drafts);
-        self.check_lamps_are_free(&drafts);
+        self.check_bodies_count(&drafts, &boxes);
+        self.check_lamps_are_free(&drafts, &boxes);
         let origin = extent::move_near_origin(&mut drafts, &mut lights, &mut camera);
         let bounds = extent::bounds(&drafts, &lights, &camera);
-        let bodies = bodies::rank(&drafts);
+        let bodies = bodies::rank(&drafts).map_err(|error| self.problem("shapes", error)).ok()?;
         let largest_corner = extent::largest_corner(&drafts);
         let surfaces = self.records(&drafts, &bodies, &mut lights);
         lights.extend(volume_lights(&drafts, &bodies, &media, bounds.radius));

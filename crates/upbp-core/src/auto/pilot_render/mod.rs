@@ -24,7 +24,7 @@ use crate::deadline::Halt;
 use crate::plan::Plan;
 use crate::settings::{CheckedSettings, Settings};
 use grid::Grid;
-use recorder::{ByRoulette, ByTechnique, Recorder, Sample, TECHNIQUES, add, passed};
+use recorder::{ByRoulette, PerTechnique, Recorder, Sample, TECHNIQUES, add, passed};
 
 /// Looks at each pixel: enough to tell what they have in common.
 pub(super) const PASSES: u32 = 2;
@@ -129,12 +129,12 @@ pub(super) struct Work {
     /// Edges per camera sub-path, by roulette.
     pub(super) camera_edges: ByRoulette,
     /// Calls of each technique per camera sub-path; of light tracing per light sub-path.
-    pub(super) calls: ByTechnique<ByRoulette>,
+    pub(super) calls: PerTechnique<ByRoulette>,
     /// Nodes, leaves and blocks of trees that the queries of each technique looked at, per camera sub-path,
     /// among the photons of the pilot render.
-    pub(super) tests: ByTechnique<ByRoulette>,
+    pub(super) tests: PerTechnique<ByRoulette>,
     /// Samples of each technique per camera sub-path; of merges for as many photons as the plan has.
-    pub(super) samples: ByTechnique<ByRoulette>,
+    pub(super) samples: PerTechnique<ByRoulette>,
     /// Edges per light sub-path.
     pub(super) light_edges: f64,
     /// Light vertices per light sub-path.
@@ -157,7 +157,7 @@ impl PilotRender {
         halt: &Halt<'_>,
     ) -> Option<Self> {
         let grid = Grid::new(scene.scene.camera().crop(), size.pixels);
-        let most_paths = (limits.vertices / plan.vertices_per_light_path.max(1.0)).max(64.0) as u32;
+        let most_paths = (limits.vertices / plan.vertices_per_light_path.max(1.0)).max(1.0) as u32;
         let most_paths = most_paths.min(plan.light_paths);
         let paths = size.light_paths.saturating_mul(grid.cells()).min(most_paths);
         let beam_paths = plan.beam_paths.min(paths);

@@ -22,7 +22,7 @@ const LEAST_SHARE: f64 = 1e-30;
 pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
 
 /// A value for each technique.
-pub(crate) type ByTechnique<T> = [T; TECHNIQUES];
+pub(crate) type PerTechnique<T> = [T; TECHNIQUES];
 
 /// A sample, weighted as when everything runs.
 #[derive(Clone, Copy, Debug)]
@@ -53,9 +53,9 @@ pub(crate) struct Recorder {
     /// Edges of camera sub-paths.
     pub(crate) edges: ByRoulette,
     /// Calls of each technique.
-    pub(crate) calls: ByTechnique<ByRoulette>,
+    pub(crate) calls: PerTechnique<ByRoulette>,
     /// Nodes, leaves and blocks of trees over photons that the queries of each technique looked at.
-    pub(crate) tests: ByTechnique<ByRoulette>,
+    pub(crate) tests: PerTechnique<ByRoulette>,
     /// Product of the albedos of the camera sub-path at hand.
     albedos: f32,
     /// Camera sub-paths that would be here, by the number of a roulette.
@@ -103,7 +103,7 @@ impl<B> Observer<B> for Recorder {
 }
 
 /// Parts of all techniques in the sum of their densities.
-pub(crate) fn shares(densities: &mis::ByTechnique) -> ByTechnique<f32> {
+pub(crate) fn shares(densities: &mis::ByTechnique) -> PerTechnique<f32> {
     let total = densities.total();
     densities.of.map(|density| if density > 0.0 { (density / total).max(LEAST_SHARE) as f32 } else { 0.0 })
 }

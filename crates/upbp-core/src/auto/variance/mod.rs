@@ -17,7 +17,7 @@ use glam::DVec3;
 use upbp_estimators::{Technique, TechniqueSet};
 
 use super::full_plan::BEAMS;
-use super::pilot_render::recorder::{ByTechnique, Sample, TECHNIQUES};
+use super::pilot_render::recorder::{PerTechnique, Sample, TECHNIQUES};
 use super::pilot_render::{PilotRender, Shared};
 use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
@@ -38,11 +38,11 @@ pub(super) const GROUPS: usize = 8;
 /// Samples of each technique under a plan, relative to those of the pilot render's plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Counts {
-    relative: ByTechnique<f64>,
+    relative: PerTechnique<f64>,
     /// Light sub-paths that they come from, and those with beams.
     paths: [f64; 2],
     /// Part of the camera sub-paths that make the queries of a technique, which `relative` contains.
-    active: ByTechnique<f64>,
+    active: PerTechnique<f64>,
     /// Factor of emission hits, next events and connections in the weights.
     camera_factor: f64,
     /// The number of the roulette.

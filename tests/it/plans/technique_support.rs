@@ -4,8 +4,9 @@
 use upbp_core::{RenderError, Settings, TechniqueSet};
 use upbp_scene::ReadyScene;
 
-/// A scene of shapes and lights, with these settings: what the census says, or why nothing is rendered.
-fn census(parts: &str, settings: &Settings) -> Result<String, RenderError> {
+/// A scene of shapes and lights, with these settings: what is known of its techniques, or why nothing is
+/// rendered.
+fn support_of(parts: &str, settings: &Settings) -> Result<String, RenderError> {
     // Media count whether or not something is made of them.
     let media: Vec<String> = [
         ("fog", "Homogeneous(sigma_s: 1)"),
@@ -57,7 +58,7 @@ fn techniques_that_can_make_no_light_are_an_error() {
         (ball("mirror", None) + POINT, "auto", "nothing"),
         (ball("mirror", None) + POINT, "all", "nothing"),
     ] {
-        let found = census(&parts, &techniques(names));
+        let found = support_of(&parts, &techniques(names));
         println!("{parts} {names}: {found:?}");
         match (found, possible) {
             (Ok(_), "") => {}
@@ -83,7 +84,7 @@ fn techniques_that_can_make_no_light_are_an_error() {
     }
     // Connections need three edges, next events two.
     let short = |names, max_length| {
-        census(&(ball("grey", None) + POINT), &Settings { max_length, ..techniques(names) })
+        support_of(&(ball("grey", None) + POINT), &Settings { max_length, ..techniques(names) })
     };
     assert!(matches!(short("connect", 2), Err(RenderError::NoLight { .. })));
     assert!(matches!(short("nee", 1), Err(RenderError::NoLight { .. })));
@@ -93,7 +94,7 @@ fn techniques_that_can_make_no_light_are_an_error() {
 #[test]
 fn light_of_media_that_camera_sub_paths_alone_find_is_named() {
     const SEEN: &str = "no light sub-path starts in: their light is found by camera sub-paths alone";
-    let says = |parts: &str, names: &str| census(parts, &techniques(names)).expect("a scene with light");
+    let says = |parts: &str, names: &str| support_of(parts, &techniques(names)).expect("a scene with light");
     // Nothing to connect.
     let fire = ball("null", Some("fire")) + POINT;
     for names in ["auto", "all", "hit"] {
