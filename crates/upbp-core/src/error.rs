@@ -35,7 +35,8 @@ impl From<ron::error::SpannedError> for TextError {
         let message = match &error.code {
             // Those of the parser speak of its own language.
             Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) | Error::ExpectedIdentifier => {
-                "expected a word, as `Auto` is one".to_owned()
+                "expected a word, as `Auto` is one; numbers go with words, as in `Count(1000)` or `Absolute(0.01)`"
+                    .to_owned()
             }
             Error::ExpectedInteger | Error::InvalidIntegerDigit { .. } => {
                 "expected a whole number".to_owned()

@@ -28,6 +28,8 @@ pub struct PreparedScene<'a, S: Scene> {
     /// Choice of emitters by place and power; `None` where that tells nothing.
     tree: Option<EmitterTree>,
     choice: Arc<EmitterChoice>,
+    /// Where light that comes back to the scene is scattered, if a medium around it scatters.
+    neighbourhood: Option<BoundingSphere>,
     /// Bounds of light sub-paths' starts, by [`EmitterChoice::emission_bounds`].
     emission_bounds: BoundingSphere,
     environments: Vec<EmitterId>,
@@ -107,6 +109,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             power,
             tree,
             choice,
+            neighbourhood: neighbourhood(scene, &bounds),
             emission_bounds: bounds,
             environments,
             volumes,
@@ -115,6 +118,14 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             emitting_media,
             dense_media,
         })
+    }
+
+    /// Where most light is scattered that comes back to the scene from a medium around it: within its bounds
+    /// and the distance beyond them on which light loses its direction. `None` without such a medium, or if
+    /// it emits: then what is far away is no less bright.
+    #[must_use]
+    pub const fn neighbourhood(&self) -> Option<BoundingSphere> {
+        self.neighbourhood
     }
 
     /// Chooses emitters by what they bring instead of by power: `emission` where light sub-paths start,
@@ -433,6 +444,15 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     pub fn stack_at_camera(&self, lens: glam::Vec3) -> MediumStack {
         self.camera_stack.clone().unwrap_or_else(|| self.scene.stack_at(lens))
     }
+}
+
+/// The bounds of a scene, wider by the distance on which light in the medium around it loses its direction.
+fn neighbourhood<S: Scene>(scene: &S, bounds: &BoundingSphere) -> Option<BoundingSphere> {
+    let medium = &scene.media()[scene.outside()?.0 as usize];
+    let forward = medium.phase().mean_cosine().max_component().max(0.0);
+    let radius = bounds.radius + medium.mean_free_path() / (1.0 - forward);
+    (medium.scatters() && !medium.emits() && radius.is_finite())
+        .then_some(BoundingSphere { centre: bounds.centre, radius })
 }
 
 /// An infinite length of the medium around everything.

@@ -1,6 +1,9 @@
 //! Russian roulette: which walks end before they leave the scene.
 
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
+
+use crate::scene::BoundingSphere;
 
 /// Rule by which sub-paths end early (`docs/theory.md`, section 6.8).
 ///
@@ -10,7 +13,10 @@ use serde::{Deserialize, Serialize};
 /// with certainty until the product of their albedos falls below a threshold, and hold it from then on.
 ///
 /// Walks of both kinds may be caught inside of clear glass, where total reflection never lets them out: after
-/// many vertices in a row that only reflect or refract, two in a thousand end at each further one.
+/// many vertices in a row that only reflect or refract, two in a thousand end at each further one. And they
+/// may get lost in a medium around the scene: of those that get so many times as far away as the
+/// [neighbourhood](crate::PreparedScene::neighbourhood) of the scene is wide, one in so many goes on, which
+/// is how many would come back.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Roulette {
     /// Walks end where they leave the scene, or at the greatest length, which those that total reflection
@@ -53,23 +59,28 @@ pub struct Survival {
     left: f32,
     /// Vertices in a row without a smooth lobe.
     reflections: u32,
+    /// Where nothing is rare; `None` for everywhere.
+    neighbourhood: Option<BoundingSphere>,
+    /// How many times as far from its centre as its radius the walk has been, at least one.
+    farthest: f32,
 }
 
 impl Survival {
-    /// State of a camera sub-path that starts.
+    /// State of a camera sub-path that starts. Far from the `neighbourhood` of the scene, if there is one,
+    /// it ends more often.
     #[must_use]
-    pub const fn of_camera(roulette: Roulette) -> Self {
-        Self { roulette, left: 1.0, reflections: 0 }
+    pub const fn of_camera(roulette: Roulette, neighbourhood: Option<BoundingSphere>) -> Self {
+        Self { roulette, left: 1.0, reflections: 0, neighbourhood, farthest: 1.0 }
     }
 
     /// State of a light sub-path that starts.
     #[must_use]
-    pub const fn of_light(roulette: Roulette) -> Self {
+    pub const fn of_light(roulette: Roulette, neighbourhood: Option<BoundingSphere>) -> Self {
         let roulette = match roulette {
             Roulette::Off => Roulette::Off,
             Roulette::Below(_) => Roulette::Below(1.0),
         };
-        Self { roulette, left: 1.0, reflections: 0 }
+        Self::of_camera(roulette, neighbourhood)
     }
 
     pub(crate) const fn roulette(&self) -> Roulette {
@@ -85,6 +96,19 @@ impl Survival {
         self.reflections = if is_smooth { 0 } else { self.reflections + 1 };
         let caught = self.reflections > FREE_REFLECTIONS && self.roulette.is_on();
         if caught { REFLECTS_ON * probability } else { probability }
+    }
+
+    /// The probability to go on from a place, by how far away it is. The walk is taken to do so.
+    #[inline]
+    pub(crate) fn probability_at(&mut self, position: Vec3) -> f32 {
+        let Some(neighbourhood) = self.neighbourhood.filter(|_| self.roulette.is_on()) else { return 1.0 };
+        let distance = position.distance(neighbourhood.centre) / neighbourhood.radius;
+        if !(distance > self.farthest) {
+            return 1.0;
+        }
+        let probability = self.farthest / distance;
+        self.farthest = distance;
+        probability
     }
 }
 
@@ -102,7 +126,7 @@ mod tests {
             albedos in prop::collection::vec(0.05_f32..1.0, 1..12), least in 0.01_f32..1.0,
         ) {
             let roulette = Roulette::Below(least);
-            let mut survival = Survival::of_camera(roulette);
+            let mut survival = Survival::of_camera(roulette, None);
             let (mut product, mut reached) = (1.0, 1.0);
             for albedo in albedos {
                 product *= albedo;
@@ -114,28 +138,45 @@ mod tests {
 
         #[test]
         fn photons_keep_their_power(albedos in prop::collection::vec(0.05_f32..1.0, 1..40)) {
-            let mut survival = Survival::of_light(Roulette::Below(0.3));
+            let mut survival = Survival::of_light(Roulette::Below(0.3), None);
             for albedo in albedos {
                 prop_assert_eq!(survival.probability(albedo, true), albedo);
             }
         }
 
+        /// The probability to get anywhere depends on the farthest place on the way alone.
+        #[test]
+        fn one_in_so_many_goes_so_many_times_as_far(
+            places in prop::collection::vec([-40.0_f32..40.0, -40.0_f32..40.0, -40.0_f32..40.0], 1..20),
+        ) {
+            let neighbourhood = BoundingSphere { centre: Vec3::new(1.0, -2.0, 3.0), radius: 8.0 };
+            let mut survival = Survival::of_light(Roulette::Below(0.5), Some(neighbourhood));
+            let (mut reached, mut farthest) = (1.0, 8.0_f32);
+            for place in places.into_iter().map(Vec3::from) {
+                reached *= survival.probability_at(place);
+                farthest = farthest.max((place - neighbourhood.centre).length());
+                prop_assert!((reached * farthest / 8.0 - 1.0).abs() < 1e-5);
+            }
+            let mut endless = Survival::of_light(Roulette::Off, Some(neighbourhood));
+            prop_assert_eq!(endless.probability_at(Vec3::splat(1e9)), 1.0);
+        }
+
         #[test]
         fn without_roulette_walks_go_on(albedo in 0.0_f32..1.0) {
-            prop_assert_eq!(Survival::of_camera(Roulette::Off).probability(albedo, false), 1.0);
-            prop_assert_eq!(Survival::of_light(Roulette::Off).probability(albedo, false), 1.0);
+            prop_assert_eq!(Survival::of_camera(Roulette::Off, None).probability(albedo, false), 1.0);
+            prop_assert_eq!(Survival::of_light(Roulette::Off, None).probability(albedo, false), 1.0);
         }
     }
 
     #[test]
     fn a_walk_that_is_caught_ends() {
-        let mut survival = Survival::of_light(Roulette::Below(0.5));
+        let mut survival = Survival::of_light(Roulette::Below(0.5), None);
         let mut probabilities = (0..400).map(|_| survival.probability(1.0, false));
         assert!(probabilities.by_ref().take(256).all(|probability| probability == 1.0));
         assert!(probabilities.all(|probability| probability == 0.998));
         assert_eq!(survival.probability(1.0, true), 1.0, "a smooth lobe lets it out");
         assert_eq!(survival.probability(1.0, false), 1.0);
-        let mut camera = Survival::of_camera(Roulette::Below(0.5));
+        let mut camera = Survival::of_camera(Roulette::Below(0.5), None);
         for _ in 0..300 {
             let _ = camera.probability(1.0, false);
         }

@@ -16,15 +16,27 @@ use upbp_estimators::{
 use upbp_testing::Estimate;
 use upbp_testing::analytic::{Case, Table, cases, medium, narrow_camera, scene};
 
-/// Distances and fluxes of the photons of each light sub-path of a source of power 1.
-fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
+/// Distances and fluxes of the photons of each light sub-path of a source.
+fn photons(case: &Case, paths: u32, each: impl FnMut(&[(f64, f64)])) {
     let sigma_t = case.input("sigma_t");
     let albedo = case.input("albedo");
-    let intensity = 0.25 * std::f64::consts::FRAC_1_PI * case.input("power");
+    let medium = medium((1.0 - albedo) * sigma_t, albedo * sigma_t, case.optional("g").unwrap_or(0.0));
+    photons_in(&medium, case.input("power"), Roulette::Below(1.0), 1_000_000, paths, each);
+}
+
+/// Distances and fluxes of the photons of each light sub-path of a source of some power in a medium.
+fn photons_in(
+    medium: &str,
+    power: f64,
+    roulette: Roulette,
+    longest: u32,
+    paths: u32,
+    mut each: impl FnMut(&[(f64, f64)]),
+) {
+    let intensity = 0.25 * std::f64::consts::FRAC_1_PI * power;
     let scene = scene(&format!(
-        "{} outside: \"m\", media: {{\"m\": {}}}, lights: [Point(position: (0.0, 0.0, 0.0), intensity: {intensity:?})],",
+        "{} outside: \"m\", media: {{\"m\": {medium}}}, lights: [Point(position: (0.0, 0.0, 0.0), intensity: {intensity:?})],",
         narrow_camera([10.0, 0.0, 0.0], [0.0; 3], 1),
-        medium((1.0 - albedo) * sigma_t, albedo * sigma_t, case.optional("g").unwrap_or(0.0)),
     ));
     let world = PreparedScene::new(&scene).expect("a valid scene");
     let plan = IterationPlan::new(
@@ -40,8 +52,8 @@ fn photons(case: &Case, paths: u32, mut each: impl FnMut(&[(f64, f64)])) {
             camera_factor: 1.0,
             periods: MergePeriods::ONE,
             vertices_per_light_path: 1.0,
-            lengths: PathLengths { min: 1, max: 1_000_000 },
-            roulette: Roulette::Below(1.0),
+            lengths: PathLengths { min: 1, max: longest },
+            roulette,
             kernels: Kernels { pp3d: Kernel::ball(0.1), ..Kernels::NONE },
             radius_field: RadiusField::Uniform,
             heuristic: Heuristic::Balance,
@@ -103,6 +115,31 @@ fn fluence_around_a_point_source() {
         table.check(&case.id, sums.estimate(), expected, 3e-3 * expected);
     }
     table.finish();
+}
+
+/// What comes back from far away is the same with the roulette, in a medium that absorbs nothing.
+#[test]
+fn lost_walks_end_without_bias() {
+    /// Edges of a walk at most: it gets some five times as far as the neighbourhood of the scene is wide.
+    const LONGEST: u32 = 1000;
+    let returning = |roulette, paths| {
+        let (mut sums, mut edges) = (Sums::default(), 0);
+        photons_in(&medium(0.0, 1.0, 0.0), 1.0, roulette, LONGEST, paths, |photons| {
+            edges += photons.len();
+            // Photons in a shell that have been far away.
+            let far = photons.iter().position(|(distance, _)| *distance > 14.0).unwrap_or(photons.len());
+            let back = photons[far..].iter().filter(|(distance, _)| *distance < 6.0);
+            sums.add(back.map(|(_, flux)| flux).sum());
+        });
+        (sums.estimate(), edges as f64 / f64::from(paths))
+    };
+    let (all, of_all) = returning(Roulette::Off, 40_000);
+    let (some, of_some) = returning(Roulette::Below(1.0), 200_000);
+    let z = (all.mean - some.mean) / all.error.hypot(some.error);
+    println!("{} +- {}, {} +- {}, {of_all} and {of_some} edges", all.mean, all.error, some.mean, some.error);
+    assert!(z.abs() < 4.0, "{z} standard errors");
+    assert!(all.error < 0.02 * all.mean && some.error < 0.03 * some.mean, "errors tell nothing");
+    assert!(of_some < 0.5 * of_all, "{of_some} of {of_all} edges");
 }
 
 #[test]

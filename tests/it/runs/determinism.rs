@@ -1,8 +1,12 @@
 //! Determinism: a scene, settings and a seed give the same bits, whatever the number of threads, and however
 //! the iterations are shared out among runs.
 
+use std::path::Path;
+
+use exr::math::Vec2;
+use exr::meta::MetaData;
 use proptest::prelude::*;
-use upbp_core::{LightPaths, Renderer, Settings, State, StateError, TechniqueSet};
+use upbp_core::{LightPaths, Renderer, Settings, State, StateError, TechniqueSet, read_exr, write_exr};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::Count;
 
@@ -71,13 +75,24 @@ fn a_crop_shows_the_same_camera_samples_as_the_whole() {
         };
         let mut renderer = upbp_testing::renderer(&scene, settings);
         assert!(renderer.iterate());
-        renderer.film().image()
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("crop_{crop}.exr"));
+        write_exr(&path, renderer.state()).expect("a folder for tests");
+        (renderer.film().image(), path)
     };
-    let (whole, part) = (render(false), render(true));
+    let ((whole, whole_file), (part, part_file)) = (render(false), render(true));
     assert_eq!((part.width, part.height), (16, 8));
     for (i, pixel) in part.pixels.iter().enumerate() {
         let (x, y) = (8 + i % 16, 4 + i / 16);
         assert_eq!(*pixel, whole.pixels[y * 32 + x]);
+    }
+    // A compositor finds the place of the part in the whole.
+    for (file, position, size) in [(whole_file, (0, 0), (32, 32)), (part_file, (8, 4), (16, 8))] {
+        let header = &MetaData::read_from_file(&file, false).expect("an image").headers[0];
+        let display = header.shared_attributes.display_window;
+        assert_eq!((display.position, display.size), (Vec2(0, 0), Vec2(32, 32)), "{}", file.display());
+        let place = header.own_attributes.layer_position;
+        assert_eq!((place, header.layer_size), (position.into(), size.into()), "{}", file.display());
+        assert_eq!(read_exr(&file).expect("an image").pixels.len(), size.0 * size.1);
     }
 }
 

@@ -1,9 +1,10 @@
 //! The options of `upbp render` and `upbp check`, in the groups in which the help shows them.
 
 use std::error::Error;
-use std::num::NonZeroUsize;
+use std::num::{IntErrorKind, NonZeroUsize, ParseIntError};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Duration;
 
 use clap::{Args, ValueHint};
@@ -93,15 +94,15 @@ pub(crate) struct Method {
     #[arg(long, value_name = "FILE.ron", value_parser = files::path(files::plan), value_hint = ValueHint::FilePath)]
     pub(crate) save_plan: Option<PathBuf>,
     /// Most edges of a path between light and camera [default: 16384]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = whole::<u32>, allow_negative_numbers = true)]
     max_length: Option<u32>,
     /// Light sub-paths per iteration [default: one per pixel, fewer or more where that pays, fewer where
     /// memory or time is short]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>, allow_negative_numbers = true)]
     light_paths: Option<u32>,
     /// Light sub-paths that leave photon beams, per iteration [default: enough to give a query beam about
     /// one, fewer or more where that pays]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>, allow_negative_numbers = true)]
     beams: Option<u32>,
     /// Keep the first radii of kernels instead of shrinking them
     #[arg(long)]
@@ -110,7 +111,7 @@ pub(crate) struct Method {
     #[arg(long)]
     features: bool,
     /// Seed of all random numbers [default: 0]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = whole::<u64>, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Settings file (RON) for these and rarer choices; options override it
     ///
@@ -138,7 +139,7 @@ pub(crate) struct Resources {
     #[arg(long, value_name = "T", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Memory for film, light vertices, photon beams and their trees, MiB [default: half of what is free]
-    #[arg(long, value_name = "MIB")]
+    #[arg(long, value_name = "MIB", value_parser = whole::<u32>, allow_negative_numbers = true)]
     memory: Option<u32>,
 }
 
@@ -274,7 +275,7 @@ pub(crate) fn names() -> String {
         ("auto", "those that pay in the scene, with the numbers of sub-paths that go with them"),
     ];
     let layers = [
-        ("R, G, B", "the picture"),
+        ("R, G, B", "the picture; of a --crop with its place in the whole (data and display window)"),
         ("bpt, surf, ...", "what each technique adds to it, weighted; of all that ran"),
         (
             "variance",
@@ -327,6 +328,14 @@ fn iterations(text: &str) -> Result<Iterations, String> {
             "expected a number of iterations such as 100, or a range such as 100..200 without its end, up to {MAX_ITERATIONS}"
         )),
     }
+}
+
+/// Parser of a number without sign, point and exponent.
+fn whole<T: FromStr<Err = ParseIntError>>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|error: ParseIntError| match error.kind() {
+        IntErrorKind::PosOverflow => "the number is too large".to_owned(),
+        _ => "expected a whole number from 0, in digits".to_owned(),
+    })
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -91,7 +91,7 @@ impl<'a> Cost<'a> {
             let samples = self.0.relative_photons(technique, plan) * work.samples[i][roulette];
             camera += plan.active_part(technique)
                 * (work.calls[i][roulette] * NS_PER_CALL[i]
-                    + self.tests(technique, plan) * NS_PER_TEST[i]
+                    + self.tests(technique, plan) * self.ns_per_test(technique, plan)
                     + samples * NS_PER_SAMPLE[i]);
         }
         camera
@@ -116,6 +116,17 @@ impl<'a> Cost<'a> {
         let light_paths = if plan.uses_light_paths() { f64::from(plan.light_paths) } else { 0.0 };
         let beam_paths = if plan.techniques.intersects(BEAMS) { f64::from(plan.beam_paths) } else { 0.0 };
         light_paths * light + beam_paths * work.beams * NS_PER_TREE_BEAM
+    }
+
+    /// Nanoseconds of a node, a leaf or a block. Lines through many photon points wait for memory: each pass
+    /// other parts of the tree, which no cache holds any more.
+    fn ns_per_test(self, technique: Technique, plan: &Plan) -> f64 {
+        /// Photon points up to which the table holds.
+        const CACHED: f64 = 65_536.0;
+        let points = f64::from(plan.light_paths) * self.0.work.points[1];
+        let wait =
+            if technique == Technique::Pb2d { (points / CACHED).max(1.0).powf(1.0 / 6.0) } else { 1.0 };
+        wait * NS_PER_TEST[technique as usize]
     }
 
     /// Nodes, leaves and blocks that the queries of a camera sub-path by a technique look at among a plan's
@@ -184,6 +195,15 @@ mod tests {
                     };
             assert!((more - expected).abs() < 1e-9, "{technique:?}: {more}, expected {expected}");
         }
+        // As many photon points as a cache holds, and 64 times as many.
+        let work = Work { points: [0.0, 1024.0], ..work };
+        let cost = |paths| {
+            let call = NS_PER_CAMERA_PATH + NS_PER_CALL[Technique::Pb2d as usize];
+            costs(&work, [1.0; 2], only(Technique::Pb2d, paths))[0] - call
+        };
+        let tests = |paths: f64| 2.0 + 8.0 * (paths / 1600.0).cbrt();
+        let [found, expected] = [cost(4096) / cost(64), 2.0 * tests(4096.0) / tests(64.0)];
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found}, expected {expected}");
     }
 
     #[test]

@@ -10,6 +10,8 @@ use exr::prelude::*;
 use serde::Serialize;
 
 use super::check_size;
+use upbp_estimators::scene::PixelRect;
+
 use crate::error::OutputError;
 use crate::files::{open_exr, write_whole};
 use crate::film::{FeatureImages, Image as Picture};
@@ -70,7 +72,7 @@ pub fn write_exr(path: &Path, state: &State) -> std::result::Result<(), OutputEr
     // Not `Text::from`, which takes nothing but Latin-1.
     let text = Text::from_slice_unchecked(text.as_bytes());
     attributes.other.insert(Text::from("upbp"), AttributeValue::Text(text));
-    encode(path, film.rect().width, film.rect().height, attributes, channels)
+    encode(path, film.rect(), state.identity().film, attributes, channels)
 }
 
 /// Writes an image as `R`, `G`, `B`, with nothing besides: float32.
@@ -81,13 +83,15 @@ pub fn write_image(path: &Path, image: &Picture) -> std::result::Result<(), Outp
     check_size(path, image)?;
     let mut channels = SmallVec::new();
     push(&mut channels, "", image);
-    encode(path, image.width, image.height, LayerAttributes::default(), channels)
+    let rect = PixelRect { x: 0, y: 0, width: image.width, height: image.height };
+    encode(path, rect, (image.width, image.height), LayerAttributes::default(), channels)
 }
 
+/// Writes the pixels of `part` of a `film` of some width and height.
 fn encode(
     path: &Path,
-    width: u32,
-    height: u32,
+    part: PixelRect,
+    film: (u32, u32),
     attributes: LayerAttributes,
     channels: SmallVec<[AnyChannel<FlatSamples>; 4]>,
 ) -> std::result::Result<(), OutputError> {
@@ -96,9 +100,12 @@ fn encode(
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let layer =
-        Layer::new((width as usize, height as usize), attributes, encoding, AnyChannels::sort(channels));
-    let file = Image::from_layer(layer);
+    let size = (part.width as usize, part.height as usize);
+    let attributes = attributes.with_position(Vec2(part.x.cast_signed(), part.y.cast_signed()));
+    let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
+    let mut file = Image::from_layer(layer);
+    // A part is placed in the whole picture by whoever puts pictures together.
+    file.attributes.display_window = IntegerBounds::from_dimensions((film.0 as usize, film.1 as usize));
     let fail =
         |error: exr::error::Error| OutputError::Encode { path: path.to_owned(), reason: error.to_string() };
     write_whole(path, |writer| file.write().to_buffered(writer).map_err(fail))

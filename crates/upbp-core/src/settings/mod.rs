@@ -272,9 +272,15 @@ mod tests {
         }
         let error = Settings::from_ron("(\n  seed: 1,\n  radius: 2,\n)").unwrap_err();
         assert_eq!(error.line, 3, "{error}");
+        let words = ["1:15", "1:16"].map(|place| {
+            format!(
+                "{place}: expected a word, as `Auto` is one; \
+                 numbers go with words, as in `Count(1000)` or `Absolute(0.01)`"
+            )
+        });
         for (text, message) in [
-            ("(light_paths: 5)", "1:15: expected a word, as `Auto` is one"),
-            ("(radii: (surf: 3))", "1:16: expected a word, as `Auto` is one"),
+            ("(light_paths: 5)", words[0].as_str()),
+            ("(radii: (surf: 3))", words[1].as_str()),
             ("(\n  memory: -1)", "2:12: the whole number is too large or negative"),
             ("(seed: 1e3)", "1:8: expected a whole number"),
         ] {

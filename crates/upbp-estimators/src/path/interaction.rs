@@ -204,7 +204,7 @@ impl<B: Bsdf> Interaction<B> {
                 let turn = stream.decide();
                 let medium = &scene.media()[medium.0 as usize];
                 let albedo = continuation(medium, position, survival.roulette());
-                let probability = survival.probability(albedo, true);
+                let probability = survival.probability(albedo, true) * survival.probability_at(position);
                 if ends(goes_on, probability) {
                     return None;
                 }

@@ -147,7 +147,7 @@ fn jacobian(direction: DVec3, normal: DVec3, ratio: f64) -> f64 {
 fn transmitted(interaction: &Interaction<Glass>, walk: Walk, from: Vec3) -> Option<Scattered<f64>> {
     (0..64).find_map(|index| {
         let mut stream = Stream::new(1, 0, StreamKind::Light, index);
-        let mut survival = Survival::of_light(Roulette::Below(1.0));
+        let mut survival = Survival::of_light(Roulette::Below(1.0), None);
         let scattered = interaction.scatter::<_, f64>(
             &Nothing,
             &mut survival,

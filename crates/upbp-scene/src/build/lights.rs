@@ -133,7 +133,7 @@ impl Builder<'_> {
             if is_infinitely_bright(medium) {
                 self.problem(
                     "scene, outside",
-                    format!("the medium `{outside}` glows in a channel that it does not attenuate: without an end it is infinitely bright"),
+                    format!("the medium `{outside}` glows in a channel that it does not absorb: without an end it is infinitely bright"),
                 );
             }
         }
@@ -157,10 +157,11 @@ fn is_closed(medium: &Homogeneous) -> bool {
     medium.extinction().to_array().iter().all(|sigma| *sigma > 0.0)
 }
 
-/// Whether an infinite length of a medium shows infinite radiance.
+/// Whether a medium without an end shows infinite radiance: what it emits is never absorbed.
 fn is_infinitely_bright(medium: &Homogeneous) -> bool {
-    let (source, sigma_t) = (medium.source(Vec3::ZERO), medium.extinction());
-    (0..3).any(|channel| source[channel] > 0.0 && sigma_t[channel] == 0.0)
+    let (source, sigma_s) = (medium.source(Vec3::ZERO), medium.sigma_s(Vec3::ZERO));
+    let sigma_t = medium.extinction();
+    (0..3).any(|channel| source[channel] > 0.0 && sigma_t[channel] <= sigma_s[channel])
 }
 
 /// The unit vector along a vector of any length, by way of double precision.

@@ -151,7 +151,7 @@ fn scenes_without_light_are_refused() {
     );
     assert_eq!(
         problem("media: { \"fog\": Homogeneous(sigma_a: (1, 0, 1), glow: 1) }, outside: \"fog\""),
-        "scene, outside: the medium `fog` glows in a channel that it does not attenuate: without an end it is infinitely bright"
+        "scene, outside: the medium `fog` glows in a channel that it does not absorb: without an end it is infinitely bright"
     );
 }
 
