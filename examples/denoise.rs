@@ -14,7 +14,10 @@ use upbp_core::{Image, ToneMapping, write_image, write_png};
 fn main() -> ExitCode {
     let arguments: Vec<_> = env::args_os().skip(1).map(PathBuf::from).collect();
     let result = match arguments.as_slice() {
-        [input, output] if input == output => Err("the image would be written over".into()),
+        [input, output] if is_same(input, output) => Err("the image would be written over".into()),
+        [_, output] if output.extension().is_none_or(|extension| extension != "exr") => {
+            Err("the image to write is an OpenEXR file: its name ends in .exr".into())
+        }
         [input, output] => denoise(input, output),
         _ => Err("expected an image and an image to write".into()),
     };
@@ -25,6 +28,11 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Whether two paths lead to one file.
+fn is_same(a: &Path, b: &Path) -> bool {
+    matches!([a, b].map(fs::canonicalize), [Ok(a), Ok(b)] if a == b)
 }
 
 fn denoise(input: &Path, output: &Path) -> Result<(), Box<dyn Error>> {

@@ -46,8 +46,9 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
         let error = pair.error();
         images.write(&error, &in_colour(&error, options.exposure), |written| failures.extend(written.err()));
     }
-    say(&comparison.text(&options.image, &options.reference))?;
+    let said = say(&comparison.text(&options.image, &options.reference));
     Failure::all(&failures)?;
+    said?;
     match &options.output {
         Some(images) => say(&format!("wrote {}", images.names())),
         None => Ok(()),

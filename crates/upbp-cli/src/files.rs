@@ -126,7 +126,8 @@ fn brightest_channels(image: &Image) -> Vec<f32> {
 
 /// The exposure that shows a value as another one, within what the option takes.
 fn stops_to(shown: f32, value: f32) -> f32 {
-    (shown / value).log2().round().clamp(-20.0, 20.0)
+    // No zero with a sign.
+    (shown / value).log2().round().clamp(-20.0, 20.0) + 0.0
 }
 
 /// Said of a picture without any light.

@@ -128,9 +128,9 @@ impl Parser {
                 self.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
             }
             Some(word) if !SKIPPED.contains(&word) => {
-                let word: String = word.chars().take(20).flat_map(char::escape_debug).collect();
                 return Err(format!(
-                    "expected a statement about polygons, such as `v` or `f`, found `{word}`"
+                    "expected a statement about polygons, such as `v` or `f`, found `{}`",
+                    beginning(word)
                 ));
             }
             _ => {}
@@ -174,6 +174,11 @@ impl Parser {
     }
 }
 
+/// The beginning of a word, which may be of any length and of any characters, for a message.
+fn beginning(word: &str) -> String {
+    word.chars().take(20).flat_map(char::escape_debug).collect()
+}
+
 fn vector<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Vec3, String> {
     let mut coordinates = [0.0; 3];
     for coordinate in &mut coordinates {
@@ -182,13 +187,14 @@ fn vector<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Vec3, String> 
             .parse()
             .ok()
             .filter(|value: &f32| value.is_finite())
-            .ok_or_else(|| format!("expected a finite coordinate, found `{word}`"))?;
+            .ok_or_else(|| format!("expected a finite coordinate, found `{}`", beginning(word)))?;
     }
     Ok(coordinates.into())
 }
 
 fn index(word: &str, count: usize, what: &str) -> Result<u32, String> {
-    let number: i64 = word.parse().map_err(|_| format!("expected the number of a {what}, found `{word}`"))?;
+    let number: i64 =
+        word.parse().map_err(|_| format!("expected the number of a {what}, found `{}`", beginning(word)))?;
     let place = usize::try_from(number.unsigned_abs()).unwrap_or(usize::MAX);
     let index = if number < 0 { count.checked_sub(place) } else { place.checked_sub(1) };
     index

@@ -132,6 +132,11 @@ fn load(options: &Options) -> Result<ReadyScene, SceneError> {
                     "note: medium `{name}` is nowhere: no shape has it as `interior`, nor is it `outside`"
                 ));
             }
+            if let Some(name) = description.outside_without_absorption() {
+                complain(&format!(
+                    "note: the medium `{name}` around everything absorbs nothing: iterations are long, and with a little `sigma_a` much shorter"
+                ));
+            }
         }
     })
 }
@@ -175,13 +180,13 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
         attempt(files::write_report(&report, path));
     }
     Failure::all(&failures)?;
+    // Whoever asked for a picture is not to take an older one for it.
+    if !rendered {
+        complain("warning: no picture: the light sub-paths of the first iteration were not done");
+    }
     let mut said = Ok(());
     if !options.messages.quiet {
-        let wrote = if rendered {
-            format!("wrote {}", images.names())
-        } else {
-            "no picture: the light sub-paths of the first iteration were not done".to_owned()
-        };
+        let wrote = if rendered { format!("wrote {}", images.names()) } else { String::new() };
         said = say(&format!("{report}{wrote}")).and_then(|()| hint.map_or(Ok(()), |hint| say(&hint)));
     }
     // Said even if nobody reads the rest.

@@ -43,12 +43,15 @@ fn save(state: &State, path: &Path) {
 
 /// The message of the progress bar: iterations, time left, and the error so far.
 fn status(now: &Progress<'_>) -> String {
-    let left = if now.fraction > 0.0 { now.seconds * (1.0 / now.fraction - 1.0) } else { f64::INFINITY };
+    /// Seconds from which on nobody can tell how long it takes.
+    const UNKNOWN: f64 = 1e7;
+    let left = now.seconds * (1.0 / now.fraction - 1.0);
+    let left = if left < UNKNOWN { format!("{left:.0} s left") } else { "time left unknown".to_owned() };
     let (error, doubt) = (now.estimated_error, if now.estimated_error.doubt.is_some() { ">" } else { "" });
     let error = if error.relative_mse.is_finite() {
         format!("relMSE {doubt}{:.1e}", error.relative_mse)
     } else {
         "error unknown".to_owned()
     };
-    format!("iteration {}, {left:.0} s left, {error}", now.iterations)
+    format!("iteration {}, {left}, {error}", now.iterations)
 }

@@ -78,8 +78,8 @@ fn a_good_scene_renders_and_writes_its_files() {
 
 /// A likely mistake is told, and rendered all the same.
 #[test]
-fn a_medium_that_is_nowhere_is_told() {
-    let folder = folder("nowhere");
+fn media_that_are_nowhere_or_never_end_are_told() {
+    let folder = folder("notes_on_media");
     let check = |scene: &str, more: &[&str]| {
         fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
         let output = program::command("check", &folder, &[&["scene.ron"], more].concat()).output();
@@ -91,7 +91,12 @@ fn a_medium_that_is_nowhere_is_told() {
     let note = "note: medium `m` is nowhere: no shape has it as `interior`, nor is it `outside`\n";
     assert_eq!(check(&empty, &[]), note);
     assert_eq!(check(&empty, &["--quiet"]), "");
-    assert_eq!(check(&empty.replace("version: 1,", "version: 1, outside: \"m\","), &[]), "");
+    let everywhere = empty.replace("version: 1,", "version: 1, outside: \"m\",");
+    let note = "note: the medium `m` around everything absorbs nothing: iterations are long, and with a little `sigma_a` much shorter\n";
+    let endless = everywhere.replace("sigma_a: 0.1, ", "");
+    assert_eq!(check(&endless, &[]), note);
+    assert_eq!(check(&endless, &["--quiet"]), "");
+    assert_eq!(check(&everywhere, &[]), "");
     assert_eq!(check(SMALL, &[]), "");
 }
 

@@ -467,7 +467,8 @@ mod tests {
         // A list that was thinned has no less weight than one that was not.
         let found = Thinned::evenly(vec![numbers(QUERIES_OF_PIECE), numbers(4 * QUERIES_OF_PIECE)]);
         assert!(found.len() <= QUERIES && 2 * found.len() > QUERIES, "{}", found.len());
-        let second = found.iter().skip(1).position(|number| *number == 0).map_or(0, |i| i + 1);
-        assert!((3..6).contains(&((found.len() - second) / second)), "{second} of {}", found.len());
+        let of_first = found.windows(2).position(|pair| pair[1] < pair[0]).map_or(0, |last| last + 1);
+        let of_second = found.len() - of_first;
+        assert!((3 * of_first..=5 * of_first).contains(&of_second), "{of_first} and {of_second}");
     }
 }

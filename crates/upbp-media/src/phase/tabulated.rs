@@ -166,9 +166,11 @@ fn checked(rows: impl ExactSizeIterator<Item = (f32, f32)>) -> Result<Vec<(f32, 
     let last = rows.len() - 1;
     let mut checked: Vec<(f32, f32)> = Vec::with_capacity(last + 1);
     for (index, (degrees, value)) in rows.enumerate() {
+        /// Angles are single-precision numbers near to what a table says.
+        const LEAST_DIFFERENCE: f32 = 0.95 * MIN_STEP;
         let what = "angle";
         let wrong = |expected| Err(MediaError::EntryOutOfRange { what, index, value: degrees, expected });
-        let rises = checked.last().is_none_or(|&(before, _)| degrees - before >= MIN_STEP);
+        let rises = checked.last().is_none_or(|&(before, _)| degrees - before >= LEAST_DIFFERENCE);
         match index {
             0 if degrees != 0.0 => return wrong("0 degrees, where tables start"),
             _ if index == last && degrees != 180.0 => return wrong("180 degrees, where tables end"),

@@ -80,12 +80,33 @@ impl<R: Read> Read for Hashed<'_, R> {
     }
 }
 
-/// The message about a name that is not defined, with those that are.
+/// The message about a name that is not defined, with those that are, or some of them.
 pub(super) fn unknown<'n>(what: &str, name: &str, known: impl Iterator<Item = &'n str>) -> String {
-    let known: Vec<String> = known.map(|name| format!("`{name}`")).collect();
-    if known.is_empty() {
+    /// Names in a message: there may be as many messages as shapes.
+    const MOST: usize = 20;
+    let mut known = known.map(|name| format!("`{name}`"));
+    let some: Vec<String> = known.by_ref().take(MOST).collect();
+    let others = match known.count() {
+        0 => String::new(),
+        count => format!(" and {count} others"),
+    };
+    if some.is_empty() {
         format!("unknown {what} `{name}`; there are none")
     } else {
-        format!("unknown {what} `{name}`, known: {}", known.join(", "))
+        format!("unknown {what} `{name}`, known: {}{others}", some.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unknown;
+
+    #[test]
+    fn messages_name_no_more_than_some() {
+        let names: Vec<String> = (0..500).map(|i| format!("n{i}")).collect();
+        let message = |count| unknown("material", "x", names.iter().take(count).map(String::as_str));
+        assert_eq!(message(0), "unknown material `x`; there are none");
+        assert_eq!(message(2), "unknown material `x`, known: `n0`, `n1`");
+        assert!(message(20).ends_with("`n19`") && message(500).ends_with("`n19` and 480 others"));
     }
 }

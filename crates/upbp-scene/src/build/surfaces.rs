@@ -193,9 +193,12 @@ impl Builder<'_> {
                 let is_copy = copies > 1 && mesh.triangle_count() >= COPIED_FROM;
                 let mesh = if in_place && !is_copy { Ok(mesh) } else { mesh.placed(&to_scene) };
                 let mesh = mesh.map_err(|error| error.to_string())?;
-                for triangle in 0..mesh.triangle_count() {
-                    for corner in mesh.corners(triangle) {
-                        Vector::new(corner).map_err(|error| format!("triangle {triangle}: {error}"))?;
+                let (min, max) = mesh.aabb();
+                if Vector::new(min).is_err() || Vector::new(max).is_err() {
+                    for triangle in 0..mesh.triangle_count() {
+                        for corner in mesh.corners(triangle) {
+                            Vector::new(corner).map_err(|error| format!("triangle {triangle}: {error}"))?;
+                        }
                     }
                 }
                 Ok(if is_copy { mesh } else { mesh.unshared() }.into())

@@ -40,7 +40,7 @@ const KINDS: [(&str, &[&str]); 6] = [
             "Sphere(centre: (0, 1, 0), radius: 0.5)",
             "Box(min: (-1, 0, -1), max: (1, 2, 1))",
             "Quad(origin: (-1, 0, -1), edge_u: (0, 0, 2), edge_v: (2, 0, 0))",
-            "Mesh(file: \"bunny.obj\")",
+            "Mesh(file: \"bunny.obj\", scale: 0.5)",
         ],
     ),
     (
@@ -411,11 +411,15 @@ mod tests {
                 "Quad((0, 0, 0), (1, 0, 0), (0, 1, 0))",
                 "6: Expected a name, as in `Quad(origin: (-1, 0, -1), edge_u: (0, 0, 2), edge_v: (2, 0, 0))`",
             ),
-            ("geometry", r#"Mesh("a\"(.obj")"#, r#"6: Expected a name, as in `Mesh(file: "bunny.obj")`"#),
+            (
+                "geometry",
+                r#"Mesh("a\"(.obj")"#,
+                r#"6: Expected a name, as in `Mesh(file: "bunny.obj", scale: 0.5)`"#,
+            ),
             (
                 "geometry",
                 "Mesh(file: a.obj)",
-                r#"11: Expected text in quotes, as in `Mesh(file: "bunny.obj")`"#,
+                r#"11: Expected text in quotes, as in `Mesh(file: "bunny.obj", scale: 0.5)`"#,
             ),
             (
                 "geometry",

@@ -1,8 +1,9 @@
 //! Light from all directions by a latitude-longitude image.
 //!
-//! The radiance is constant over each pixel, and directions are drawn with a density in exact proportion to
-//! its luminance: by row, then by column, then uniformly by solid angle within the pixel. With the polar
-//! angle θ from +y, a pixel of an image of w columns covers `(2π/w) (cos θ₀ − cos θ₁)` steradians.
+//! The radiance is constant over each pixel, and directions are drawn with a density in proportion to its
+//! luminance, by tables in single precision: by row, then by column, then uniformly by solid angle within
+//! the pixel. With the polar angle θ from +y, a pixel of an image of w columns covers
+//! `(2π/w) (cos θ₀ − cos θ₁)` steradians.
 //!
 //! Oracle: `tests::the_density_of_an_image_integrates_to_one`.
 
@@ -37,6 +38,18 @@ pub enum EnvironmentImageError {
         width: usize,
         /// Rows.
         height: usize,
+    },
+    /// The pixels are a part of a picture: a sky of a part would be stretched over all directions.
+    #[error("has {width} x {height} pixels of a picture of {of_width} x {of_height}, expected all of them")]
+    Part {
+        /// Columns that there are.
+        width: usize,
+        /// Rows that there are.
+        height: usize,
+        /// Columns of the whole picture.
+        of_width: usize,
+        /// Rows of the whole picture.
+        of_height: usize,
     },
     /// No pixels, or not as many as the size says.
     #[error("has {pixels} pixels for {width} x {height}, expected all of them, at least 1")]
@@ -149,7 +162,14 @@ impl EnvironmentImage {
             .all_attributes()
             .from_buffered(file)
             .map_err(unreadable)?;
+        let whole = image.attributes.display_window;
+        let position = image.layer_data.attributes.layer_position;
         let pixels = image.layer_data.channel_data.pixels;
+        let (width, height) = (pixels.width, pixels.height);
+        let (of_width, of_height) = (whole.size.width(), whole.size.height());
+        if (position, width, height) != (whole.position, of_width, of_height) {
+            return Err(EnvironmentImageError::Part { width, height, of_width, of_height });
+        }
         Self::new(pixels.width, pixels.height, pixels.values)
     }
 

@@ -309,6 +309,27 @@ fn images_are_read_from_openexr() {
 }
 
 #[test]
+fn a_part_of_a_picture_is_no_sky() {
+    use exr::prelude::*;
+    let path = std::env::temp_dir().join(format!("upbp-scene-part-{}.exr", std::process::id()));
+    let message = |position: (i32, i32), whole: (usize, usize)| {
+        let channels = SpecificChannels::rgb(|_| (1.0_f32, 1.0_f32, 1.0_f32));
+        let attributes = LayerAttributes::default().with_position(position.into());
+        let layer = Layer::new((4, 1), attributes, Encoding::FAST_LOSSLESS, channels);
+        let mut image = exr::image::Image::from_layer(layer);
+        image.attributes.display_window = IntegerBounds::from_dimensions(whole);
+        image.write().to_file(&path).unwrap();
+        let image = EnvironmentImage::load(&path);
+        std::fs::remove_file(&path).unwrap();
+        image.err().map(|error| error.to_string())
+    };
+    assert_eq!(message((0, 0), (4, 1)), None);
+    let part = Some("has 4 x 1 pixels of a picture of 4 x 2, expected all of them".to_owned());
+    assert_eq!(message((0, 0), (4, 2)), part);
+    assert!(message((0, 1), (4, 1)).is_some(), "another place");
+}
+
+#[test]
 fn a_receiver_inside_or_on_a_sphere_finds_its_density() {
     let sphere = Sphere::new(Vec3::ZERO, 1.0).unwrap();
     let light = area(sphere);

@@ -212,6 +212,12 @@ fn wrong_tables_are_named() {
         assert!(tabulated(&[(0.0, bad), (180.0, 1.0)]).is_err());
         assert!(tabulated(&[(0.0, 1.0), (bad, 1.0), (180.0, 1.0)]).is_err());
     }
+    // In single precision some of these steps are less than a thousandth.
+    let small: Vec<_> = (0..180_000).step_by(997).chain([180_000]).flat_map(|i| [i, i + 1]).collect();
+    let mut rows: Vec<_> =
+        small.iter().filter(|i| **i <= 180_000).map(|i| (*i as f32 / 1000.0, 1.0)).collect();
+    rows.dedup();
+    assert!(tabulated(&rows).is_ok(), "{:?}", tabulated(&rows));
     assert!(tabulated(&[(0.0, f32::MAX), (180.0, f32::MAX)]).is_ok());
     assert!(tabulated(&[(0.0, 1e-45), (180.0, 0.0)]).is_ok());
 }
