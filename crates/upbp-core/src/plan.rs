@@ -6,12 +6,10 @@ use std::sync::Arc;
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use upbp_estimators::{
-    EmitterChoice, FootprintField, Kernel, MergePeriods, Roulette, Technique, TechniqueSet,
-};
+use upbp_estimators::{EmitterChoice, FootprintField, MergePeriods, Roulette, Technique, TechniqueSet};
 
 use crate::error::TextError;
-use crate::radius_schedule::RadiusSchedule;
+use crate::radius_schedule::{LARGEST_RADIUS, RadiusSchedule};
 
 /// Samples of a technique that a camera vertex may have on average.
 pub(crate) const PER_VERTEX: RangeInclusive<f32> = 0.001..=1000.0;
@@ -20,8 +18,8 @@ const CAMERA_FACTORS: RangeInclusive<f32> = 0.001..=1000.0;
 
 /// Techniques, sample counts and radii of all iterations of a render.
 ///
-/// What iterations compute depends on it, on the scene, on the settings and on their index, and on nothing
-/// else. So a plan that is written to a file and read on many machines makes their iterations fit together.
+/// Iterations depend on it, on the scene, on the settings and on their index, and on nothing else. So a plan
+/// that is written to a file and read on many machines makes their iterations fit together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self", deny_unknown_fields)]
 pub struct Plan {
@@ -75,8 +73,7 @@ impl Plan {
     pub(crate) fn validate(&self) -> Result<(), String> {
         let radii = &self.radii;
         let lengths = [radii.surf, radii.pp3d, radii.pb2d, radii.bp2d, radii.bb1d];
-        let kernels = radii.kernels(0);
-        let finite = |x: &f32| (0.0..f32::INFINITY).contains(x);
+        let possible = |x: &f32| (0.0..=LARGEST_RADIUS).contains(x);
         if self.techniques.is_empty() {
             Err("techniques: expected at least one".into())
         } else if self.light_paths == 0 && !self.techniques.without(TechniqueSet::PT).is_empty() {
@@ -97,10 +94,8 @@ impl Plan {
             Err(format!("roulette: expected Off, or Below a number in (0, 1], found {:?}", self.roulette))
         } else if !(0.0..f64::INFINITY).contains(&self.vertices_per_light_path) {
             Err(format!("vertices_per_light_path: expected a number, found {}", self.vertices_per_light_path))
-        } else if !(lengths.iter().all(finite) && finite(&radii.floor)) {
-            Err(format!("radii: expected lengths, found {radii:?}"))
-        } else if !Technique::ALL.iter().filter_map(|t| kernels.get(*t)).all(Kernel::is_representable) {
-            Err(format!("radii: expected kernels whose values single precision can hold, found {radii:?}"))
+        } else if !(lengths.iter().all(possible) && possible(&radii.floor)) {
+            Err(format!("radii: expected lengths up to {LARGEST_RADIUS:e}, found {radii:?}"))
         } else if !radii.field.is_valid(lengths.into_iter().fold(0.0, f32::max)) {
             Err(format!(
                 "radii.field: expected positive factors, of which the greatest is at most {} times the least, \
@@ -256,8 +251,7 @@ pub(crate) mod tests {
         assert!(wrong(|p| p.light_paths = 0).contains("light_paths"));
         assert!(wrong(|p| p.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|p| p.radii.pb2d = f32::NAN).contains("radii"));
-        assert!(wrong(|p| p.radii.pp3d = 1e16).contains("radii: expected kernels"));
-        assert!(wrong(|p| p.radii.pp3d = 1e-14).contains("radii: expected kernels"));
+        assert!(wrong(|p| p.radii.pp3d = 1e16).contains("radii: expected lengths up to 1e12"));
         assert!(wrong(|p| p.lanes = Some([0.5; 3])).contains("lanes: expected None, or"));
         let message = wrong(|p| p.connections = 1e9);
         assert!(message.contains(": connections, next_events: expected 0.001"), "{message}");

@@ -3,6 +3,9 @@
 use serde::{Deserialize, Serialize};
 use upbp_estimators::{Kernel, Kernels, RadiusField, Technique, TechniqueSet};
 
+/// The largest radius of a kernel, scene units: single precision holds the values of all kernels.
+pub(crate) const LARGEST_RADIUS: f32 = 1e12;
+
 /// The first radius of a kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Radius {

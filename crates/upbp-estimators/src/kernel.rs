@@ -32,6 +32,8 @@ impl Kernel {
     pub const NONE: Self =
         Self { shape: Shape::Disc, radius: 0.0, peak: 0.0, falloff: 0.0, effective_volume: 0.0 };
 
+    /// [`NONE`](Self::NONE) where single precision does not hold the values: of too wide a kernel they would
+    /// be zero, of too narrow a one infinite, and weights would count on it all the same.
     fn new(shape: Shape, radius: f32) -> Self {
         let r = f64::from(radius);
         let (peak, falloff, effective_volume) = match shape {
@@ -40,7 +42,11 @@ impl Kernel {
             Shape::ParabolicDisc => (2.0 / (PI * r * r), 1.0 / (r * r), 0.75 * PI * r * r),
             Shape::ParabolicLine => (0.75 / r, 1.0 / (r * r), 5.0 / 3.0 * r),
         };
-        Self { shape, radius, peak: peak as f32, falloff: falloff as f32, effective_volume }
+        let (peak, falloff) = (peak as f32, falloff as f32);
+        if !(peak.is_normal() && falloff.is_finite()) {
+            return Self::NONE;
+        }
+        Self { shape, radius, peak, falloff, effective_volume }
     }
 
     /// Constant on a disc: surface merging.
@@ -92,13 +98,6 @@ impl Kernel {
         self.effective_volume
     }
 
-    /// Whether single precision holds the kernel's values: too wide a kernel would be zero, too narrow a one
-    /// infinite.
-    #[must_use]
-    pub const fn is_representable(&self) -> bool {
-        self.radius == 0.0 || self.peak.is_normal()
-    }
-
     /// Value at a squared distance below `radius²`.
     #[must_use]
     pub fn value(&self, distance_squared: f32) -> f32 {
@@ -121,6 +120,22 @@ mod tests {
                 shell * r.powi(dimension - 1) * f64::from(kernel.value((r * r) as f32)).powi(power) * dr
             })
             .sum()
+    }
+
+    #[test]
+    fn there_is_no_kernel_that_single_precision_does_not_hold() {
+        for none in [
+            Kernel::ball(1e-14),
+            Kernel::ball(1e16),
+            Kernel::disc(1e-20),
+            Kernel::parabolic_disc(1e20),
+            Kernel::parabolic_line(1e-20),
+            Kernel::ball(1e-3).scaled(1e-11),
+            Kernel::disc(f32::NAN),
+        ] {
+            assert_eq!(none, Kernel::NONE);
+        }
+        assert_ne!(Kernel::parabolic_line(1e-15), Kernel::NONE);
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub struct PreparedScene<'a, S: Scene> {
     /// Choice of emitters by place and power; `None` where that tells nothing.
     tree: Option<EmitterTree>,
     choice: Arc<EmitterChoice>,
-    /// Where light that comes back to the scene is scattered, if a medium around it scatters.
+    /// The [neighbourhood](Self::neighbourhood) of the scene.
     neighbourhood: Option<BoundingSphere>,
     /// Bounds of light sub-paths' starts, by [`EmitterChoice::emission_bounds`].
     emission_bounds: BoundingSphere,
@@ -120,9 +120,9 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         })
     }
 
-    /// Where most light is scattered that comes back to the scene from a medium around it: within its bounds
-    /// and the distance beyond them on which light loses its direction. `None` without such a medium, or if
-    /// it emits: then what is far away is no less bright.
+    /// The sphere in which a medium around the scene scatters most of the light that comes back: the bounds
+    /// of the scene, and beyond them the distance on which light loses its direction. `None` without such a
+    /// medium, or if it emits: then what is far away is no less bright.
     #[must_use]
     pub const fn neighbourhood(&self) -> Option<BoundingSphere> {
         self.neighbourhood
@@ -450,7 +450,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 fn neighbourhood<S: Scene>(scene: &S, bounds: &BoundingSphere) -> Option<BoundingSphere> {
     let medium = &scene.media()[scene.outside()?.0 as usize];
     let forward = medium.phase().mean_cosine().max_component().max(0.0);
-    let radius = bounds.radius + medium.mean_free_path() / (1.0 - forward);
+    let radius = bounds.radius + medium.mean_free_path().max(0.0) / (1.0 - forward);
     (medium.scatters() && !medium.emits() && radius.is_finite())
         .then_some(BoundingSphere { centre: bounds.centre, radius })
 }

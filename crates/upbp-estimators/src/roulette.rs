@@ -59,9 +59,9 @@ pub struct Survival {
     left: f32,
     /// Vertices in a row without a smooth lobe.
     reflections: u32,
-    /// Where nothing is rare; `None` for everywhere.
+    /// The sphere within which distance ends no walk; `None` for everywhere.
     neighbourhood: Option<BoundingSphere>,
-    /// How many times as far from its centre as its radius the walk has been, at least one.
+    /// The largest distance from its centre so far, in terms of its radius, at least one.
     farthest: f32,
 }
 

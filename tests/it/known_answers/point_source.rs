@@ -117,7 +117,7 @@ fn fluence_around_a_point_source() {
     table.finish();
 }
 
-/// What comes back from far away is the same with the roulette, in a medium that absorbs nothing.
+/// The roulette changes no mean of the light that comes back from far away in a medium that absorbs nothing.
 #[test]
 fn lost_walks_end_without_bias() {
     /// Edges of a walk at most: it gets some five times as far as the neighbourhood of the scene is wide.

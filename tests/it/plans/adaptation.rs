@@ -134,7 +134,7 @@ fn no_bias_in_a_forward_scattering_box() {
     unbiased("forward_hg_box", "reference");
 }
 
-/// Where one pixel in eight makes the queries of surface merging, a render of few iterations is as bright as
+/// A render of few iterations where one pixel in eight makes the queries of surface merging is as bright as
 /// one where all do. If whole iterations took turns, three of them would have all light that merges find
 /// times 8/3, or none.
 #[test]

@@ -134,7 +134,7 @@ fn load(options: &Options) -> Result<ReadyScene, SceneError> {
             }
             if let Some(name) = description.outside_without_absorption() {
                 complain(&format!(
-                    "note: the medium `{name}` around everything absorbs nothing: iterations are long, and with a little `sigma_a` much shorter"
+                    "note: the medium `{name}` around everything scatters without absorbing: iterations are long, and with a little `sigma_a` in each channel much shorter"
                 ));
             }
         }
@@ -187,7 +187,8 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
     let mut said = Ok(());
     if !options.messages.quiet {
         let wrote = if rendered { format!("wrote {}", images.names()) } else { String::new() };
-        said = say(&format!("{report}{wrote}")).and_then(|()| hint.map_or(Ok(()), |hint| say(&hint)));
+        said =
+            say(format!("{report}{wrote}").trim_end()).and_then(|()| hint.map_or(Ok(()), |hint| say(&hint)));
     }
     // Said even if nobody reads the rest.
     if reason == StopReason::Cancelled {

@@ -92,7 +92,7 @@ fn media_that_are_nowhere_or_never_end_are_told() {
     assert_eq!(check(&empty, &[]), note);
     assert_eq!(check(&empty, &["--quiet"]), "");
     let everywhere = empty.replace("version: 1,", "version: 1, outside: \"m\",");
-    let note = "note: the medium `m` around everything absorbs nothing: iterations are long, and with a little `sigma_a` much shorter\n";
+    let note = "note: the medium `m` around everything scatters without absorbing: iterations are long, and with a little `sigma_a` in each channel much shorter\n";
     let endless = everywhere.replace("sigma_a: 0.1, ", "");
     assert_eq!(check(&endless, &[]), note);
     assert_eq!(check(&endless, &["--quiet"]), "");

@@ -12,7 +12,7 @@ use super::roulette::usual_roulette;
 use super::statistics::Statistics;
 use crate::deadline::Budget;
 use crate::plan::Plan;
-use crate::radius_schedule::{Radius, RadiusSchedule};
+use crate::radius_schedule::{LARGEST_RADIUS, Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
 
 /// The techniques with photon beams.
@@ -30,8 +30,6 @@ const LARGEST_BEAM_RADIUS: f32 = 3e-3;
 const SMALLEST: f32 = 0.1;
 /// The least first radius that settings give, scene units: single precision holds the values of all kernels.
 const LEAST_GIVEN: f32 = 1e-12;
-/// The largest first radius that settings give, scene units.
-const LARGEST_GIVEN: f32 = 1e12;
 /// Part of the render's time that the light sub-paths of an iteration may take: a quick look need not wait
 /// for a light sub-path per pixel.
 const LIGHT_TIME: f64 = 0.05;
@@ -178,7 +176,7 @@ fn first_radii<S: Scene>(
     let size = size(scene, statistics);
     let floor = 2.0 * LEAST_RADIUS * statistics.largest_coordinate;
     // Where coordinates have no digits for it, the least radius may be beyond the largest one.
-    let given = |radius: f32| radius.max(floor.max(LEAST_GIVEN)).min(LARGEST_GIVEN);
+    let given = |radius: f32| radius.max(floor.max(LEAST_GIVEN)).min(LARGEST_RADIUS);
     let radius = |technique, choice, found: Option<Neighbours>, count: f64, paths: u32, most: f32| {
         if !techniques.has(technique) {
             return 0.0;

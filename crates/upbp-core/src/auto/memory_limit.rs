@@ -26,8 +26,8 @@ pub(crate) struct Room {
     estimate: u64,
     /// The writing of an image, when light vertices have gone.
     output: u64,
-    /// What a render by a plan that is given may take: all that is free if no setting says otherwise, so
-    /// that it can go on where less is free than where it was begun.
+    /// Bytes that a render by a given plan may take: all that are free if no setting says otherwise, so that
+    /// it can go on where less is free than where it was begun.
     given: u64,
     /// Light vertices, beams, and their trees.
     pub(crate) light_bytes: u64,

@@ -67,7 +67,7 @@ pub struct Settings {
     pub features: bool,
     /// Memory for light vertices, beams, their trees and the film, MiB; `None` for half of what the
     /// machine has free. If choices are [deterministic](Self::deterministic), light vertices, beams and
-    /// look-ups then take at most 2048 MiB on any machine.
+    /// their trees then take at most 2048 MiB on any machine; a plan that is given may take all that is free.
     pub memory: Option<u32>,
 }
 

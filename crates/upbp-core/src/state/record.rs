@@ -14,7 +14,7 @@ pub struct PassSeconds {
     pub light: f64,
     /// Building the trees of photons and beams.
     pub build: f64,
-    /// Camera sub-paths, with all look-ups.
+    /// Camera sub-paths, with all photon queries.
     pub camera: f64,
     /// Splats and film.
     pub film: f64,

@@ -403,7 +403,7 @@ fn sample() -> impl Strategy<Value = Sample> {
         })
 }
 
-/// Where each light sub-path that comes by is seen by all pixels of a block, its mean varies as they do.
+/// The mean of a block varies as its pixels do where all of them see each light sub-path that comes by.
 #[test]
 fn variances_of_blocks_contain_what_pixels_share() {
     const PLANNED: f64 = 16_000.0;
