@@ -52,7 +52,7 @@ pub(crate) fn codes() -> String {
              written, the state first",
         ),
         (INTERRUPTED, "interrupted by a signal; what was done is in the --state, if there is one: try again"),
-        (AT_ONCE, "ended at once by a second signal"),
+        (AT_ONCE, "ended at once by a second signal, SIGINT or SIGTERM"),
     ];
     list("Exit codes", &codes.map(|(code, meaning)| (code.to_string(), meaning)))
 }

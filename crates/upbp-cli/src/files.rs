@@ -89,7 +89,7 @@ impl Images {
             return None;
         }
         let (stops, png) = (stops_to(MIDDLE, *bright), self.png.display());
-        Some(format!("nearly all of {png} is dark: try --exposure {stops}"))
+        (stops > tones.exposure).then(|| format!("nearly all of {png} is dark: try --exposure {stops}"))
     }
 
     /// A hint for a PNG whose pixels are mostly too bright by more than a stop: a sky may be white.
@@ -104,9 +104,11 @@ impl Images {
         let (_, median, _) = brightest.select_nth_unstable_by(all / 2, f32::total_cmp);
         let stops = stops_to(MIDDLE, *median);
         let (percent, png) = (100 * white / all, self.png.display());
-        Some(format!(
-            "{percent} % of {png} are brighter than white by more than a stop: try --exposure {stops}"
-        ))
+        (stops < tones.exposure).then(|| {
+            format!(
+                "{percent} % of {png} are brighter than white by more than a stop: try --exposure {stops}"
+            )
+        })
     }
 
     /// The names of the files, for messages.

@@ -22,7 +22,7 @@ pub(crate) struct Options {
     /// Write the report as JSON
     #[arg(long, value_name = "FILE.json", value_parser = files::path(files::report), value_hint = ValueHint::FilePath)]
     report: Option<PathBuf>,
-    /// Print nothing but errors
+    /// Print nothing but warnings and errors
     #[arg(long)]
     quiet: bool,
     #[command(flatten)]
@@ -105,11 +105,10 @@ fn merge(paths: &[PathBuf], quiet: bool) -> Result<(State, String), Failure> {
 
 fn describe(path: &Path, state: &State) -> String {
     let film = state.film();
-    format!(
-        "{}: {}, iterations {}, film {}\n",
-        path.display(),
-        state.identity().scene,
-        film.iteration_set(),
-        film.fingerprint()
-    )
+    let mut iterations = film.iteration_set().to_string();
+    for (iteration, share) in film.begun() {
+        iterations += &format!(" and {:.0} % of {iteration}", 100.0 * share);
+    }
+    let (path, scene) = (path.display(), &state.identity().scene);
+    format!("{path}: {scene}, iterations {iterations}, film {}\n", film.fingerprint())
 }

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use crate::error::{RenderError, SettingsError};
 
-/// Stops a render from any thread, its preparation included: within the time of a few sub-paths. Of the
-/// iteration in hand the sets of pixels that are done stay on the film.
+/// Stops a render from any thread, its preparation included: within the time of a few sub-paths, or of trees
+/// over photons or an estimate of the error that are being made. Of the iteration in hand the sets of pixels
+/// that are done stay on the film.
 ///
 /// It may be made before the render ([`Start`](crate::Start)); all copies stop the same renders.
 #[derive(Clone, Debug, Default)]

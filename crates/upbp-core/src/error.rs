@@ -52,8 +52,8 @@ impl From<ron::error::SpannedError> for TextError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// A plan whose light sub-paths leave more than the memory budget has room for.
-    #[error("plan: needs {needed} MiB, {budget} are free or allowed by the setting `memory`")]
+    /// A plan whose light sub-paths leave more than there is room for.
+    #[error("plan: needs {needed} MiB, {budget} MiB are free or allowed by the setting `memory`")]
     PlanMemory {
         /// MiB that an iteration needs.
         needed: u64,
@@ -100,7 +100,7 @@ pub enum RenderError {
     Scene(#[from] PrepareError),
     /// The film, with what writing it takes, does not fit.
     #[error(
-        "film of {width} x {height} pixels: its {needed} MiB exceed the {budget} MiB that the setting `memory` allows; \
+        "film of {width} x {height} pixels: needs {needed} MiB, {budget} MiB are free or allowed by the setting `memory`; \
          a smaller film or fewer techniques take less"
     )]
     Memory {
@@ -110,7 +110,7 @@ pub enum RenderError {
         height: u32,
         /// MiB that the film takes.
         needed: u64,
-        /// The setting.
+        /// MiB that are allowed.
         budget: u64,
     },
 }

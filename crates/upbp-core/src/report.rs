@@ -1,5 +1,6 @@
 //! The report of a render, for people and for scripts.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
@@ -25,11 +26,14 @@ pub struct Report {
     pub iterations: u64,
     /// Iterations that are on the film: ranges with their ends excluded.
     pub iteration_set: IterationSet,
+    /// Iterations of which only some of the pixels are on the film, with their share.
+    pub begun: BTreeMap<u64, f64>,
     /// A number of the film's bits: equal for equal films, however they came about.
     pub film_fingerprint: String,
     /// Seconds of rendering by pass.
     pub seconds: PassSeconds,
-    /// Whether limits of time and of the machine's memory had no influence on the plan.
+    /// The setting `deterministic`: whether limits of time and the machine's memory had no influence on the
+    /// plan, if the render chose it.
     pub deterministic: bool,
     /// Techniques, sample counts and first radii.
     pub plan: Plan,
@@ -76,6 +80,7 @@ impl Report {
             seed: identity.settings.seed,
             iterations: film.iterations(),
             iteration_set: film.iteration_set().clone(),
+            begun: film.begun(),
             film_fingerprint: film.fingerprint(),
             seconds: record.times.seconds(),
             deterministic: identity.settings.deterministic,
@@ -99,10 +104,13 @@ impl fmt::Display for Report {
         let [width, height] = self.resolution;
         writeln!(f, "{}\nplan: {}", self.support, self.plan)?;
         let s = &self.seconds;
+        write!(f, "{width} x {height}, {} iterations", self.iterations)?;
+        for (iteration, share) in &self.begun {
+            write!(f, " and {:.0} % of iteration {iteration}", 100.0 * share)?;
+        }
         writeln!(
             f,
-            "{width} x {height}, {} iterations in {:.1} s (preparation {:.1}, light {:.1}, build {:.1}, camera {:.1}, film {:.1})",
-            self.iterations,
+            " in {:.1} s (preparation {:.1}, light {:.1}, build {:.1}, camera {:.1}, film {:.1})",
             s.total(),
             s.preparation,
             s.light,
@@ -139,7 +147,7 @@ impl fmt::Display for Report {
                 }
                 writeln!(f)?;
             }
-            None => writeln!(f, "estimated relMSE: unknown before the second iteration")?,
+            None => writeln!(f, "estimated relMSE: unknown before there is an even and an odd iteration")?,
         }
         if c.cut_walks > 0 {
             writeln!(

@@ -17,6 +17,8 @@ const SPLIT_SAMPLES: usize = 16;
 const SPLIT_LIGHT: f64 = 1.0 / 2048.0;
 /// Most splits along one axis: random numbers have 24 bits, and positions of a scene hardly more.
 const MOST_SPLITS: u8 = 20;
+/// Places of random numbers.
+const STEPS: f64 = 16_777_216.0;
 /// Shares are multiples of one over this.
 const SHARES: u16 = 4096;
 /// The least share of a half.
@@ -145,9 +147,11 @@ impl EmissionGuide {
                 index = node.1 as usize;
             }
         }
+        // Down to the multiples that random numbers are: digits beyond them, which emitters add, stay in the
+        // cell, whose ends are such multiples.
         let at = std::array::from_fn(|axis| {
-            let end = ((low[axis] + width[axis]) as f32).next_down();
-            ((low[axis] + width[axis] * within[axis]) as f32).min(end)
+            let place = low[axis] + width[axis] * within[axis].min(1.0 - f64::EPSILON);
+            ((place * STEPS).floor() / STEPS) as f32
         });
         (at, density as f32)
     }
@@ -367,6 +371,7 @@ mod tests {
             for _ in 0..n {
                 let (at, density) = guide.warp(uniform(&mut random));
                 prop_assert!(at.iter().all(|x| (0.0..1.0).contains(x)), "{at:?}");
+                prop_assert!(at.iter().all(|x| (f64::from(*x) * STEPS).fract() == 0.0), "{at:?}");
                 prop_assert_eq!(guide.density(at), density);
                 prop_assert!(density > 0.2 * DEFENSIVE as f32, "{}", density);
                 volume += 1.0 / f64::from(density);
@@ -375,6 +380,31 @@ mod tests {
             let mean = volume / f64::from(n);
             let error = ((squares / f64::from(n) - mean * mean) / f64::from(n)).sqrt();
             prop_assert!((mean - 1.0).abs() < 5.0 * error + 1e-3, "{} +- {}", mean, error);
+        }
+    }
+
+    /// Emitters add digits to the numbers: so every place of a cell stands for a strip as wide as any other.
+    #[test]
+    fn places_of_a_narrow_cell_are_taken_alike() {
+        let axes = [true, false, false, false];
+        let at = [0.8, 0.5, 0.5, 0.5];
+        let guide =
+            EmissionGuide::fit(&vec![EmissionSample { at, light: 1.0 }; 4096], axes).expect("uneven light");
+        let narrow = guide.density(at);
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let (mut counts, draws) = (std::collections::BTreeMap::<u32, u32>::new(), 200_000);
+        for _ in 0..draws {
+            let (at, density) = guide.warp(uniform(&mut random));
+            if density == narrow {
+                *counts.entry((f64::from(at[0]) * STEPS) as u32).or_default() += 1;
+            }
+        }
+        let places = 1 << (24 - MOST_SPLITS);
+        assert_eq!(counts.len(), places, "{counts:?}");
+        let expected = counts.values().sum::<u32>() / places as u32;
+        assert!(expected > draws / 100, "{counts:?}");
+        for count in counts.values() {
+            assert!(count.abs_diff(expected) < expected / 10, "{counts:?}");
         }
     }
 

@@ -22,6 +22,18 @@ impl Kernels {
         Self { surf: none, pp3d: none, pb2d: none, bp2d: none, bb1d: none }
     };
 
+    /// The kernels that single precision holds wherever a field scales them, [`Kernel::NONE`] instead of the
+    /// others.
+    fn held_by(self, field: &RadiusField) -> Self {
+        let held = |kernel: Kernel| {
+            let ends = [field.least(), field.greatest()];
+            let is_held = ends.iter().all(|factor| kernel.scaled(*factor).radius() > 0.0);
+            if is_held { kernel } else { Kernel::NONE }
+        };
+        let Self { surf, pp3d, pb2d, bp2d, bb1d } = self;
+        Self { surf: held(surf), pp3d: held(pp3d), pb2d: held(pb2d), bp2d: held(bp2d), bb1d: held(bb1d) }
+    }
+
     /// The least radius of those that merge, scene units; infinite if none does.
     fn least_radius(&self) -> f32 {
         let Self { surf, pp3d, pb2d, bp2d, bb1d } = self;
@@ -152,7 +164,8 @@ impl IterationPlan {
     /// Derives the weights' constants, so that counts and what runs cannot disagree.
     #[must_use]
     pub fn new<S: Scene>(scene: &S, choices: &IterationChoices) -> Self {
-        let IterationChoices { techniques, light_paths, kernels, .. } = *choices;
+        let IterationChoices { techniques, light_paths, radius_field, .. } = *choices;
+        let kernels = choices.kernels.held_by(&radius_field);
         let beam_paths = choices.beam_paths.min(light_paths);
         let periods = choices.periods;
         let on = |technique, value: f64| {
@@ -218,7 +231,7 @@ impl IterationPlan {
             roulette: choices.roulette,
             kernels,
             // Weights without merges know no radius.
-            radius_field: if merges { choices.radius_field } else { RadiusField::Uniform },
+            radius_field: if merges { radius_field } else { RadiusField::Uniform },
             resolved: kernels.least_radius() / LEAST_RADIUS,
             periods,
             turns: periods.turns(choices.seed, choices.iteration),
@@ -336,5 +349,24 @@ impl IterationPlan {
     pub fn needs_light_paths(&self) -> bool {
         self.light_paths > 0
             && (self.mis.light_tracing > 0.0 || self.stores_vertices() || self.stores_beams())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radius_field::FootprintField;
+
+    /// A kernel that is none at some places only would be in the weights there.
+    #[test]
+    fn kernels_that_a_field_scales_out_of_single_precision_are_none() {
+        let field = FootprintField { eye: [0.0; 3], offset: 0.0, slope: 1.0, least: 0.05, most: 3.0 };
+        let ball = |radius| Kernels { pp3d: Kernel::ball(radius), ..Kernels::NONE };
+        for (radius, is_held) in [(1e-12, false), (1e-11, true), (1e11, true), (1e12, false)] {
+            assert!(Kernel::ball(radius).radius() > 0.0, "{radius}: held where the factor is one");
+            let kernels = ball(radius).held_by(&RadiusField::Footprint(field));
+            assert_eq!(kernels.pp3d.radius() > 0.0, is_held, "{radius}");
+            assert_eq!(ball(radius).held_by(&RadiusField::Uniform), ball(radius));
+        }
     }
 }

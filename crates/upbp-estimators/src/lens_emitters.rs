@@ -82,7 +82,9 @@ impl Disc {
                 }
             }
         }
-        let is_out_of_focus = seen > 0.0 && blur >= LEAST_BLUR * seen && brightness.is_finite();
+        // Where all points that were tried are black, nothing tells when to choose it.
+        let is_lit = brightness > 0.0 && brightness.is_finite();
+        let is_out_of_focus = is_lit && blur >= LEAST_BLUR * seen;
         is_out_of_focus.then(|| Self {
             emitter: EmitterId(id as u32),
             corners,
@@ -127,10 +129,10 @@ impl LensEmitters {
             }
         }
         for place in &mut cells {
-            let sum: f32 = place.iter().map(|&(_, brightness)| brightness).sum();
+            let sum: f64 = place.iter().map(|&(_, brightness)| f64::from(brightness)).sum();
             let even = EVEN / place.len() as f32;
             for (_, share) in place {
-                *share = even + (1.0 - EVEN) * *share / sum;
+                *share = even + (1.0 - EVEN) * (f64::from(*share) / sum) as f32;
             }
         }
         (!discs.is_empty()).then_some(Self { viewpoint, cell, columns, cells })

@@ -58,6 +58,15 @@ impl RadiusField {
         }
     }
 
+    /// The greatest factor anywhere.
+    #[must_use]
+    pub const fn greatest(&self) -> f32 {
+        match self {
+            Self::Uniform => 1.0,
+            Self::Footprint(field) => field.most,
+        }
+    }
+
     /// The largest radius, where the factor is one, that the field does not change by more than a tenth of
     /// the distance; scene units.
     #[must_use]

@@ -38,6 +38,9 @@ pub(super) enum Fault {
     PositionElsewhere,
     MediumUnknown,
     EmitterUnknown,
+    EmitterMissing,
+    /// Light from infinity comes through what is around everything from above only.
+    OutsideVaries,
     RefractiveIndex(f32),
     NothingConnectible,
     BsdfNan,
@@ -105,7 +108,8 @@ impl Hostile {
                 (geometry: Sphere(centre: (-1.5, 0, 0), radius: 0.15), material: \"glass\"),
             ],
             lights: [Point(position: (-1, 2, 0), intensity: 1)])";
-        let scene = ReadyScene::from_ron_str(text, "").expect("a valid scene");
+        let sky = if fault == F::OutsideVaries { "lights: [Constant(0.1), " } else { "lights: [" };
+        let scene = ReadyScene::from_ron_str(&text.replace("lights: [", sky), "").expect("a valid scene");
         Self {
             lights: scene.emitters().iter().map(|light| HostileLight(light.clone(), fault)).collect(),
             media: scene.media().iter().map(|medium| HostileMedium(medium.clone(), fault)).collect(),
@@ -202,6 +206,7 @@ impl Scene for Hostile {
                 }
             }
             F::EmitterUnknown => hit.emitter = Some(EmitterId(99)),
+            F::EmitterMissing => hit.emitter = None,
             _ => {}
         }
         Some(hit)
@@ -224,6 +229,10 @@ impl Scene for Hostile {
 
     fn camera(&self) -> &HostileCamera {
         &self.camera
+    }
+
+    fn outside(&self) -> Option<MediumId> {
+        (self.fault == F::OutsideVaries).then_some(MediumId(0))
     }
 
     fn has_connectible_surfaces(&self) -> bool {
@@ -294,6 +303,9 @@ impl Medium for HostileMedium {
             F::Transmittance(t) => density.transmittance = Spectrum::splat(t),
             F::Reach(value) => density.pass_probability = value,
             F::Stop(stop) => (density.stop_at_start, density.stop_at_end) = (stop, stop),
+            F::OutsideVaries if segment.end == f32::INFINITY && segment.direction.y > 0.0 => {
+                density = SegmentDensity::passing(Spectrum::ONE);
+            }
             _ => {}
         }
         density
@@ -453,6 +465,8 @@ pub(super) const GEOMETRY: [Fault; 21] = [
 pub(super) fn faults() -> Vec<Fault> {
     let mut faults = vec![
         F::NothingConnectible,
+        F::EmitterMissing,
+        F::OutsideVaries,
         F::CameraLens,
         F::BsdfNan,
         F::BsdfNegative,

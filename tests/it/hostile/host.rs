@@ -124,6 +124,8 @@ fn the_checkers_find_every_fault() {
         (F::NormalInwards, "geometric normals point out of a body"),
         (F::NormalTurned, "does not turn towards the ray"),
         (F::InteriorMissing, "a surface that refracts encloses a body"),
+        (F::EmitterMissing, "rays meet lights that have an area"),
+        (F::OutsideVaries, "lets light from infinity pass alike everywhere"),
     ] {
         let violation = check(fault).unwrap_err();
         assert!(violation.contains(named), "{fault:?}: {violation}");

@@ -146,8 +146,11 @@ fn read_plan(path: &Path) -> Result<FrozenPlan, String> {
     FrozenPlan::from_ron(&text).map_err(|error| format!("{}:{error}", path.display()))
 }
 
-/// Reads a state file, if there is one.
+/// Reads a state file, if there is one that is not empty.
 fn read_state(path: &Path) -> Result<Option<State>, OutputError> {
+    if path.metadata().is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0) {
+        return Ok(None);
+    }
     match State::load(path) {
         Err(OutputError::State { source: StateError::Io(error), .. })
             if error.kind() == std::io::ErrorKind::NotFound =>

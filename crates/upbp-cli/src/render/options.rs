@@ -152,7 +152,7 @@ pub(crate) struct Messages {
     /// Image to compare with after every iteration; the series of errors goes to the report
     #[arg(long, value_name = "REF.exr", value_hint = ValueHint::FilePath)]
     pub(crate) reference: Option<PathBuf>,
-    /// Print nothing but errors
+    /// Print nothing but warnings and errors
     #[arg(long)]
     pub(crate) quiet: bool,
 }
@@ -279,7 +279,8 @@ pub(crate) fn names() -> String {
         ("bpt, surf, ...", "what each technique adds to it, weighted; of all that ran"),
         (
             "variance",
-            "variance of the mean, by the spread of the iterations; from two iterations on, as the next two",
+            "variance of the mean, by the spread of the iterations; from two iterations on, the next two from an even \
+             and an odd one on",
         ),
         ("half0, half1", "two independent halves of the render, for denoisers"),
         ("error", "estimated squared error of each pixel, relative to the converged value"),

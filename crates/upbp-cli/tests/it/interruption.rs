@@ -233,6 +233,46 @@ fn a_second_signal_while_it_writes_leaves_nothing_unfinished() {
     panic!("no signal came while it wrote");
 }
 
+/// A terminal that is closed may say so twice; what `nohup` has ignored is not heard at all.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_closed_terminal_ends_in_order_or_not_at_all() {
+    let folder = prepared("hangup");
+    let is_ignored = |process: &str| {
+        let status = fs::read_to_string(format!("/proc/{process}/status")).expect("it is there");
+        let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).expect("a known name");
+        u64::from_str_radix(ignored.trim(), 16).expect("a mask") & 1 == 1
+    };
+    // The tests themselves may run under `nohup`, which a shell cannot undo.
+    for ignored in [true, is_ignored("self")] {
+        let trap = if ignored { "trap '' HUP; " } else { "" };
+        let mut child = Command::new("sh")
+            .args(["-c", &format!("{trap}exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_upbp"), "render"])
+            .args(["scene.ron", "--quiet", "--threads", "1", "--deterministic", "--light-paths", "64"])
+            .args(["--iterations", "200000000", "--state", "a.state", "--save-every", "0.01", "-o", "a.exr"])
+            .current_dir(&*folder)
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program runs");
+        wait_until(&mut child, "a saving", |_| folder.join("a.state").exists());
+        assert_eq!(is_ignored(&child.id().to_string()), ignored);
+        signal(&child, "HUP");
+        if ignored {
+            let before = written(&folder.join("a.state"));
+            wait_until(&mut child, "another saving", |_| written(&folder.join("a.state")) > before);
+            signal(&child, "TERM");
+        } else {
+            sleep(Duration::from_millis(1));
+            // It may have ended.
+            let _ = Command::new("kill").args(["-HUP", &child.id().to_string()]).output();
+        }
+        let (code, text) = end(&child.wait_with_output().expect("it ends"));
+        assert_eq!(code, Some(75), "{text}");
+        assert!(text.contains("the state is in a.state"), "{text}");
+        fs::remove_file(folder.join("a.state")).expect("it was saved");
+    }
+}
+
 #[test]
 fn without_disk_or_reader_the_error_is_clear_and_the_state_stays() {
     let folder = prepared("disk");
@@ -321,6 +361,34 @@ fn a_signal_says_try_again_to_nobody_as_well() {
     let (code, text) = end(&child.wait_with_output().expect("it ends"));
     assert_eq!(code, Some(75), "{text}");
     assert!(text.contains("the state is in a.state"), "{text}");
+}
+
+/// States of parts of iterations say which; a file that is empty is none; a pipe takes an image.
+#[cfg(unix)]
+#[test]
+fn what_is_begun_is_told_and_what_is_empty_is_filled() {
+    let folder = prepared("begun");
+    let size = ["--size", "1500x1000", "--light-paths", "64", "--techniques", "pt"];
+    fs::write(folder.join("a.state"), "").expect("a writable folder");
+    succeeds(render(&folder, &["--time", "0.05", "--state", "a.state", "-o", "a.png"]).args(size));
+    let state = State::load(&folder.join("a.state")).expect("a good state");
+    let begun = state.film().begun();
+    let (iteration, share) = begun.first_key_value().expect("a part of an iteration");
+    let output = command("merge", &folder, &["a.state"]).output().expect("the program runs");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    for words in [
+        format!(" and {:.0} % of {iteration}, film", 100.0 * share),
+        format!(" iterations and {:.0} % of iteration {iteration} in ", 100.0 * share),
+    ] {
+        assert!(said.contains(&words), "{words}: {said}");
+    }
+    let pipe = folder.join("pipe.exr");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("it runs").success());
+    let read = std::thread::spawn(move || fs::read(pipe).expect("a pipe"));
+    succeeds(command("merge", &folder, &["a.state", "--quiet", "-o", "pipe.exr"]));
+    let received = read.join().expect("it is read");
+    succeeds(command("merge", &folder, &["a.state", "--quiet", "-o", "file.exr"]));
+    assert!(received == fs::read(folder.join("file.exr")).expect("an image"));
 }
 
 #[test]

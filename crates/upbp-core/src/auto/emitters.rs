@@ -24,6 +24,7 @@ use super::guides::{self, Evidence, Starts};
 use super::memory_limit::Room;
 use super::parallel_walks::{PilotRun, SampleRoom, camera_path, in_pieces, light_path, pixel};
 use super::statistics::{self, PATHS_PER_BEAM_PATH};
+use super::thinned::Thinned;
 use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
 use crate::settings::CheckedSettings;
@@ -47,6 +48,8 @@ const LIGHT_VERTICES: f64 = 2e5;
 const MORE_CAMERA_PATHS: u32 = 4;
 /// Second moment of next events with a choice by receiver, over that without, up to which it is made.
 const WORTH: f64 = 0.9;
+/// Points of specular surfaces that a piece of the work keeps.
+const SPECULAR_OF_PIECE: usize = 4096;
 /// Rounds with guides, each by its part of the time and the most that its sub-paths may be multiplied by: one
 /// that looks for places, and two that are guided there. The guide of the last one stays.
 const GUIDED_ROUNDS: [(f64, u32); 3] = [(0.25, 1), (0.25, 1), (0.5, 4)];
@@ -286,7 +289,7 @@ fn measure<S: Scene, L: Lanes>(
     };
     by_path(&seen.emission, 1.0);
     let mut guides = Evidence::default();
-    let mut next_events = [Vec::new(), Vec::new()];
+    let (mut next_events, mut specular) = ([Vec::new(), Vec::new()], Vec::new());
     for (piece, seen) in walks.into_iter().enumerate() {
         by_path(&seen.emission, scale);
         for (end, receiver, contribution) in seen.next_event {
@@ -295,8 +298,9 @@ fn measure<S: Scene, L: Lanes>(
             next_events[piece % 2].push(NextEvent { receiver, sample, chosen });
             guides.lit.push((end, receiver));
         }
-        guides.specular.extend(seen.specular);
+        specular.push(seen.specular);
     }
+    guides.specular = Thinned::joined(specular);
     guides.starts = starts.into_iter().flatten().collect();
     // All that one sub-path brings is one sample.
     let light_paths = effective_samples(guides.starts.iter().map(|&(_, light)| light));
@@ -350,7 +354,7 @@ struct Seen {
     contributions: usize,
     most: usize,
     /// Places where camera sub-paths were reflected or refracted in one direction.
-    specular: Vec<Vec3>,
+    specular: Thinned<Vec3, SPECULAR_OF_PIECE>,
 }
 
 impl Seen {

@@ -5,6 +5,9 @@
 //! sub-paths. Statistics tell the numbers per sub-path. Sizes that do not grow are not counted: the program,
 //! the scene, the threads.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
 use upbp_estimators::path::{LightVertex, PhotonBeam};
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{PreparedScene, TechniqueSet};
@@ -26,15 +29,15 @@ pub(crate) struct Room {
     estimate: u64,
     /// The writing of an image, when light vertices have gone.
     output: u64,
-    /// Bytes that a render by a given plan may take: all that are free if no setting says otherwise, so that
-    /// it can go on where less is free than where it was begun.
-    given: u64,
+    /// All that may be taken.
+    total: u64,
     /// Light vertices, beams, and their trees.
     pub(crate) light_bytes: u64,
 }
 
 impl Room {
-    /// The room beside the film.
+    /// The room beside the film. A render by a plan that `is_given` may take all that is free if no setting
+    /// says otherwise, so that it can go on where less is free than where it was begun.
     ///
     /// # Errors
     /// [`RenderError::Memory`] if there is none.
@@ -42,9 +45,10 @@ impl Room {
         scene: &PreparedScene<'_, S>,
         settings: &Settings,
         techniques: TechniqueSet,
+        is_given: bool,
     ) -> Result<Self, RenderError> {
         let rect = scene.scene.camera().crop();
-        let total = budget(settings.memory);
+        let total = budget(settings.memory, is_given);
         let film = Film::memory_bytes(rect, techniques, settings.features);
         let estimate = Film::estimate_bytes(rect);
         let output = Film::output_bytes(rect, techniques, settings.features);
@@ -62,8 +66,7 @@ impl Room {
             None if settings.deterministic => LIGHT_BYTES,
             _ => total - film - estimate,
         };
-        let given = if settings.memory.is_some() { total } else { total.saturating_mul(2) };
-        Ok(Self { film, estimate, output, given, light_bytes })
+        Ok(Self { film, estimate, output, total, light_bytes })
     }
 
     /// Checks that the iterations of a plan fit, and returns it.
@@ -72,10 +75,10 @@ impl Room {
     /// [`RenderError::PlanMemory`].
     pub(crate) fn fits<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Result<Plan, RenderError> {
         let needed = self.iteration_bytes::<S>(plan, statistics);
-        if needed > self.given {
+        if needed > self.total {
             return Err(RenderError::PlanMemory {
                 needed: needed.div_ceil(1 << 20),
-                budget: self.given >> 20,
+                budget: self.total >> 20,
             });
         }
         Ok(*plan)
@@ -105,19 +108,55 @@ impl Room {
     }
 }
 
-/// Bytes that a render may take: the given number of MiB, or half of what the machine has free.
-fn budget(mebibytes: Option<u32>) -> u64 {
-    mebibytes.map_or_else(|| free_bytes().map_or(LIGHT_BYTES, |free| free / 2), |mib| u64::from(mib) << 20)
+/// Bytes that a render may take: the given number of MiB, or half of what the machine has free, or `all` of it.
+fn budget(mebibytes: Option<u32>, all: bool) -> u64 {
+    let of_free = |free: u64| if all { free } else { free / 2 };
+    mebibytes.map_or_else(|| free_bytes().map_or(LIGHT_BYTES, of_free), |mib| u64::from(mib) << 20)
 }
 
-/// Bytes that a process can still have, by what Linux says of the machine and of the group of processes that
-/// it is in; `None` where it says nothing.
+/// Bytes that a process can still have, by what Linux says of the machine and of the control groups that it
+/// is in; `None` where it says nothing.
 fn free_bytes() -> Option<u64> {
-    let number = |path: &str| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
-    let machine = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| available(&text));
-    let group = ["/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"].map(number);
-    let group = group[0].zip(group[1]).map(|(most, taken)| most.saturating_sub(taken));
-    machine.into_iter().chain(group).min()
+    let text = |path: &str| fs::read_to_string(path).unwrap_or_default();
+    let machine = available(&text("/proc/meminfo"));
+    let groups = text("/proc/self/cgroup");
+    let of_groups = group_folders(&groups).filter_map(|folder| free_of_group(&folder));
+    machine.into_iter().chain(of_groups).min()
+}
+
+/// Folders with the limits of control groups: those of `/proc/self/cgroup` and all above them, as limits hold
+/// for what is below. In a container the own group may be the root.
+fn group_folders(groups: &str) -> impl Iterator<Item = PathBuf> + '_ {
+    groups.lines().flat_map(|line| {
+        let mut parts = line.splitn(3, ':').skip(1);
+        let root = match parts.next() {
+            Some("") => Some("/sys/fs/cgroup"),
+            Some(controllers) if controllers.split(',').any(|name| name == "memory") => {
+                Some("/sys/fs/cgroup/memory")
+            }
+            _ => None,
+        };
+        let path = parts.next().unwrap_or_default();
+        let folders = root.map(|root| {
+            let own = Path::new(path.trim_start_matches('/')).ancestors();
+            own.map(|folder| Path::new(root).join(folder))
+        });
+        folders.into_iter().flatten()
+    })
+}
+
+/// Bytes that a control group, of version 2 or 1, may still take: files in its cache make room for others.
+fn free_of_group(folder: &Path) -> Option<u64> {
+    let text = |name: &str| fs::read_to_string(folder.join(name)).ok();
+    let number = |name: &str| text(name)?.trim().parse::<u64>().ok();
+    let of_version = |[most, taken, cached]: [&str; 3]| {
+        let cached = text("memory.stat").and_then(|stat| {
+            stat.lines().find_map(|line| line.strip_prefix(cached)?.trim().parse::<u64>().ok())
+        });
+        Some(number(most)?.saturating_sub(number(taken)?.saturating_sub(cached.unwrap_or(0))))
+    };
+    of_version(["memory.max", "memory.current", "inactive_file "])
+        .or_else(|| of_version(["memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file "]))
 }
 
 /// The line `MemAvailable` of `/proc/meminfo`, in bytes.
@@ -202,7 +241,35 @@ mod tests {
         let text = "MemTotal:       24576000 kB\nMemFree:          512000 kB\nMemAvailable:   16384000 kB\n";
         assert_eq!(available(text), Some(16_384_000 * 1024));
         assert_eq!(available("MemAvailable: lots"), None);
-        assert_eq!(budget(Some(3)), 3 << 20);
-        assert!(budget(None) > 1 << 20);
+        assert_eq!([false, true].map(|all| budget(Some(3), all)), [3 << 20; 2]);
+        assert!(budget(None, false) > 1 << 20);
+    }
+
+    #[test]
+    fn limits_of_all_control_groups_count() {
+        let folders = |groups: &str| group_folders(groups).collect::<Vec<_>>();
+        let paths = |paths: &[&str]| paths.iter().map(PathBuf::from).collect::<Vec<_>>();
+        let unified = ["/sys/fs/cgroup/a.slice/b", "/sys/fs/cgroup/a.slice", "/sys/fs/cgroup/"];
+        assert_eq!(folders("0::/a.slice/b\n"), paths(&unified));
+        let first = ["/sys/fs/cgroup/memory/job", "/sys/fs/cgroup/memory/"];
+        assert_eq!(folders("5:cpu,cpuacct:/x\n4:memory:/job\n"), paths(&first));
+        assert_eq!(folders("nothing"), paths(&[]));
+        let folder = std::env::temp_dir().join(format!("upbp-group-{}", std::process::id()));
+        let of = |files: &[(&str, &str)]| {
+            fs::create_dir_all(&folder).unwrap();
+            for (name, text) in files {
+                fs::write(folder.join(name), text).unwrap();
+            }
+            let free = free_of_group(&folder);
+            fs::remove_dir_all(&folder).unwrap();
+            free
+        };
+        let (most, taken) = (("memory.max", "8000\n"), ("memory.current", "7000\n"));
+        assert_eq!(of(&[most, taken]), Some(1000));
+        let stat = ("memory.stat", "anon 400\ninactive_file 6000\nactive_file 600\n");
+        assert_eq!(of(&[most, taken, stat]), Some(7000));
+        assert_eq!(of(&[("memory.max", "max\n"), taken]), None);
+        let of_first = [("memory.limit_in_bytes", "500"), ("memory.usage_in_bytes", "600")];
+        assert_eq!(of(&of_first), Some(0));
     }
 }

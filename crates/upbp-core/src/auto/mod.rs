@@ -35,6 +35,7 @@ mod roulette;
 mod search;
 pub(crate) mod statistics;
 pub(crate) mod technique_support;
+mod thinned;
 mod variance;
 mod volumes;
 
@@ -102,7 +103,7 @@ pub(crate) fn choose<S: Scene>(
         None => volumes::choose(scene, settings, settings.techniques.candidates(), budget)?,
     }
     let support = TechniqueSupport::of(scene, settings, given.as_ref())?;
-    let room = Room::of(scene, settings, support.techniques)?;
+    let room = Room::of(scene, settings, support.techniques, given.is_some())?;
     let lanes = match &given {
         Some(frozen) => lanes::of_plan(&frozen.plan, settings)?,
         None => lanes::choose(scene, settings),

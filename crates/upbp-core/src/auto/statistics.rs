@@ -18,6 +18,7 @@ use super::parallel_walks::{PIECE, PilotRun, camera_path, in_pieces, pixel};
 use super::photon_distances::{Nearest, Neighbours, median};
 use super::pixel_footprint::{self, FAR};
 use super::roulette::usual_roulette;
+use super::thinned::Thinned;
 use crate::deadline::{Allowance, Clock, Halt};
 use crate::error::RenderError;
 use crate::settings::CheckedSettings;
@@ -318,9 +319,9 @@ struct Queries {
 /// Writes down the queries of a piece of the work.
 #[derive(Default)]
 struct QueryRecorder {
-    surfaces: Thinned<Vec3>,
-    media: Thinned<Vec3>,
-    edges: Thinned<Ray>,
+    surfaces: Thinned<Vec3, QUERIES_OF_PIECE>,
+    media: Thinned<Vec3, QUERIES_OF_PIECE>,
+    edges: Thinned<Ray, QUERIES_OF_PIECE>,
     first: Vec<Vec3>,
     footprints: Vec<f32>,
     last: Vec3,
@@ -386,89 +387,16 @@ impl Queries {
             queries.first.extend(piece.first);
             queries.footprints.extend(piece.footprints);
         }
-        queries.surfaces = Thinned::evenly(surfaces);
-        queries.media = Thinned::evenly(media);
-        queries.edges = Thinned::evenly(edges);
+        queries.surfaces = measured(surfaces);
+        queries.media = measured(media);
+        queries.edges = measured(edges);
         Some(queries)
     }
 }
 
-/// A list of which every second element is left out whenever it is [full](QUERIES_OF_PIECE): walks that
-/// hardly ever end would fill all memory.
-struct Thinned<T> {
-    kept: Vec<T>,
-    /// Elements for each that is kept, a power of two.
-    step: usize,
-    count: usize,
-}
-
-impl<T> Default for Thinned<T> {
-    fn default() -> Self {
-        Self { kept: Vec::new(), step: 1, count: 0 }
-    }
-}
-
-impl<T> Thinned<T> {
-    fn push(&mut self, element: T) {
-        if self.count.is_multiple_of(self.step) {
-            if self.kept.len() == QUERIES_OF_PIECE {
-                self.thin_to(2 * self.step);
-            }
-            self.kept.push(element);
-        }
-        self.count += 1;
-    }
-
-    /// Keeps one of `step` elements, a multiple of the step so far.
-    fn thin_to(&mut self, step: usize) {
-        let ratio = step / self.step;
-        let mut index = 0;
-        self.kept.retain(|_| {
-            index += 1;
-            (index - 1) % ratio == 0
-        });
-        self.step = step;
-    }
-
-    /// At most [`QUERIES`] elements of all lists, evenly.
-    fn evenly(mut lists: Vec<Self>) -> Vec<T> {
-        let step = lists.iter().map(|list| list.step).max().unwrap_or(1);
-        for list in &mut lists {
-            list.thin_to(step);
-        }
-        let all: Vec<T> = lists.into_iter().flat_map(|list| list.kept).collect();
-        let step = all.len().div_ceil(QUERIES).max(1);
-        all.into_iter().step_by(step).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The numbers from 0 up to a count, pushed one by one.
-    fn numbers(count: usize) -> Thinned<usize> {
-        let mut list = Thinned::default();
-        for number in 0..count {
-            list.push(number);
-        }
-        list
-    }
-
-    #[test]
-    fn lists_are_thinned_evenly() {
-        for count in [0, 1, QUERIES_OF_PIECE, QUERIES_OF_PIECE + 1, 100_000] {
-            let list = numbers(count);
-            assert!(
-                list.kept.len() <= QUERIES_OF_PIECE && 2 * list.kept.len() >= count.min(QUERIES_OF_PIECE)
-            );
-            assert!(list.kept.iter().copied().eq((0..count).step_by(list.step)), "of {count}");
-        }
-        // A list that was thinned has no less weight than one that was not.
-        let found = Thinned::evenly(vec![numbers(QUERIES_OF_PIECE), numbers(4 * QUERIES_OF_PIECE)]);
-        assert!(found.len() <= QUERIES && 2 * found.len() > QUERIES, "{}", found.len());
-        let of_first = found.windows(2).position(|pair| pair[1] < pair[0]).map_or(0, |last| last + 1);
-        let of_second = found.len() - of_first;
-        assert!((3 * of_first..=5 * of_first).contains(&of_second), "{of_first} and {of_second}");
-    }
+/// At most [`QUERIES`] elements of all lists, evenly.
+fn measured<T>(lists: Vec<Thinned<T, QUERIES_OF_PIECE>>) -> Vec<T> {
+    let all = Thinned::joined(lists);
+    let step = all.len().div_ceil(QUERIES).max(1);
+    all.into_iter().step_by(step).collect()
 }

@@ -52,7 +52,8 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 /// # Errors
 /// Those of [`open_file`]; or one that says what is wrong with the header.
 pub fn open_exr(path: &Path) -> io::Result<BufReader<File>> {
-    // No compression of the format makes more of a byte; the rest is for small images.
+    // No compression of the format makes more of a byte, but for DWA of pictures that are nearly constant;
+    // the rest is for small images.
     const BYTES_PER_BYTE: u64 = 1100;
     const SMALL: u64 = 1 << 16;
     let file = open_file(path, u64::MAX)?;

@@ -43,7 +43,7 @@ impl Content {
         match self {
             Self::Exr => b"\x76\x2f\x31\x01",
             Self::Png => b"\x89PNG\r\n\x1a\n",
-            Self::Report => b"{",
+            Self::Report => b"{\n  \"version\":",
             Self::Plan => b"FrozenPlan(",
             Self::State => b"UPBPSTAT",
             Self::Text(beginning) => beginning.as_bytes(),

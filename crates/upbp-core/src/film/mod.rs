@@ -164,6 +164,12 @@ impl Film {
         &self.parts
     }
 
+    /// Iterations of which only some of the pixels are there, with their share.
+    #[must_use]
+    pub fn begun(&self) -> BTreeMap<u64, f64> {
+        self.parts.iter().map(|(iteration, sets)| (*iteration, f64::from(*sets) / f64::from(SETS))).collect()
+    }
+
     /// Number of pixels.
     pub(crate) const fn len(&self) -> usize {
         pixels(self.rect)

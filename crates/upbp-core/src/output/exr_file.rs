@@ -4,6 +4,7 @@
 //! One part with dotted channel names is what every viewer reads; all metadata is in one text attribute,
 //! because the encoder writes several in random order.
 
+use std::io::{Cursor, Seek as _, Write as _};
 use std::path::Path;
 
 use exr::prelude::*;
@@ -108,7 +109,16 @@ fn encode(
     file.attributes.display_window = IntegerBounds::from_dimensions((film.0 as usize, film.1 as usize));
     let fail =
         |error: exr::error::Error| OutputError::Encode { path: path.to_owned(), reason: error.to_string() };
-    write_whole(path, |writer| file.write().to_buffered(writer).map_err(fail))
+    write_whole(path, |writer| {
+        if writer.stream_position().is_ok() {
+            return file.write().to_buffered(writer).map_err(fail);
+        }
+        // The encoder goes back to its tables, which a pipe does not.
+        let mut whole = Cursor::new(Vec::new());
+        file.write().to_buffered(&mut whole).map_err(fail)?;
+        let written = writer.write_all(whole.get_ref());
+        written.map_err(|source| OutputError::Write { path: path.to_owned(), source })
+    })
 }
 
 fn push(channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>, prefix: &str, image: &Picture) {

@@ -12,8 +12,9 @@ const SEGMENTS: usize = 16;
 const CELLS: usize = 8;
 
 /// Checks the contract of [`Medium`] on random segments inside `bounds`: ranges of all values, that walks
-/// pass and stop as often as `segment` says, in each lane as often as `segment_lanes` says, and that
-/// transmittance is a product over pieces.
+/// pass and stop as often as `segment` says, in each lane as often as `segment_lanes` says, that a walk the
+/// other way has the densities that the first one is told of it, that transmittance is a product over pieces,
+/// and that points drawn for their light bring what is `emitted`.
 pub fn check_medium(medium: &impl Medium, bounds: &BoundingSphere) -> Check {
     let mut random = Random(13);
     let path = medium.mean_free_path();
@@ -26,9 +27,11 @@ pub fn check_medium(medium: &impl Medium, bounds: &BoundingSphere) -> Check {
         let segment = RaySegment { origin, direction, start, end: start + length };
         check_coefficients(medium, &segment)?;
         check_product(medium, &segment)?;
-        check_distances(&Walks { medium, lane: None }, &segment, &mut random)?;
-        for lane in 0..3 {
-            check_distances(&Walks { medium, lane: Some(lane) }, &segment, &mut random)?;
+        check_emission(medium, &segment, &mut random)?;
+        for lane in [None, Some(0), Some(1), Some(2)] {
+            let walks = Walks { medium, lane };
+            check_distances(&walks, &segment, &mut random)?;
+            check_other_way(&walks, &segment)?;
         }
     }
     Ok(())
@@ -108,6 +111,57 @@ fn check_product(medium: &impl Medium, segment: &RaySegment) -> Check {
         * walks.density(&RaySegment { start: middle, ..*segment })?.transmittance;
     let agrees = (0..3).all(|c| (whole[c] - parts[c]).abs() <= 1e-4);
     require(agrees, "transmittance is the product over pieces", (segment, whole, parts))
+}
+
+/// Checks that a walk from the end to the start passes as often, and stops with the density that `segment`
+/// says of it.
+fn check_other_way<M: Medium>(walks: &Walks<'_, M>, segment: &RaySegment) -> Check {
+    let direction = -segment.direction;
+    let origin = segment.at(segment.end) - direction * segment.start;
+    let [there, back] =
+        [walks.density(segment)?, walks.density(&RaySegment { origin, direction, ..*segment })?];
+    let case = (segment, walks.lane, there, back);
+    let alike = |a: f64, b: f64| (a - b).abs() <= 0.01 * a.max(b) + 1e-5;
+    let passes = alike(there.pass_probability, back.pass_probability);
+    require(passes, "walks pass as often the other way", case)?;
+    let stops = [[there.stop_at_start, back.stop_at_end], [there.stop_at_end, back.stop_at_start]];
+    require(
+        stops.iter().all(|&[told, own]| (told - own).abs() <= 0.01 * told.max(own)),
+        "a walk the other way stops with the density that is told of it",
+        case,
+    )
+}
+
+/// Checks that points that are drawn for their light bring what the segment emits; a medium that tells no
+/// source is in no body that is an emitter.
+fn check_emission(medium: &impl Medium, segment: &RaySegment, random: &mut Random) -> Check {
+    let middle = segment.at(0.5 * (segment.start + segment.end));
+    if !medium.emits() || medium.source(middle).is_black() {
+        return Ok(());
+    }
+    let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
+    for _ in 0..DRAWS {
+        let Some(t) = medium.sample_emitted(segment, random.next()) else { continue };
+        let case = (segment, t);
+        require(t >= segment.start && t < segment.end, "a point of light is inside of the segment", case)?;
+        let pdf = medium.pdf_emitted(segment, t);
+        require(pdf > 0.0 && pdf.is_finite(), "where light is looked at there is a density", (case, pdf))?;
+        let transmittance = medium.segment(&RaySegment { end: t, ..*segment }).transmittance;
+        let source = medium.source(segment.at(t));
+        for c in 0..3 {
+            let value = f64::from(transmittance[c] * source[c]) / pdf;
+            sum[c] += value;
+            squares[c] += value * value;
+        }
+    }
+    let draws = DRAWS as f64;
+    let emitted = medium.emitted(segment);
+    let mean = sum.map(|sum| sum / draws);
+    let agrees = (0..3).all(|c| {
+        let error = ((squares[c] / draws - mean[c] * mean[c]).max(0.0) / draws).sqrt();
+        (mean[c] - f64::from(emitted[c])).abs() <= 5.0 * error + 1e-3 * f64::from(emitted[c])
+    });
+    require(agrees, "points of light bring what is emitted", (segment, emitted, mean))
 }
 
 fn check_distances<M: Medium>(walks: &Walks<'_, M>, segment: &RaySegment, random: &mut Random) -> Check {

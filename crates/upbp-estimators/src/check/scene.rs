@@ -1,15 +1,18 @@
 //! [`check_scene`]: hits, crossings and bodies of a scene agree.
 
 use glam::Vec3;
+use upbp_media::{Medium as _, RaySegment};
 
 use super::normals::Normals;
 use super::{Check, ContractViolation, Random, is_unit, require};
-use crate::scene::{Boundary, BoundingSphere, Bsdf, Crossing, Emitter, Scene};
+use crate::scene::{Boundary, BoundingSphere, Bsdf, Crossing, Emitter, EmitterId, EmitterKind, Scene};
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
 /// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside
 /// with an index of refraction, surfaces are as the scene says of all of them, `trace` and `is_clear` find
-/// what `intersect` does, and the bodies around a point follow from the boundaries on the way to it.
+/// what `intersect` does, the bodies around a point follow from the boundaries on the way to it, rays meet
+/// every light that has an area, unless it is all hidden, and all light from infinity passes what is around
+/// everything alike.
 ///
 /// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the
 /// normals of a body one in ten.
@@ -18,16 +21,8 @@ pub fn check_scene(scene: &impl Scene) -> Check {
     require(bounds.radius.is_finite() && bounds.radius > 0.0, "bounds have a radius", bounds)?;
     require(bounds.centre.is_finite(), "bounds have a centre", bounds)?;
     let mut random = Random(11);
-    for emitter in scene.emitters().iter().filter(|emitter| !emitter.kind().is_infinite()) {
-        for _ in 0..16 {
-            let Some(emission) = emitter.sample_emission(&bounds, random.pair(), random.pair()) else {
-                continue;
-            };
-            let position = emission.point.position;
-            let inside = position.distance(bounds.centre) <= bounds.radius * (1.0 + 1e-3);
-            require(inside, "lights lie within the bounds", (bounds, position))?;
-        }
-    }
+    check_lights(scene, &bounds, &mut random)?;
+    check_outside(scene, &bounds, &mut random)?;
     let mut violations = Vec::new();
     let mut normals = Normals::default();
     let rays = 2000;
@@ -57,6 +52,64 @@ pub fn check_scene(scene: &impl Scene) -> Check {
     if !agree {
         let first = violations.swap_remove(0);
         return Err(ContractViolation { details: format!("{first:?}"), ..first });
+    }
+    Ok(())
+}
+
+/// Checks that lights are where the scene is, and that rays meet those with an area: weights count on it.
+fn check_lights(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random) -> Check {
+    for (index, emitter) in scene.emitters().iter().enumerate() {
+        if emitter.kind().is_infinite() {
+            continue;
+        }
+        let (mut starts, mut met) = (0, 0);
+        for _ in 0..16 {
+            let Some(emission) = emitter.sample_emission(bounds, random.pair(), random.pair()) else {
+                continue;
+            };
+            let position = emission.point.position;
+            let inside = position.distance(bounds.centre) <= bounds.radius * (1.0 + 1e-3);
+            require(inside, "lights lie within the bounds", (bounds, position))?;
+            let before = 1e-4 * bounds.radius;
+            let (origin, direction) = (position + emission.direction * before, -emission.direction);
+            let ray = crate::Ray { origin, direction, t_min: 0.0, t_max: 2.0 * before };
+            let hit = scene.intersect(&ray).and_then(|hit| hit.emitter);
+            starts += 1;
+            met += u32::from(hit == Some(EmitterId(index as u32)));
+        }
+        let hidden = starts == 0 || emitter.kind() != EmitterKind::Area;
+        require(hidden || met > 0, "rays meet lights that have an area", (index, starts))?;
+    }
+    Ok(())
+}
+
+/// Checks that light from infinity passes the medium around everything wherever it comes from and goes to:
+/// walks that start there are given one probability for all.
+fn check_outside(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random) -> Check {
+    let Some(outside) = scene.outside().and_then(|medium| scene.media().get(medium.0 as usize)) else {
+        return Ok(());
+    };
+    if !scene.emitters().iter().any(|emitter| emitter.kind().is_infinite()) {
+        return Ok(());
+    }
+    let mut first = None;
+    for _ in 0..64 {
+        let origin = bounds.centre + random.direction() * (bounds.radius * random.next());
+        let ray = RaySegment { origin, direction: random.direction(), start: 0.0, end: f32::INFINITY };
+        let density = outside.segment(&ray);
+        let case = (ray, density.transmittance, density.pass_probability);
+        let all_or_nothing = density.transmittance.to_array().iter().all(|t| *t == 0.0 || *t == 1.0);
+        require(
+            all_or_nothing,
+            "what is around everything lets all light from infinity pass, or none",
+            case,
+        )?;
+        let passes = (density.transmittance, density.pass_probability);
+        require(
+            *first.get_or_insert(passes) == passes,
+            "what is around everything lets light from infinity pass alike everywhere",
+            case,
+        )?;
     }
     Ok(())
 }

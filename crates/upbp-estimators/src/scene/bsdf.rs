@@ -38,6 +38,12 @@ pub struct Interface {
 impl Interface {
     /// A surface with the same index on both sides.
     pub const MATCHED: Self = Self { above: 1.0, below: 1.0 };
+
+    /// That of a surface whose normal points to the other side.
+    #[must_use]
+    pub const fn turned(self) -> Self {
+        Self { above: self.below, below: self.above }
+    }
 }
 
 /// A direction drawn by [`Bsdf::sample`].

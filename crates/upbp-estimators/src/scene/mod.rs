@@ -60,7 +60,8 @@ pub trait Scene: Sync {
     fn camera(&self) -> &Self::Camera;
 
     /// The medium around everything, `None` for vacuum. Of the light of infinite emitters there is what gets
-    /// through an infinite length of it: nothing, but in channels without extinction.
+    /// through an infinite length of it: nothing, but in channels without extinction. It has to be the same
+    /// from everywhere in all directions, so that fog that thins out needs a body with a top.
     fn outside(&self) -> Option<MediumId> {
         None
     }

@@ -50,11 +50,18 @@ fn lies_on<B, D: Densities, L: Lanes>(
 ) -> bool {
     let Interaction::Surface(other) = &photon.interaction else { return false };
     let normal = surface.geometric_normal;
+    let (mut other_normal, mut interface) = (other.geometric_normal, other.interface);
+    // Facets of one surface may be wound either way, in a mesh or as two quads. The far side of a plate of
+    // glass is told by its indices; that of an opaque one reflects nothing to this side.
+    let is_turned = normal.dot(other_normal) < 0.0;
+    if is_turned {
+        (other_normal, interface) = (-other_normal, interface.turned());
+    }
     // Light that falls on the other side of the photon's facet does not reach this one.
-    let from_same_side =
-        normal.dot(photon.towards_light) * other.geometric_normal.dot(photon.towards_light) > 0.0;
+    let from_same_side = normal.dot(photon.towards_light) * other_normal.dot(photon.towards_light) > 0.0;
     from_same_side
-        && normal.dot(other.geometric_normal) > MIN_NORMAL_COSINE
+        && normal.dot(other_normal) > MIN_NORMAL_COSINE
+        && (!is_turned || interface == surface.interface)
         && (photon.position - vertex.position).dot(normal).abs() < MAX_PLANE_DISTANCE * radius
 }
 
@@ -67,13 +74,19 @@ mod tests {
     use crate::mis::VertexMis;
     use crate::scene::Interface;
 
-    fn surface(normal: Vec3) -> SurfaceInteraction<()> {
-        let interface = Interface::MATCHED;
-        SurfaceInteraction { bsdf: (), geometric_normal: normal, shading_normal: normal, interface }
-    }
-
     /// Whether a photon counts for a query in the origin, on a floor, with a radius of one.
     fn counts(position: Vec3, normal: Vec3, towards_light: Vec3) -> bool {
+        counts_on(Interface::MATCHED, position, normal, towards_light)
+    }
+
+    /// The same, on bodies with such indices out of them and in them.
+    fn counts_on(interface: Interface, position: Vec3, normal: Vec3, towards_light: Vec3) -> bool {
+        let surface = |normal| SurfaceInteraction {
+            bsdf: (),
+            geometric_normal: normal,
+            shading_normal: normal,
+            interface,
+        };
         let mis = VertexMis::<f64> { connect: 0.0, below: 0.0, distance_factor: 0.0, shares: () };
         let (throughput, scale, depth) = (Spectrum::ONE, 1.0, 1);
         let floor = surface(Vec3::Y);
@@ -101,6 +114,22 @@ mod tests {
         // Light that falls on both sides of the edge alike.
         assert!(!counts(Vec3::new(0.0, -0.1, 0.4), Vec3::X, slant), "the side of a step");
         assert!(!counts(beside - 0.4 * Vec3::Y, Vec3::Y, slant), "the next floor below");
-        assert!(!counts(beside - 0.01 * Vec3::Y, Vec3::NEG_Y, -slant), "the ceiling below");
+        let glass = Interface { above: 1.0, below: 1.5 };
+        let below = beside - 0.01 * Vec3::Y;
+        assert!(!counts_on(glass, below, Vec3::NEG_Y, -slant), "the other side of a plate, outside");
+        assert!(!counts_on(glass, below, Vec3::NEG_Y, slant), "the same, from inside");
+    }
+
+    #[test]
+    fn facets_count_whichever_way_they_are_wound() {
+        let slant = Vec3::new(1.0, 1.0, 0.0).normalize();
+        let beside = Vec3::new(0.5, 0.0, 0.4);
+        let bend = Vec3::new(0.5, 1.0, 0.0).normalize();
+        for side in [1.0, -1.0] {
+            for normal in [Vec3::Y, bend] {
+                assert!(counts(beside, side * normal, slant) && counts(beside, side * normal, -slant));
+            }
+            assert!(!counts(beside, side * Vec3::X, slant), "the side of a step");
+        }
     }
 }

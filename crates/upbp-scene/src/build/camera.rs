@@ -43,7 +43,13 @@ impl Builder<'_> {
         if view.origin == view.target {
             self.problem("camera", "`origin` and `target` are the same point");
         } else if PerspectiveCamera::new(&view, width, height, whole).is_none() {
-            self.problem("camera", "`up` is zero or along the direction of view");
+            let has_direction = view.origin.distance(view.target).is_normal();
+            let message = if has_direction {
+                "`up` is zero or along the direction of view"
+            } else {
+                "`origin` and `target` are too near to each other, or too far"
+            };
+            self.problem("camera", message);
         }
         PerspectiveCamera::new(&view, width, height, crop)
     }

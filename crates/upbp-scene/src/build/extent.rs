@@ -1,6 +1,6 @@
 //! The bounds of a scene, and its origin.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use upbp_accel::Shape;
 use upbp_estimators::scene::BoundingSphere;
 
@@ -34,7 +34,11 @@ pub(super) fn move_near_origin(
 /// A multiple of a power of two that is greater than any rounding in the file: moving is exact.
 fn origin_near(bounds: &BoundingSphere) -> Vec3 {
     let step = f64::from(16.0 * bounds.radius).log2().ceil().exp2();
-    let near = (bounds.centre.as_dvec3() / step).round() * step;
+    let near = (bounds.centre.as_dvec3() / step).to_array().map(|steps| {
+        // Nearer than a step, coordinates beyond half of one would lose a digit.
+        if steps.abs() < 1.0 { 0.0 } else { steps.round() * step }
+    });
+    let near = DVec3::from(near);
     // A scene as small as the rounding of its coordinates has no digits to save.
     if near.is_finite() { near.as_vec3() } else { Vec3::ZERO }
 }

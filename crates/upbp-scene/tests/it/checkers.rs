@@ -238,7 +238,11 @@ impl Medium for WrongMedium {
     }
     fn segment(&self, segment: &RaySegment) -> SegmentDensity {
         let density = self.0.segment(segment);
-        SegmentDensity { stop_at_end: self.errs("density") * density.stop_at_end, ..density }
+        SegmentDensity {
+            stop_at_end: self.errs("density") * density.stop_at_end,
+            stop_at_start: self.errs("density the other way") * density.stop_at_start,
+            ..density
+        }
     }
     fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32> {
         let stop = self.0.sample_distance(segment, u_channel, u_distance)?;
@@ -261,6 +265,21 @@ impl Medium for WrongMedium {
     }
     fn sigma_t(&self, position: Vec3) -> Spectrum {
         self.0.sigma_t(position)
+    }
+    fn emits(&self) -> bool {
+        self.0.emits()
+    }
+    fn emitted(&self, segment: &RaySegment) -> Spectrum {
+        self.0.emitted(segment)
+    }
+    fn source(&self, position: Vec3) -> Spectrum {
+        self.errs("source") as f32 * self.0.source(position)
+    }
+    fn sample_emitted(&self, segment: &RaySegment, u: f32) -> Option<f32> {
+        self.0.sample_emitted(segment, u)
+    }
+    fn pdf_emitted(&self, segment: &RaySegment, distance: f32) -> f64 {
+        self.0.pdf_emitted(segment, distance)
     }
     fn phase(&self) -> &PhaseFunction {
         self.0.phase()
@@ -291,13 +310,16 @@ fn faults_of_a_medium_are_found() {
     ] {
         check_medium(&medium(sigma_a, sigma_s), &bounds).unwrap();
     }
-    let chromatic = medium([0.1, 0.2, 0.3], [0.5, 1.0, 4.0]);
+    let chromatic =
+        medium([0.1, 0.2, 0.3], [0.5, 1.0, 4.0]).with_emission(Spectrum::new(1.0, 2.0, 3.0)).unwrap();
     check_medium(&WrongMedium(chromatic.clone(), "nothing"), &bounds).unwrap();
     for (fault, expected) in [
         ("density", "walks stop at the rate at which fewer pass"),
         ("distances", "walks stop where fewer pass"),
         ("density of a lane", "walks stop at the rate at which fewer pass"),
         ("lane", "walks stop where fewer pass"),
+        ("density the other way", "a walk the other way stops with the density that is told of it"),
+        ("source", "points of light bring what is emitted"),
     ] {
         assert_eq!(check_medium(&WrongMedium(chromatic.clone(), fault), &bounds).unwrap_err().what, expected);
     }
