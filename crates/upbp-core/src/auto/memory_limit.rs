@@ -108,7 +108,8 @@ impl Room {
     }
 }
 
-/// Bytes that a render may take: the given number of MiB, or half of what the machine has free, or `all` of it.
+/// Bytes that a render may take: the given number of MiB, or half of what the machine has free, or `all` of
+/// it.
 fn budget(mebibytes: Option<u32>, all: bool) -> u64 {
     let of_free = |free: u64| if all { free } else { free / 2 };
     mebibytes.map_or_else(|| free_bytes().map_or(LIGHT_BYTES, of_free), |mib| u64::from(mib) << 20)
