@@ -106,9 +106,8 @@ fn merge(paths: &[PathBuf], quiet: bool) -> Result<(State, String), Failure> {
 fn describe(path: &Path, state: &State) -> String {
     let film = state.film();
     let mut iterations = film.iteration_set().to_string();
-    for (iteration, share) in film.begun() {
-        iterations += &format!(" and {:.0} % of {iteration}", 100.0 * share);
-    }
+    let begun = film.begun().into_iter();
+    iterations.extend(begun.map(|(iteration, share)| format!(" and {:.0} % of {iteration}", 100.0 * share)));
     let (path, scene) = (path.display(), &state.identity().scene);
     format!("{path}: {scene}, iterations {iterations}, film {}\n", film.fingerprint())
 }

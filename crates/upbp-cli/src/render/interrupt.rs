@@ -1,4 +1,5 @@
-//! SIGINT, SIGTERM and SIGHUP: the first ends the render in order, another SIGINT or SIGTERM ends the program.
+//! SIGINT, SIGTERM and SIGHUP: the first ends the render in order, another SIGINT or SIGTERM ends the
+//! program.
 
 use std::io;
 
