@@ -21,11 +21,11 @@ const NS_PER_EDGE: f64 = 245.0;
 /// Part of a camera edge's time if no query beam has to know what is beyond the end of the edge.
 const SHORT: f64 = 0.92;
 /// Nanoseconds of a call of each technique; of a query, without what it looks at.
-const NS_PER_CALL: PerTechnique<f64> = [0.0, 370.0, 270.0, 270.0, 45.0, 105.0, 150.0, 110.0, 185.0];
+const NS_PER_CALL: PerTechnique<f64> = [0.0, 370.0, 270.0, 270.0, 45.0, 85.0, 30.0, 110.0, 50.0];
 /// Nanoseconds of a node, a leaf or a block that a query of each technique looks at.
-const NS_PER_TEST: PerTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 9.0, 9.0, 12.0, 9.0, 13.0];
+const NS_PER_TEST: PerTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 9.0, 20.0, 20.0, 9.0, 14.5];
 /// Nanoseconds of a sample that a query of each technique finds.
-const NS_PER_SAMPLE: PerTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 110.0, 125.0, 130.0, 130.0, 140.0];
+const NS_PER_SAMPLE: PerTechnique<f64> = [0.0, 0.0, 0.0, 0.0, 110.0, 95.0, 130.0, 130.0, 235.0];
 /// Nanoseconds of storing a light vertex.
 const NS_PER_VERTEX: f64 = 20.0;
 /// Nanoseconds of building a photon point into a tree.
