@@ -1,7 +1,7 @@
 //! Renders the reference scenes with many sets of techniques and compares them with images of an independent
 //! renderer.
 //!
-//! `cargo run --release --example validate` takes the better part of an hour; `-- --quick` some minutes.
+//! `cargo run --release --example validate` takes an hour and a half; `-- --quick` some minutes.
 //! Prints a table and ends with exit code 1 if a bar was missed.
 //!
 //! Sets without merges are unbiased: mean of the picture, tiles and pixels must agree within the noise, and

@@ -11,7 +11,7 @@ use crate::film::{ErrorEstimate, ErrorMap, IterationSet};
 use crate::plan::Plan;
 use crate::state::{ErrorPoint, ErrorSeries, PassSeconds, State};
 
-/// Report of a render.
+/// Report of a render. In JSON, numbers that are not finite are `null`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Version of the renderer.
@@ -157,7 +157,11 @@ impl fmt::Display for Report {
             )?;
         }
         if c.dropped > 0 {
-            writeln!(f, "{} contributions were not finite and are left out", c.dropped)?;
+            writeln!(
+                f,
+                "{} contributions or pixels were negative or not finite and are left out",
+                c.dropped
+            )?;
         }
         if c.lost_walks > 0 {
             let count = c.lost_walks;

@@ -20,7 +20,8 @@ pub struct Counters {
     pub photon_beams: u64,
     /// Contributions of each technique, in the order of [`Technique::ALL`].
     pub contributions: [u64; 9],
-    /// Contributions that were not finite or negative, and were dropped.
+    /// Contributions, and values of an iteration's pixels, that were not finite or negative, and were
+    /// dropped.
     pub dropped: u64,
     /// Camera sub-paths that were ended by the limit of the path length at a vertex that scatters.
     pub cut_walks: u64,

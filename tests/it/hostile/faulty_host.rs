@@ -43,6 +43,7 @@ pub(super) enum Fault {
     OutsideVaries,
     RefractiveIndex(f32),
     NothingConnectible,
+    NothingSpecular,
     BsdfNan,
     BsdfNegative,
     BsdfInfinite,
@@ -237,6 +238,10 @@ impl Scene for Hostile {
 
     fn has_connectible_surfaces(&self) -> bool {
         self.fault != F::NothingConnectible
+    }
+
+    fn has_specular_surfaces(&self) -> bool {
+        self.fault != F::NothingSpecular
     }
 }
 
@@ -465,6 +470,7 @@ pub(super) const GEOMETRY: [Fault; 21] = [
 pub(super) fn faults() -> Vec<Fault> {
     let mut faults = vec![
         F::NothingConnectible,
+        F::NothingSpecular,
         F::EmitterMissing,
         F::OutsideVaries,
         F::CameraLens,

@@ -4,7 +4,7 @@ set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(cd "$here/../../../.." && pwd)
 (cd "$root" && cargo build --quiet --locked --release --package upbp-cli)
-PATH=$root/target/release:$PATH
+PATH=$(cd "$root" && realpath -m "${CARGO_TARGET_DIR:-target}")/release:$PATH
 export SCENE=$root/examples/scenes/cornell_media.ron
 work=$(mktemp -d)
 

@@ -69,7 +69,7 @@ pub struct ErrorEstimate {
 /// A reason for which the error could be anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Doubt {
-    /// Fewer than two halves, or fewer than eight iterations in both.
+    /// Fewer than two halves, or fewer than eight iterations in both together.
     FewIterations,
     /// A pixel of a half is no number, or infinite.
     NotANumber,

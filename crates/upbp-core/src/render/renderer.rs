@@ -213,9 +213,10 @@ impl<'a> Renderer<'a> {
         self.state.seconds().total()
     }
 
-    /// Renders until a rule of `stop` holds or `progress`, which is called after every iteration, breaks, and
-    /// says why it ends. Time spent in `progress`, and in comparing with the
-    /// [reference](Start::reference), does not count.
+    /// Renders until a rule of `stop` holds or `progress`, which is called after every whole iteration,
+    /// breaks, and says why it ends. After an iteration that ends in its middle [`film`](Self::film) has what
+    /// is done. Time spent in `progress`, and in comparing with the [reference](Start::reference), does not
+    /// count.
     pub fn render(
         &mut self,
         stop: &Stop,

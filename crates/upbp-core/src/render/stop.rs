@@ -25,7 +25,8 @@ pub struct Progress<'a> {
     pub seconds: f64,
     /// Part of the work done, `[0, 1]`, as far as the stop rules tell.
     pub fraction: f64,
-    /// Estimated relMSE, as it was when a stop rule last had reason to ask.
+    /// Estimated relMSE, as of the last iteration after which it was asked for: each time that their number
+    /// is a power of two, and every now and then later.
     pub estimated_error: ErrorEstimate,
     /// The film.
     pub film: &'a Film,

@@ -65,9 +65,10 @@ pub struct Settings {
     /// Whether the film has [albedo, normal and depth](crate::FeatureImages) besides the picture, for
     /// denoisers and compositing.
     pub features: bool,
-    /// Memory for light vertices, beams, their trees and the film, MiB; `None` for half of what the
-    /// machine has free. If choices are [deterministic](Self::deterministic), light vertices, beams and
-    /// their trees then take at most 2048 MiB on any machine; a plan that is given may take all that is free.
+    /// Memory for light vertices, beams, their trees and the film, MiB; `None` for half of what is free, on
+    /// the machine and in its control groups, where Linux tells, else 2048 MiB. If choices are
+    /// [deterministic](Self::deterministic), light vertices, beams and their trees then take at most 2048 MiB
+    /// on any machine; a plan that is given may take all that is free.
     pub memory: Option<u32>,
 }
 

@@ -10,13 +10,13 @@ use upbp_estimators::Counters;
 pub struct PassSeconds {
     /// The preparation, with its pilot renders.
     pub preparation: f64,
-    /// Light sub-paths.
+    /// Light sub-paths, with their splats.
     pub light: f64,
     /// Building the trees of photons and beams.
     pub build: f64,
     /// Camera sub-paths, with all photon queries.
     pub camera: f64,
-    /// Splats and film.
+    /// Adding to the film, and estimates of the error.
     pub film: f64,
 }
 
@@ -62,7 +62,7 @@ impl PassTimes {
 /// The error at some moment of a render, against a reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorPoint {
-    /// Seconds of rendering, without evaluation of the error.
+    /// Seconds of rendering, without comparisons with the reference.
     pub seconds: f64,
     /// Whole iterations done.
     pub iterations: u64,

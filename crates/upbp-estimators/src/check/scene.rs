@@ -5,14 +5,16 @@ use upbp_media::{Medium as _, RaySegment};
 
 use super::normals::Normals;
 use super::{Check, ContractViolation, Random, is_unit, require};
-use crate::scene::{Boundary, BoundingSphere, Bsdf, Crossing, Emitter, EmitterId, EmitterKind, Scene};
+use crate::scene::{
+    Boundary, BoundingSphere, Bsdf, Crossing, Emitter, EmitterId, EmitterKind, Interface, Scene, Walk,
+};
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
 /// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside
-/// with an index of refraction, surfaces are as the scene says of all of them, `trace` and `is_clear` find
-/// what `intersect` does, the bodies around a point follow from the boundaries on the way to it, rays meet
-/// every light that has an area, unless it is all hidden, and all light from infinity passes what is around
-/// everything alike.
+/// with an index of refraction, surfaces scatter as the scene says of all of them, `trace` and `is_clear`
+/// find what `intersect` does, the bodies around a point follow from the boundaries on the way to it, rays
+/// meet every light that has an area, unless it is all hidden, and all light from infinity passes what is
+/// around everything alike.
 ///
 /// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the
 /// normals of a body one in ten.
@@ -143,6 +145,15 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
         let connectible = hit.boundary.bsdf().is_some_and(Bsdf::is_connectible);
         let told = scene.has_connectible_surfaces() || !connectible;
         require(told, "a scene without connectible surfaces has none", case)?;
+        let has_dirac = hit.boundary.bsdf().is_some_and(|bsdf| {
+            let below = hit.boundary.interior().map_or(1.0, |interior| interior.ior);
+            let from = Vec3::new(0.6, 0.0, 0.8);
+            let interface = Interface { above: 1.0, below };
+            let sample = bsdf.sample(from, Walk::Camera, interface, random.next(), random.pair());
+            sample.is_some_and(|sample| sample.delta)
+        });
+        let told = scene.has_specular_surfaces() || !has_dirac;
+        require(told, "a scene without specular surfaces has none", case)?;
         let sides = hit.geometric_normal.dot(hit.shading_normal) >= 0.0;
         require(sides, "the shading normal is on the side of the geometric one", case)?;
     }

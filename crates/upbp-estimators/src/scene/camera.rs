@@ -64,7 +64,8 @@ pub trait Camera: Send + Sync {
         PixelRect { x: 0, y: 0, width, height }
     }
 
-    /// The ray through `film` (in pixels). `u_lens` is uniform in `[0, 1)²`, for the lens point.
+    /// The ray through `film` (in pixels). `u_lens` is uniform in `[0, 1)²`, for the lens point. `None` is a
+    /// sample that sees nothing, and counts as black.
     fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Option<CameraRay>;
 
     /// The connection of `point` with the camera through the lens point that `u_lens` stands for; `None` if

@@ -49,8 +49,9 @@ impl EmitterKind {
 /// A point of an emitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmitterPoint {
-    /// Position, scene units. For an infinite emitter: a point outside of the scene's bounds in that
-    /// direction, or whatever is at hand: only the direction counts.
+    /// Position, scene units. Of an infinite emitter, in an [`Emission`]: on the disc that rays start from,
+    /// as wide as the sphere that is given and at least its radius before its centre; elsewhere whatever is
+    /// at hand, since only the direction counts.
     pub position: Vec3,
     /// The normal of the emitting side for [`EmitterKind::Area`]; of no meaning for the other kinds.
     pub normal: Vec3,
@@ -205,7 +206,8 @@ pub trait Emitter: Send + Sync {
         None
     }
 
-    /// Starts a light sub-path. The four random numbers are uniform in `[0, 1)`.
+    /// Starts a light sub-path. The four random numbers are uniform in `[0, 1)`. `None` is a draw that brings
+    /// no light: densities are those of all draws.
     fn sample_emission(
         &self,
         sphere: &BoundingSphere,
@@ -213,7 +215,8 @@ pub trait Emitter: Send + Sync {
         u_direction: [f32; 2],
     ) -> Option<Emission>;
 
-    /// Chooses a point of the emitter for next event estimation at `receiver`.
+    /// Chooses a point of the emitter for next event estimation at `receiver`; `u` is uniform in `[0, 1)²`.
+    /// `None` is a draw that brings no light: densities are those of all draws.
     fn sample_incident(&self, sphere: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident>;
 
     /// Radiance and densities for a path from `point` (on a surface that carries this emitter, or in its

@@ -71,8 +71,8 @@ pub trait Scene: Sync {
         true
     }
 
-    /// Whether any surface scatters by Dirac lobes alone. If there is none, or if all lights can be hit,
-    /// camera sub-paths alone find every path, and light sub-paths may be left out.
+    /// Whether any surface has a Dirac lobe, alone or beside smooth ones. If there is none, or if all lights
+    /// can be hit, camera sub-paths alone find every path, and light sub-paths may be left out.
     fn has_specular_surfaces(&self) -> bool {
         true
     }
