@@ -32,6 +32,7 @@ pub fn check_scene(scene: &impl Scene) -> Check {
         let target = bounds.centre + random.direction() * (bounds.radius * random.next());
         let Some(ray) = ray_through(&bounds, target, &mut random) else { continue };
         normals.look(scene, &ray)?;
+        check_lobes(scene, &ray, &mut random)?;
         violations.extend(check_ray(scene, &ray, &mut random).err());
         if violations.len() * 100 > rays {
             break;
@@ -133,6 +134,17 @@ fn look_through(scene: &impl Scene, target: Vec3, random: &mut Random, normals: 
     }
 }
 
+/// Checks that a scene says so if the surface that a ray meets has a Dirac lobe.
+fn check_lobes(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check {
+    let Some(hit) = scene.intersect(ray) else { return Ok(()) };
+    let Some(bsdf) = hit.boundary.bsdf() else { return Ok(()) };
+    let below = hit.boundary.interior().map_or(1.0, |interior| interior.ior);
+    let (from, interface) = (Vec3::new(0.6, 0.0, 0.8), Interface { above: 1.0, below });
+    let sample = bsdf.sample(from, Walk::Camera, interface, random.next(), random.pair());
+    let told = scene.has_specular_surfaces() || !sample.is_some_and(|sample| sample.delta);
+    require(told, "a scene without specular surfaces has none", (ray, hit.t, sample))
+}
+
 fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check {
     let radius = scene.bounds().radius;
     if let Some(hit) = scene.intersect(ray) {
@@ -145,15 +157,6 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
         let connectible = hit.boundary.bsdf().is_some_and(Bsdf::is_connectible);
         let told = scene.has_connectible_surfaces() || !connectible;
         require(told, "a scene without connectible surfaces has none", case)?;
-        let has_dirac = hit.boundary.bsdf().is_some_and(|bsdf| {
-            let below = hit.boundary.interior().map_or(1.0, |interior| interior.ior);
-            let from = Vec3::new(0.6, 0.0, 0.8);
-            let interface = Interface { above: 1.0, below };
-            let sample = bsdf.sample(from, Walk::Camera, interface, random.next(), random.pair());
-            sample.is_some_and(|sample| sample.delta)
-        });
-        let told = scene.has_specular_surfaces() || !has_dirac;
-        require(told, "a scene without specular surfaces has none", case)?;
         let sides = hit.geometric_normal.dot(hit.shading_normal) >= 0.0;
         require(sides, "the shading normal is on the side of the geometric one", case)?;
     }
