@@ -12,6 +12,7 @@ use glam::{Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ploc::SortPrecision;
 use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 
@@ -48,6 +49,9 @@ impl Boundable for Group {
     }
 }
 
+/// Distance from a triangle at which rays may meet it by rounding, relative to its longest extent.
+const EDGE_ROUNDING: f32 = 4.0 * f32::EPSILON;
+
 /// A primitive as the build sees it.
 #[derive(Clone, Copy)]
 pub(super) struct Boxed {
@@ -57,8 +61,12 @@ pub(super) struct Boxed {
 }
 
 impl Boxed {
+    /// A triangle. Its box holds what the exact test accepts: projected corners are rounded as their
+    /// distances are, so that a ray that just passes a long edge may meet the triangle.
     pub(super) fn triangle([a, b, c]: [Vec3; 3]) -> Self {
-        Self { min: a.min(b).min(c), max: a.max(b).max(c), kind: Kind::Triangle }
+        let (min, max) = (a.min(b).min(c), a.max(b).max(c));
+        let margin = EDGE_ROUNDING * (max - min).max_element();
+        Self { min: min - margin, max: max + margin, kind: Kind::Triangle }
     }
 }
 
@@ -77,6 +85,8 @@ pub(super) fn build(boxes: &[Boxed], leaves: Leaves, pack: Pack<'_>) -> Hierarch
     let params = BvhBuildParams {
         max_prims_per_leaf: 1,
         post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
+        // 21 bits per axis do not tell the triangles of a statue apart on a ground a million times as wide.
+        sort_precision: SortPrecision::U128,
         ..BvhBuildParams::medium_build()
     };
     let tree = build_bvh2(&groups, params, &mut Duration::default());

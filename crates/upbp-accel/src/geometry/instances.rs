@@ -43,6 +43,18 @@ struct Instance {
     reach: f32,
 }
 
+impl Instance {
+    /// The greatest sum of coordinate differences between a point and any of the copy.
+    #[inline(always)]
+    fn extent_from(&self, point: Vec3) -> f32 {
+        (self.bounds.0 - point).abs().max((self.bounds.1 - point).abs()).element_sum()
+    }
+}
+
+/// Error of a corner that is placed, and of a ray in the coordinates of the mesh, relative to the largest
+/// number that adds to a coordinate: three products and a sum of four, and a rounding, twice over.
+const PLACING: f32 = 16.0 * f32::EPSILON;
+
 /// A mesh in coordinates of its own.
 #[derive(Clone, Debug)]
 struct Model {
@@ -125,7 +137,7 @@ impl<const IN_ORDER: bool> Task for InstanceSearch<'_, IN_ORDER> {
         let lanes = LaneRay::new(wide, &ray);
         let triangle_ray = TriangleRay::new(ray.origin, ray.direction, extent);
         let mut t_max = ray.t_max;
-        let mut each = EachInstance::<IN_ORDER> { instances, ray, extent, triangle_ray, visit };
+        let mut each = EachInstance::<IN_ORDER> { instances, ray, triangle_ray, visit };
         // Nothing is left to do if it breaks off.
         let _ =
             instances.hierarchy.traverse::<IN_ORDER, SlabRay<_>, _>(wide, &lanes, (), &mut t_max, &mut each);
@@ -135,7 +147,6 @@ impl<const IN_ORDER: bool> Task for InstanceSearch<'_, IN_ORDER> {
 struct EachInstance<'a, const IN_ORDER: bool> {
     instances: &'a Instances,
     ray: Ray,
-    extent: f32,
     triangle_ray: TriangleRay,
     visit: OnHit<'a>,
 }
@@ -149,10 +160,10 @@ impl<const IN_ORDER: bool> Visitor for EachInstance<'_, IN_ORDER> {
         block: BlockRef,
         t_max: &mut f32,
     ) -> ControlFlow<()> {
-        let Self { instances, ray, extent, triangle_ray, visit } = self;
+        let Self { instances, ray, triangle_ray, visit } = self;
         let instance = &instances.copies[block.index];
-        // What the exact test, the corners and the ray in the coordinates of the mesh may be wrong by.
-        let margin = ROUNDING * (*extent + instance.reach);
+        // What the exact test may be wrong by, and the corners and the ray in the coordinates of the mesh.
+        let margin = ROUNDING * instance.extent_from(ray.origin) + PLACING * instance.reach;
         let Some(start) = entry(ray, instance.bounds, margin, *t_max) else {
             return ControlFlow::Continue(());
         };

@@ -24,6 +24,9 @@ const SAMPLES: usize = 32;
 /// Items that are sorted into buckets together: they stay in the cache of a core.
 const CHUNK: usize = 1 << 14;
 
+/// The fewest such items per bucket, for which each chunk has a number.
+const CHUNK_PER_BUCKET: usize = 4;
+
 /// Items in the order of their buckets.
 pub(super) struct Buckets<T> {
     /// Runs of items, each sorted by bucket.
@@ -39,8 +42,10 @@ impl<T: Copy + Send + Sync> Buckets<T> {
     pub(super) fn new(items: Vec<Item<T>>) -> Self {
         let splitters = Splitters::new(&items);
         let buckets = splitters.buckets();
-        let (chunks, starts): (Vec<_>, Vec<_>) =
-            items.par_chunks(CHUNK).map(|chunk| splitters.sort(chunk)).unzip();
+        let (chunks, starts): (Vec<_>, Vec<_>) = items
+            .par_chunks(CHUNK.max(CHUNK_PER_BUCKET * buckets))
+            .map(|chunk| splitters.sort(chunk))
+            .unzip();
         drop(items);
         let count = |bucket| {
             starts.iter().map(|starts: &Vec<u32>| (starts[bucket + 1] - starts[bucket]) as usize).sum()
@@ -134,11 +139,11 @@ impl Splitters {
             *start = sum;
         }
         // Indices are sorted instead of items, which are larger; each item is then copied once.
-        let mut order = vec![0_u16; chunk.len()];
+        let mut order = vec![0_u32; chunk.len()];
         for (index, &bucket) in buckets.iter().enumerate().rev() {
             let start = &mut starts[bucket as usize];
             *start -= 1;
-            order[*start as usize] = index as u16;
+            order[*start as usize] = index as u32;
         }
         (order.into_iter().map(|index| chunk[index as usize]).collect(), starts)
     }

@@ -316,6 +316,33 @@ fn closed_meshes_are_crossed_an_even_number_of_times() {
     }
 }
 
+/// A glass fibre: a ray that is given to one side by rounding is not to miss the box of that side's block.
+#[test]
+fn long_edges_of_a_thin_rod_have_no_gaps() {
+    const SIDES: u32 = 64;
+    let corner = |side: u32, z: f32| {
+        let (sin, cos) = (std::f32::consts::TAU * (side % SIDES) as f32 / SIDES as f32).sin_cos();
+        Vec3::new(0.0005 * cos, 0.0005 * sin, z)
+    };
+    let positions = (0..SIDES).flat_map(|side| [corner(side, -0.5), corner(side, 0.5)]).collect();
+    let quad = |side| [2 * side, 2 * side + 1, 2 * ((side + 1) % SIDES), 2 * ((side + 1) % SIDES) + 1];
+    let triangles = (0..SIDES).map(quad).flat_map(|[a, b, c, d]| [[a, c, d], [a, d, b]]).collect();
+    let rod = TriangleMesh::new(positions, triangles, None).unwrap();
+    let scene = SceneGeometry::build(vec![rod.into()]).unwrap();
+    let mut random = Random::new(5);
+    let mut lost = 0;
+    for _ in 0..200_000 {
+        let origin = 0.0004 * random.unit() * corner(random.below(64) as u32, 0.0).normalize();
+        let origin = origin + (random.unit() - 0.5) * 0.8 * Vec3::Z;
+        // As near to an edge as its ends are told apart from there.
+        let along = origin.z + 0.003 * (random.unit() - 0.5);
+        let target = corner(random.below(64) as u32, along) + 2e-8 * random.cube();
+        let ray = Ray::new(origin, (target - origin).normalize());
+        lost += usize::from(scene.closest(ray).is_none());
+    }
+    assert_eq!(lost, 0);
+}
+
 #[test]
 fn the_number_of_threads_does_not_show() {
     let mut random = Random::new(15);
