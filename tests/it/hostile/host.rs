@@ -170,7 +170,7 @@ fn cancelled_at_any_ray_it_ends_at_once_and_what_is_done_is_not_lost() {
                 let reason = renderer
                     .render(&Stop { iterations: Some(2), ..Stop::default() }, |_| ControlFlow::Continue(()));
                 assert_eq!(reason, StopReason::Cancelled);
-                parts += renderer.film().parts().len();
+                parts += renderer.film().begun().len();
                 let mut resumed = begin(&scene).expect("a good scene");
                 resumed.resume(renderer.state().clone()).expect("the same render");
                 while resumed.film().iterations() < 2 {

@@ -15,7 +15,7 @@ pub enum Content {
     Exr,
     /// A PNG image.
     Png,
-    /// A report as JSON.
+    /// A report as JSON with indents, its version first.
     Report,
     /// A plan as RON text.
     Plan,

@@ -159,8 +159,7 @@ impl Film {
     }
 
     /// Iterations of which only some of the 256 sets of pixels are there, with the number of these.
-    #[must_use]
-    pub const fn parts(&self) -> &BTreeMap<u64, u32> {
+    pub(crate) const fn parts(&self) -> &BTreeMap<u64, u32> {
         &self.parts
     }
 
