@@ -12,9 +12,10 @@ use crate::emitter_tree::EmitterTree;
 use crate::emitters_by_receiver::{ClusterSample, ReceiverShares};
 use crate::lens_emitters::LensEmitters;
 use crate::random::Decision;
+use crate::roulette::Surroundings;
 use crate::scene::{
-    BoundingSphere, Camera, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, LensConnection,
-    PixelRect, Scene,
+    BoundingSphere, Camera, CameraRay, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint,
+    LensConnection, PixelRect, Scene,
 };
 
 /// A [`Scene`] with all that is derived from it once.
@@ -28,8 +29,9 @@ pub struct PreparedScene<'a, S: Scene> {
     /// Choice of emitters by place and power; `None` where that tells nothing.
     tree: Option<EmitterTree>,
     choice: Arc<EmitterChoice>,
-    /// The [neighbourhood](Self::neighbourhood) of the scene.
-    neighbourhood: Option<BoundingSphere>,
+    /// Bounds of the scene, wide enough for the camera.
+    bounds_with_camera: BoundingSphere,
+    surroundings: Option<Surroundings>,
     /// Bounds of light sub-paths' starts, by [`EmitterChoice::emission_bounds`].
     emission_bounds: BoundingSphere,
     environments: Vec<EmitterId>,
@@ -93,6 +95,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         let emitting_media = scene.media().iter().any(Medium::emits);
         let dense = |medium: &S::Medium| !(medium.mean_free_path() > DENSE * bounds.radius);
         let dense_media = scene.media().iter().any(|medium| medium.scatters() && dense(medium));
+        let bounds_with_camera = bounds_with_camera(scene, bounds);
         let power = Selection::new(&powers);
         let choice = Arc::new(EmitterChoice {
             emission: power.clone(),
@@ -109,7 +112,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             power,
             tree,
             choice,
-            neighbourhood: neighbourhood(scene, &bounds),
+            bounds_with_camera,
+            surroundings: surroundings(scene, bounds_with_camera),
             emission_bounds: bounds,
             environments,
             volumes,
@@ -120,12 +124,17 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         })
     }
 
-    /// The sphere in which a medium around the scene scatters most of the light that comes back: the bounds
-    /// of the scene, and beyond them the distance on which light loses its direction. `None` without such a
-    /// medium, or if it emits: then what is far away is no less bright.
+    /// A sphere around the bounds of the scene and the camera.
     #[must_use]
-    pub const fn neighbourhood(&self) -> Option<BoundingSphere> {
-        self.neighbourhood
+    pub const fn bounds_with_camera(&self) -> BoundingSphere {
+        self.bounds_with_camera
+    }
+
+    /// The medium around the scene in which walks get lost. `None` without such a medium, or if it emits:
+    /// then what is far away is no less bright.
+    #[must_use]
+    pub const fn surroundings(&self) -> Option<Surroundings> {
+        self.surroundings
     }
 
     /// Chooses emitters by what they bring instead of by power: `emission` where light sub-paths start,
@@ -446,13 +455,26 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     }
 }
 
-/// The bounds of a scene, wider by the distance on which light in the medium around it loses its direction.
-fn neighbourhood<S: Scene>(scene: &S, bounds: &BoundingSphere) -> Option<BoundingSphere> {
+/// The smallest sphere around the bounds of a scene and its camera.
+fn bounds_with_camera<S: Scene>(scene: &S, bounds: BoundingSphere) -> BoundingSphere {
+    let Some(eye) = ray_through_centre(scene).map(|ray| ray.origin) else { return bounds };
+    let beyond = eye.distance(bounds.centre) - bounds.radius;
+    if !(beyond > 0.0 && beyond.is_finite()) {
+        return bounds;
+    }
+    let towards_eye = (eye - bounds.centre).normalize();
+    BoundingSphere {
+        centre: bounds.centre + 0.5 * beyond * towards_eye,
+        radius: bounds.radius + 0.5 * beyond,
+    }
+}
+
+fn surroundings<S: Scene>(scene: &S, within: BoundingSphere) -> Option<Surroundings> {
     let medium = &scene.media()[scene.outside()?.0 as usize];
     let forward = medium.phase().mean_cosine().max_component().max(0.0);
-    let radius = bounds.radius + medium.mean_free_path().max(0.0) / (1.0 - forward);
-    (medium.scatters() && !medium.emits() && radius.is_finite())
-        .then_some(BoundingSphere { centre: bounds.centre, radius })
+    let free_path = medium.mean_free_path().max(0.0) / (1.0 - forward);
+    (medium.scatters() && !medium.emits() && free_path.is_finite())
+        .then_some(Surroundings { within, free_path })
 }
 
 /// An infinite length of the medium around everything.
@@ -465,11 +487,16 @@ fn from_infinity<S: Scene, L: Lanes>(scene: &S, bounds: &BoundingSphere) -> Segm
 
 /// The bodies in which a pinhole camera is, if its ray through the middle of the film can be had.
 fn stack_of_pinhole<S: Scene>(scene: &S) -> Option<MediumStack> {
-    let crop = scene.camera().crop();
-    let centre = Vec2::new(crop.x as f32 + 0.5 * crop.width as f32, crop.y as f32 + 0.5 * crop.height as f32);
-    let ray = scene.camera().ray(centre, [0.5; 2])?;
+    let ray = ray_through_centre(scene)?;
     // Ahead of the pinhole, which may stand on a boundary.
     Some(scene.stack_at(upbp_accel::offset_origin(ray.origin, ray.direction, ray.direction)))
+}
+
+/// The camera's ray through the middle of what it renders, if it can be had.
+fn ray_through_centre<S: Scene>(scene: &S) -> Option<CameraRay> {
+    let crop = scene.camera().crop();
+    let centre = Vec2::new(crop.x as f32 + 0.5 * crop.width as f32, crop.y as f32 + 0.5 * crop.height as f32);
+    scene.camera().ray(centre, [0.5; 2])
 }
 
 /// The tree over the emitters that can be chosen by `power`.

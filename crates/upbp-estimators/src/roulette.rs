@@ -14,9 +14,8 @@ use crate::scene::BoundingSphere;
 ///
 /// Walks of both kinds may be caught inside of clear glass, where total reflection never lets them out: after
 /// many vertices in a row that only reflect or refract, two in a thousand end at each further one. And they
-/// may get lost in a medium around the scene: of those that get so many times as far away as the
-/// [neighbourhood](crate::PreparedScene::neighbourhood) of the scene is wide, one in so many goes on, which
-/// is how many would come back.
+/// may get lost in a medium around the scene: the farther away, the fewer [go on](Surroundings), since fewer
+/// would come back and after more vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Roulette {
     /// Walks end where they leave the scene, or at the greatest length, which those that total reflection
@@ -51,6 +50,28 @@ const FREE_REFLECTIONS: u32 = 256;
 /// that gets out of the wall of a vessel after as many has 2.7 times the throughput.
 const REFLECTS_ON: f32 = 0.998;
 
+/// What a walk gets lost in: a medium around the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surroundings {
+    /// A sphere around the scene and its camera, within which distance ends no walk.
+    pub within: BoundingSphere,
+    /// The distance on which light loses its direction in the medium, scene units.
+    pub free_path: f32,
+}
+
+impl Surroundings {
+    /// Part of the walks that have been at a place which go on (`docs/theory.md`, section 6.8).
+    fn part_that_goes_on(&self, position: Vec3) -> f32 {
+        let Self { within: BoundingSphere { centre, radius }, free_path } = *self;
+        let distance = position.distance(centre);
+        if distance > radius {
+            radius / distance * ((radius + free_path) / (distance + free_path)).sqrt()
+        } else {
+            1.0
+        }
+    }
+}
+
 /// The roulette of one walk.
 #[derive(Clone, Copy, Debug)]
 pub struct Survival {
@@ -59,28 +80,28 @@ pub struct Survival {
     left: f32,
     /// Vertices in a row without a smooth lobe.
     reflections: u32,
-    /// The sphere within which distance ends no walk; `None` for everywhere.
-    neighbourhood: Option<BoundingSphere>,
-    /// The largest distance from its centre so far, in terms of its radius, at least one.
-    farthest: f32,
+    /// What the walk may get lost in, if anything.
+    surroundings: Option<Surroundings>,
+    /// Part of the walks as far away that go on.
+    not_lost: f32,
 }
 
 impl Survival {
-    /// State of a camera sub-path that starts. Far from the `neighbourhood` of the scene, if there is one,
-    /// it ends more often.
+    /// State of a camera sub-path that starts. Far out in the `surroundings`, if there are any, it ends more
+    /// often.
     #[must_use]
-    pub const fn of_camera(roulette: Roulette, neighbourhood: Option<BoundingSphere>) -> Self {
-        Self { roulette, left: 1.0, reflections: 0, neighbourhood, farthest: 1.0 }
+    pub const fn of_camera(roulette: Roulette, surroundings: Option<Surroundings>) -> Self {
+        Self { roulette, left: 1.0, reflections: 0, surroundings, not_lost: 1.0 }
     }
 
     /// State of a light sub-path that starts.
     #[must_use]
-    pub const fn of_light(roulette: Roulette, neighbourhood: Option<BoundingSphere>) -> Self {
+    pub const fn of_light(roulette: Roulette, surroundings: Option<Surroundings>) -> Self {
         let roulette = match roulette {
             Roulette::Off => Roulette::Off,
             Roulette::Below(_) => Roulette::Below(1.0),
         };
-        Self::of_camera(roulette, neighbourhood)
+        Self::of_camera(roulette, surroundings)
     }
 
     pub(crate) const fn roulette(&self) -> Roulette {
@@ -101,14 +122,10 @@ impl Survival {
     /// The probability to go on from a place, by how far away it is. The walk is taken to do so.
     #[inline]
     pub(crate) fn probability_at(&mut self, position: Vec3) -> f32 {
-        let Some(neighbourhood) = self.neighbourhood.filter(|_| self.roulette.is_on()) else { return 1.0 };
-        let distance = position.distance(neighbourhood.centre) / neighbourhood.radius;
-        if !(distance > self.farthest) {
-            return 1.0;
-        }
-        let probability = self.farthest / distance;
-        self.farthest = distance;
-        probability
+        let Some(surroundings) = self.surroundings.filter(|_| self.roulette.is_on()) else { return 1.0 };
+        let before = self.not_lost;
+        self.not_lost = before.min(surroundings.part_that_goes_on(position));
+        self.not_lost / before
     }
 }
 
@@ -146,18 +163,21 @@ mod tests {
 
         /// The probability to get anywhere depends on the farthest place on the way alone.
         #[test]
-        fn one_in_so_many_goes_so_many_times_as_far(
+        fn fewer_walks_go_on_the_farther_away_they_have_been(
             places in prop::collection::vec([-40.0_f32..40.0, -40.0_f32..40.0, -40.0_f32..40.0], 1..20),
+            free_path in 0.01_f32..100.0,
         ) {
-            let neighbourhood = BoundingSphere { centre: Vec3::new(1.0, -2.0, 3.0), radius: 8.0 };
-            let mut survival = Survival::of_light(Roulette::Below(0.5), Some(neighbourhood));
+            let within = BoundingSphere { centre: Vec3::new(1.0, -2.0, 3.0), radius: 8.0 };
+            let surroundings = Surroundings { within, free_path };
+            let mut survival = Survival::of_light(Roulette::Below(0.5), Some(surroundings));
             let (mut reached, mut farthest) = (1.0, 8.0_f32);
             for place in places.into_iter().map(Vec3::from) {
                 reached *= survival.probability_at(place);
-                farthest = farthest.max((place - neighbourhood.centre).length());
-                prop_assert!((reached * farthest / 8.0 - 1.0).abs() < 1e-5);
+                farthest = farthest.max((place - within.centre).length());
+                let left = 8.0 / farthest * ((8.0 + free_path) / (farthest + free_path)).sqrt();
+                prop_assert!((reached / left - 1.0).abs() < 1e-5);
             }
-            let mut endless = Survival::of_light(Roulette::Off, Some(neighbourhood));
+            let mut endless = Survival::of_light(Roulette::Off, Some(surroundings));
             prop_assert_eq!(endless.probability_at(Vec3::splat(1e9)), 1.0);
         }
 

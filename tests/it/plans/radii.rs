@@ -77,6 +77,54 @@ fn a_landscape_and_a_microscope_get_the_kernels_that_pixels_ask_for() {
     assert!((0.01..=0.14).contains(&pixels), "{pixels} pixels: {radii:?}");
 }
 
+/// Walks get lost in haze that has no end: what they meet there needs no kernels.
+#[test]
+fn radii_do_not_depend_on_how_far_walks_get() {
+    let at_the_ball = |sigma_s: &str| {
+        let text = r#"(version: 1, outside: "haze", media: { "haze": Homogeneous(sigma_s: SIGMA) },
+            camera: Perspective(origin: (0, 1.6, 4), target: (0, 0.5, 0), fov_degrees: 40),
+            film: (width: 64, height: 48), materials: { "stone": Lambert(0.5), "glass": Dielectric(1.5) },
+            shapes: [
+                (geometry: Quad(origin: (-5, 0, -5), edge_u: (0, 0, 10), edge_v: (10, 0, 0)), material: "stone"),
+                (geometry: Sphere(centre: (0, 0.5, 0), radius: 0.5), material: "glass"),
+            ],
+            lights: [Point(position: (1, 3, 1), intensity: 40)])"#;
+        let scene = ReadyScene::from_ron_str(&text.replace("SIGMA", sigma_s), ".").expect("a valid scene");
+        let radii = plan(&scene, settings()).radii;
+        let there = radii.field.at(Vec3::new(0.0, 0.5, 0.0));
+        println!("{sigma_s}: {radii:?}");
+        [there * radii.surf, there * radii.pb2d, there * radii.bb1d, radii.floor]
+    };
+    let clear = at_the_ball("1e-2");
+    for sigma_s in ["1e-4", "1e-6"] {
+        let thin = at_the_ball(sigma_s);
+        assert!(thin.iter().zip(clear).all(|(thin, clear)| *thin < 2.0 * clear), "{thin:?} and {clear:?}");
+    }
+}
+
+/// Most edges in a room are in the air, where no photons are looked up.
+#[test]
+fn radii_in_a_body_do_not_depend_on_the_room_around_it() {
+    let radii_with = |walls: &str| {
+        let text = r#"(version: 1, media: { "juice": Homogeneous(sigma_s: 12, sigma_a: 0.5) },
+            camera: Perspective(origin: (0, 0.3, 1.5), target: (0, 0, 0), fov_degrees: 60),
+            film: (width: 64, height: 48), materials: { "white": Lambert(0.7), "clear": Null },
+            shapes: [WALLS (geometry: Sphere(centre: (0, 0, 0), radius: 0.25), material: "clear", interior: "juice")],
+            lights: [Point(position: (0.5, 1.2, 0.8), intensity: 5)])"#;
+        let scene = ReadyScene::from_ron_str(&text.replace("WALLS", walls), ".").expect("a valid scene");
+        let settings = Settings { light_paths: LightPaths::Count(50_000), ..settings() };
+        plan(&scene, settings).radii
+    };
+    let wall = "(geometry: Box(min: (-2, -0.3, -2), max: (2, -0.28, 2)), material: \"white\"),
+        (geometry: Quad(origin: (-2, -0.3, -2), edge_u: (4, 0, 0), edge_v: (0, 3, 0)), material: \"white\"),
+        (geometry: Quad(origin: (-2, -0.3, -2), edge_u: (0, 3, 0), edge_v: (0, 0, 4)), material: \"white\"),";
+    let [alone, in_a_room] = ["", wall].map(radii_with);
+    println!("{alone:?}\n{in_a_room:?}");
+    for (alone, in_a_room) in [(alone.pb2d, in_a_room.pb2d), (alone.pp3d, in_a_room.pp3d)] {
+        assert!((0.5..2.0).contains(&(in_a_room / alone)), "{in_a_room} in a room, {alone} alone");
+    }
+}
+
 #[test]
 fn radii_that_are_given_are_the_same_everywhere() {
     let scene = landscape();

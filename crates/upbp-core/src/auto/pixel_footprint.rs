@@ -19,11 +19,11 @@ const NEAR: f32 = 0.25;
 const LEAST_RANGE: f32 = 2.0;
 
 /// The field over `places`, where camera sub-paths meet things first.
-pub(super) fn field(camera: &impl Camera, places: &[Vec3]) -> RadiusField {
+pub(super) fn field(camera: &impl Camera, places: impl Iterator<Item = Vec3>) -> RadiusField {
     let Some(PixelWidth { eye, offset, slope }) = PixelWidth::of(camera) else {
         return RadiusField::Uniform;
     };
-    let mut widths: Vec<f32> = places.iter().map(|place| offset + slope * (*place - eye).length()).collect();
+    let mut widths: Vec<f32> = places.map(|place| offset + slope * (place - eye).length()).collect();
     widths.retain(|width| width.is_finite() && *width > 0.0);
     let Some(typical) = median(&mut widths) else { return RadiusField::Uniform };
     widths.sort_unstable_by(f32::total_cmp);
@@ -33,8 +33,8 @@ pub(super) fn field(camera: &impl Camera, places: &[Vec3]) -> RadiusField {
         eye: eye.to_array(),
         offset: offset / typical,
         slope: slope / typical,
-        least: (least / typical).max(most / typical / FootprintField::RANGE),
-        most: most / typical,
+        least: least / typical,
+        most: most.min(FootprintField::RANGE * least) / typical,
     };
     let field = RadiusField::Footprint(field);
     if most > LEAST_RANGE * least && field.is_valid(0.0) { field } else { RadiusField::Uniform }
@@ -120,20 +120,18 @@ mod tests {
 
     #[test]
     fn radii_follow_where_pixels_differ_and_only_there() {
-        let along = |from: i32, to: i32| -> Vec<Vec3> {
-            (from..to).map(|i| Vec3::new(1.0, 0.0, 0.1 * i as f32)).collect()
-        };
+        let along = |from: i32, to: i32| (from..to).map(|i| Vec3::new(1.0, 0.0, 0.1 * i as f32));
         let camera = Spreading { parallel: 0.0, spread: 0.5 };
-        let field = super::field(&camera, &along(10, 1000));
+        let field = super::field(&camera, along(10, 1000));
         assert!((field.at(Vec3::new(1.0, 0.0, 50.45)) - 1.0).abs() < 0.02, "{field:?}");
         let ratio = field.at(Vec3::new(1.0, 0.0, 90.0)) / field.at(Vec3::new(1.0, 0.0, 30.0));
         assert!((ratio - 3.0).abs() < 0.03, "{field:?}");
         // No less than at the nearer quarter.
         assert!((field.least() - 0.51).abs() < 0.02, "{field:?}");
         assert_eq!(field.at(Vec3::X), field.least());
-        assert_eq!(super::field(&camera, &along(50, 90)), RadiusField::Uniform);
-        assert_eq!(super::field(&camera, &[]), RadiusField::Uniform);
+        assert_eq!(super::field(&camera, along(50, 90)), RadiusField::Uniform);
+        assert_eq!(super::field(&camera, std::iter::empty()), RadiusField::Uniform);
         let orthographic = Spreading { parallel: 1.0, spread: 0.0 };
-        assert_eq!(super::field(&orthographic, &along(10, 1000)), RadiusField::Uniform);
+        assert_eq!(super::field(&orthographic, along(10, 1000)), RadiusField::Uniform);
     }
 }

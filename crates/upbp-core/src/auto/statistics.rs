@@ -5,7 +5,7 @@ use upbp_accel::{PointTree, Ray, Segment, SegmentTree, SplitParams};
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Heuristic};
 use upbp_estimators::observer::{NoObserver, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, Interaction, LightChunk, LightVertex};
-use upbp_estimators::scene::{Camera, CameraRay, Scene};
+use upbp_estimators::scene::{BoundingSphere, Camera, CameraRay, Scene};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
@@ -105,9 +105,10 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
         let most_vertices = room.items::<LightVertex<S::Bsdf, f64, L>>().min(MOST_VERTICES);
         let light = LightPaths::trace::<_, L>(scene, plan, light_paths, most_vertices as f64, halt)?;
         let plan = plan(light.paths);
-        let queries = Queries::trace::<_, L>(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?;
+        let queries = Queries::trace::<_, L>(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?
+            .within(&scene.bounds_with_camera());
         let field = if settings.radii.are_auto(techniques) {
-            pixel_footprint::field(scene.scene.camera(), &queries.first)
+            pixel_footprint::field(scene.scene.camera(), queries.first.iter().map(|seen| seen.place))
         } else {
             RadiusField::Uniform
         };
@@ -219,7 +220,7 @@ impl LightPaths {
         &self,
         plan: &IterationPlan,
         field: RadiusField,
-        mut queries: Queries,
+        queries: Queries,
         scale: f32,
     ) -> Statistics {
         let (paths, beam_paths) = (f64::from(self.paths), f64::from(plan.beam_paths));
@@ -248,8 +249,8 @@ impl LightPaths {
             lanes: None,
             light_path_seconds: self.seconds,
             vertices_per_path: self.photons.len() as f64 / paths,
-            footprint: median(&mut queries.footprints).unwrap_or(0.0),
-            largest_coordinate: largest_coordinate(&queries.first),
+            footprint: queries.footprint(),
+            largest_coordinate: queries.largest_coordinate(),
             radius_field: field,
             surface_per_path: per_path(plan.merges_by(Technique::Surf), false),
             medium_per_path: per_path(plan.stores_medium_photons(), true),
@@ -282,14 +283,6 @@ impl LightPaths {
     }
 }
 
-/// The largest coordinate of all places but the [farthest](FAR).
-fn largest_coordinate(places: &[Vec3]) -> f32 {
-    let mut largest: Vec<f32> = places.iter().map(|place| place.abs().max_element()).collect();
-    largest.sort_unstable_by(f32::total_cmp);
-    let last = largest.len().saturating_sub(1);
-    largest.get(((1.0 - FAR) * last as f32) as usize).copied().unwrap_or(0.0)
-}
-
 /// The photons of the first light sub-paths, and how many sub-paths those are.
 fn first_paths(photons: &[Photon], paths: f64) -> (&[Photon], f64) {
     match photons.get(NEIGHBOURS) {
@@ -310,10 +303,14 @@ struct Queries {
     surfaces: Vec<Vec3>,
     media: Vec<Vec3>,
     edges: Vec<Ray>,
-    /// Places where sub-paths first scatter in more than one direction.
-    first: Vec<Vec3>,
-    /// Widths of pixels there.
-    footprints: Vec<f32>,
+    first: Vec<Seen>,
+}
+
+/// What a pixel sees: where a camera sub-path first scatters in more than one direction.
+struct Seen {
+    place: Vec3,
+    /// Width of the pixel there, scene units.
+    footprint: f32,
 }
 
 /// Writes down the queries of a piece of the work.
@@ -322,13 +319,16 @@ struct QueryRecorder {
     surfaces: Thinned<Vec3, QUERIES_OF_PIECE>,
     media: Thinned<Vec3, QUERIES_OF_PIECE>,
     edges: Thinned<Ray, QUERIES_OF_PIECE>,
-    first: Vec<Vec3>,
-    footprints: Vec<f32>,
+    first: Vec<Seen>,
     last: Vec3,
     /// Length of the sub-path so far.
     travelled: f32,
     /// Width of a pixel per length, until a width is known.
     pixel: Option<f32>,
+    /// Whether the edge at hand, or one before, is in a medium that scatters.
+    in_medium: bool,
+    /// Whether such an edge is written down, and a vertex in a medium.
+    known: [bool; 2],
 }
 
 impl<B> Observer<B> for QueryRecorder {
@@ -338,17 +338,27 @@ impl<B> Observer<B> for QueryRecorder {
         self.last = ray.origin;
         self.travelled = 0.0;
         self.pixel = Some(ray.pdf.sqrt().recip());
+        self.in_medium = false;
+        self.known = [false; 2];
+    }
+
+    fn call(&mut self, technique: Technique, _: u32) {
+        self.in_medium |= matches!(technique, Technique::Pb2d | Technique::Bb1d);
     }
 
     fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
         match vertex.interaction {
             Interaction::Surface(_) if !vertex.delta => self.surfaces.push(vertex.position),
             Interaction::Surface(_) => {}
-            Interaction::Medium(_) => self.media.push(vertex.position),
+            Interaction::Medium(_) if !std::mem::replace(&mut self.known[1], true) => {
+                self.media.push(vertex.position);
+            }
+            Interaction::Medium(_) => {}
         }
         let between = vertex.position - self.last;
         let length = between.length();
-        if length > 0.0 && length.is_finite() {
+        let is_first = self.in_medium && !std::mem::replace(&mut self.known[0], self.in_medium);
+        if is_first && length > 0.0 && length.is_finite() {
             self.edges.push(Ray {
                 origin: self.last,
                 direction: between / length,
@@ -359,11 +369,10 @@ impl<B> Observer<B> for QueryRecorder {
         self.last = vertex.position;
         self.travelled += length;
         if !vertex.delta
-            && let Some(width) = self.pixel.take().map(|pixel| pixel * self.travelled)
-            && width.is_finite()
+            && let Some(footprint) = self.pixel.take().map(|pixel| pixel * self.travelled)
+            && footprint.is_finite()
         {
-            self.footprints.push(width);
-            self.first.push(vertex.position);
+            self.first.push(Seen { place: vertex.position, footprint });
         }
     }
 }
@@ -385,18 +394,53 @@ impl Queries {
             media.push(piece.media);
             edges.push(piece.edges);
             queries.first.extend(piece.first);
-            queries.footprints.extend(piece.footprints);
         }
-        queries.surfaces = measured(surfaces);
-        queries.media = measured(media);
-        queries.edges = measured(edges);
+        queries.surfaces = Thinned::joined(surfaces);
+        queries.media = Thinned::joined(media);
+        queries.edges = Thinned::joined(edges);
         Some(queries)
+    }
+
+    /// The queries within a sphere, at most [`QUERIES`] of each kind; all of a kind of which there are none.
+    ///
+    /// Walks get far out in a medium around the scene, where photons are rare and nothing needs any: radii
+    /// that suit them would blur the scene.
+    fn within(self, BoundingSphere { centre, radius }: &BoundingSphere) -> Self {
+        let is_within = |place: Vec3| place.distance(*centre) <= *radius;
+        Self {
+            surfaces: measured(those(self.surfaces, |place| is_within(*place))),
+            media: measured(those(self.media, |place| is_within(*place))),
+            edges: measured(those(self.edges, |edge| {
+                is_within(edge.origin) || is_within(edge.at(edge.t_max))
+            })),
+            first: those(self.first, |seen| is_within(seen.place)),
+        }
+    }
+
+    /// The median width of a pixel.
+    fn footprint(&self) -> f32 {
+        median(&mut self.first.iter().map(|seen| seen.footprint).collect::<Vec<_>>()).unwrap_or(0.0)
+    }
+
+    /// The largest coordinate of all that is seen but the [farthest](FAR).
+    fn largest_coordinate(&self) -> f32 {
+        let mut largest: Vec<f32> = self.first.iter().map(|seen| seen.place.abs().max_element()).collect();
+        largest.sort_unstable_by(f32::total_cmp);
+        let last = largest.len().saturating_sub(1);
+        largest.get(((1.0 - FAR) * last as f32) as usize).copied().unwrap_or(0.0)
     }
 }
 
-/// At most [`QUERIES`] elements of all lists, evenly.
-fn measured<T>(lists: Vec<Thinned<T, QUERIES_OF_PIECE>>) -> Vec<T> {
-    let all = Thinned::joined(lists);
+/// The elements that `are_wanted`, or all if none is.
+fn those<T>(mut all: Vec<T>, are_wanted: impl Fn(&T) -> bool) -> Vec<T> {
+    if all.iter().any(&are_wanted) {
+        all.retain(are_wanted);
+    }
+    all
+}
+
+/// At most [`QUERIES`] elements, evenly.
+fn measured<T>(all: Vec<T>) -> Vec<T> {
     let step = all.len().div_ceil(QUERIES).max(1);
     all.into_iter().step_by(step).collect()
 }

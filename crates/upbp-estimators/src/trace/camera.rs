@@ -64,7 +64,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     };
 
     let mut travelled = 0.0;
-    let mut survival = Survival::of_camera(plan.roulette, prepared.neighbourhood());
+    let mut survival = Survival::of_camera(plan.roulette, prepared.surroundings());
     let hero = L::draw(&plan.mis.lanes, || stream.uniform());
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;

@@ -43,7 +43,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
     let Some(mut flight) = emit(context, index, &mut stream, &mut out.counters, observer) else { return };
     let scene = prepared.scene;
-    let mut survival = Survival::of_light(plan.roulette, prepared.neighbourhood());
+    let mut survival = Survival::of_light(plan.roulette, prepared.surroundings());
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
     let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
