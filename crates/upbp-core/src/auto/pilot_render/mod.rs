@@ -117,6 +117,8 @@ pub(super) struct PilotRender {
 /// Merges with one light sub-path, or splats of one, at a pixel of a cell and at another one near it.
 pub(super) struct Shared {
     pub(super) cell: u32,
+    /// Number of the light sub-path.
+    pub(super) path: u32,
     /// Part of their product in the mean error of blocks.
     pub(super) weight: f64,
     /// Samples of the one pixel and of the other.
@@ -325,12 +327,13 @@ impl PilotRender {
             near.sort_by_key(|sample| sample.merged);
             let by_path = |a: &Sample, b: &Sample| a.merged == b.merged;
             let own = &self.samples[self.range(cell, 0)];
-            for group in near.chunk_by(by_path).filter(|group| group[0].merged.is_some()) {
+            for group in near.chunk_by(by_path) {
+                let Some(path) = group[0].merged else { continue };
                 let start = own.partition_point(|sample| sample.merged < group[0].merged);
                 let length = own[start..].partition_point(|sample| sample.merged == group[0].merged);
                 if length > 0 {
                     let samples = [own[start..start + length].to_vec(), group.to_vec()];
-                    self.shared.push(Shared { cell: cell as u32, weight, samples });
+                    self.shared.push(Shared { cell: cell as u32, path, weight, samples });
                 }
             }
         }
@@ -394,13 +397,13 @@ impl Pass {
         let splats: usize = pieces.iter().map(|(recorder, _)| recorder.samples.len()).sum();
         let step = splats.div_ceil(ASKED_SPLATS).max(1);
         let (mut vertices, mut beams) = (Vec::new(), Vec::new());
-        for (recorder, out) in pieces {
+        for (piece, (recorder, out)) in pieces.into_iter().enumerate() {
             vertices.extend(out.vertices);
             beams.extend(out.beams);
             pass.counters.add(&out.counters);
             if with_partners {
-                let first = pass.splats.len();
-                pass.shared_splats.extend(shared_splats(&recorder, &out.splats, first, step, grid));
+                let firsts = [piece * PIECE, pass.splats.len()];
+                pass.shared_splats.extend(shared_splats(&recorder, &out.splats, firsts, step, grid));
             }
             // A splat goes with each sample.
             let cells = out.splats.iter().map(|splat| grid.cell(splat.pixel));
@@ -441,16 +444,17 @@ impl Pass {
 }
 
 /// Pairs of splats of one light sub-path at pixels of one block: every splat in `step` with another one,
-/// which is drawn and stands for all others. The first splat is the `first` one of its pass.
+/// which is drawn and stands for all others. Light sub-path and splat that come first have these numbers in
+/// their pass.
 fn shared_splats<'a>(
     recorder: &'a Recorder,
     splats: &'a [Splat],
-    first: usize,
+    [first_path, first]: [usize; 2],
     step: usize,
     grid: &'a Grid,
 ) -> impl Iterator<Item = Shared> + 'a {
     let per_pixel = f64::from(grid.cells()) / grid.pixels();
-    let of_path = move |range: Range<usize>| {
+    let of_path = move |(path, range): (usize, Range<usize>)| {
         let count = range.len();
         let start = range.start;
         let asked = range.filter(move |own| count > 1 && (first + own).is_multiple_of(step));
@@ -461,12 +465,13 @@ fn shared_splats<'a>(
             let weight = per_pixel * others * blocks::weight([to[0] - from[0], to[1] - from[1]]);
             (weight > 0.0).then(|| Shared {
                 cell: grid.cell(splats[own].pixel),
+                path: (first_path + path) as u32,
                 weight,
                 samples: [own, other].map(|i| vec![recorder.samples[i]]),
             })
         })
     };
-    recorder.ranges().flat_map(of_path)
+    recorder.ranges().enumerate().flat_map(of_path)
 }
 
 #[cfg(test)]
@@ -512,7 +517,7 @@ mod tests {
             let draws = 30_000;
             let mut found = 0.0;
             for first in 0..draws {
-                for shared in shared_splats(&recorder, &splats, first, step, &grid) {
+                for shared in shared_splats(&recorder, &splats, [0, first], step, &grid) {
                     let [own, other] = shared.samples.each_ref().map(|samples| f64::from(samples[0].value.x));
                     found += shared.weight * own * other / draws as f64;
                 }

@@ -157,12 +157,13 @@ impl Variance {
         std::array::from_fn(|group| finite_or_infinite((variance[group] + charges[group]) * more))
     }
 
-    /// Variances of blocks without what rare paths are charged for, and those charges.
+    /// Variances of blocks without what rare paths are charged for, and those charges. What pixels have in
+    /// common is grouped by light sub-path: all cells meet the same ones.
     fn over_scales_with(&self, counts: &Counts) -> [[f64; GROUPS]; 2] {
         let [mut variance, charges] = self.parts(counts);
         let view = View::new(&self.pilot, &self.looks, counts);
         for shared in &self.pilot.shared {
-            variance[group(shared.cell as usize)] += view.in_common(shared) / self.pilot.cells as f64;
+            variance[group(shared.path as usize)] += view.in_common(shared) / self.pilot.cells as f64;
         }
         [variance, charges]
     }
@@ -181,7 +182,7 @@ impl Variance {
         for cell in 0..pilot.cells {
             groups[group(cell)].add(&self.of_cell(cell, &mut view, &mut doubt));
         }
-        let mut variance = groups.map(|moments| moments.variance(counts.light_paths) / pilot.cells as f64);
+        let mut variance = variances(&groups, counts.light_paths).map(|sum| sum / pilot.cells as f64);
         let mean_photons = mean_photons(pilot);
         for (cell, splat) in &pilot.splats {
             let group = group(*cell as usize);
@@ -240,14 +241,28 @@ impl Moments {
         self.mean_square += more.mean_square;
     }
 
-    /// The variance. As the difference of noisy numbers it may be anything, but not less than if nothing was
-    /// due to camera sub-paths: that of independent light sub-paths is their second moment less the square of
-    /// the mean over their number, and pairs only add to it.
-    fn variance(&self, light_paths: f64) -> f64 {
-        let of_light = self.light - self.mean_square / light_paths;
-        let least = LEAST_PART * (self.single - self.light) + of_light;
-        (self.single + self.pairs - self.mean_square).max(least).max(LEAST_PART * self.single)
+    /// The variance, a difference of noisy numbers.
+    fn variance(&self) -> f64 {
+        self.single + self.pairs - self.mean_square
     }
+
+    /// The least that the variance may be, as if nothing was due to camera sub-paths: that of independent
+    /// light sub-paths is their second moment less the square of the mean over their number, and pairs only
+    /// add to it.
+    fn least_variance(&self, light_paths: f64) -> f64 {
+        let of_light = self.light - self.mean_square / light_paths;
+        (LEAST_PART * (self.single - self.light) + of_light).max(LEAST_PART * self.single)
+    }
+}
+
+/// Variances of groups, whose sum is no less than it may be. Not each for itself: where a plan has many times
+/// the photons of the pilot render, the noise of a group is larger than its variance, and if groups could only
+/// be too large, so would be their sum.
+fn variances(groups: &[Moments; GROUPS], light_paths: f64) -> [f64; GROUPS] {
+    let mut all = Moments::default();
+    groups.iter().for_each(|group| all.add(group));
+    let missing = (all.least_variance(light_paths) - all.variance()).max(0.0);
+    groups.map(|group| group.variance() + missing / GROUPS as f64)
 }
 
 /// Charges for samples that a plan finds rarely, and how much they are to be believed.
@@ -277,9 +292,9 @@ impl Doubt {
     }
 }
 
-/// Groups are spread over the picture.
-const fn group(cell: usize) -> usize {
-    ((cell as u32).wrapping_mul(2_654_435_761) >> 29) as usize
+/// The group of a cell, or of a light sub-path: spread over the picture, and over all of them.
+const fn group(number: usize) -> usize {
+    ((number as u32).wrapping_mul(2_654_435_761) >> 29) as usize
 }
 
 impl PilotRender {

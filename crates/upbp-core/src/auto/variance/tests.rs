@@ -219,6 +219,70 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
     }
 }
 
+/// Where a pilot render has few photons, groups of cells vary by more than what they are to tell, also below
+/// nothing. What is too little is so in the sum.
+#[test]
+fn the_variance_of_noisy_groups_is_that_of_their_sum() {
+    let of_groups = |mean_pairs: f64| {
+        let moments = |i: usize| {
+            let noise = if i.is_multiple_of(2) { 0.5 } else { -0.5 };
+            let pairs = mean_pairs + noise;
+            Moments { single: 0.2, light: 0.2, pairs, mean_square: 0.1 }
+        };
+        variances(&std::array::from_fn(moments), 2.0)
+    };
+    let sum = |mean_pairs| of_groups(mean_pairs).iter().sum::<f64>() / GROUPS as f64;
+    // More than the least, 0.2 − 0.1/2.
+    assert!((sum(0.3) - 0.4).abs() < 1e-12);
+    assert!((sum(0.06) - 0.16).abs() < 1e-12);
+    for too_little in [0.04, -0.2] {
+        assert!((sum(too_little) - 0.15).abs() < 1e-12);
+        let [a, b, ..] = of_groups(too_little);
+        assert!((a - b - 1.0).abs() < 1e-12, "the noise stays to be seen");
+    }
+}
+
+/// All cells of a pilot render meet the same light sub-paths, so that cells do not tell how much what they
+/// find depends on these.
+#[test]
+fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
+    const PATHS: u32 = 256;
+    const PILOTS: u32 = 200;
+    const CELLS: u32 = 50;
+    let mut shares = [0.0; TECHNIQUES];
+    shares[Technique::Bb1d as usize] = 1.0;
+    let (mut sums, mut errors) = (Vec::new(), 0.0);
+    for number in 0..PILOTS {
+        let mut pilot = PilotRender { plan: planned(1000), ..pilot() };
+        for path in 0..PATHS {
+            // Some are brighter than others.
+            let value = Vec3::splat((-uniform(path as usize, number).ln()).sqrt() as f32);
+            let sample =
+                Sample { technique: Technique::Bb1d, merged: Some(path), albedos: 1.0, value, shares };
+            pilot.shared.extend((0..CELLS).map(|cell| Shared {
+                cell: 300 * cell + path,
+                path,
+                weight: 1.0,
+                samples: [vec![sample], vec![sample]],
+            }));
+        }
+        let plan = Plan { techniques: TechniqueSet::VOLUME_MERGES, ..planned(1000) };
+        let prediction = Variance::of(pilot);
+        let [pixels, all] = [prediction.relative(&plan), prediction.over_scales(&plan)];
+        let shared: [f64; GROUPS] = std::array::from_fn(|group| all[group] - pixels[group]);
+        let n = GROUPS as f64;
+        let sum: f64 = shared.iter().sum();
+        errors += n / (n - 1.0) * shared.iter().map(|part| (part - sum / n).powi(2)).sum::<f64>();
+        sums.push(sum);
+    }
+    let n = f64::from(PILOTS);
+    let mean = sums.iter().sum::<f64>() / n;
+    let variance = sums.iter().map(|sum| (sum - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let ratio = errors / n / variance;
+    println!("{mean} +- {}, variances told over true ones {ratio}", variance.sqrt());
+    assert!((0.7..1.4).contains(&ratio), "variances told over true ones: {ratio}");
+}
+
 /// A pilot render that has few photons, and by chance of as much from pass to pass as if they did not vary,
 /// does not make them vary less than independent ones.
 #[test]
@@ -429,8 +493,12 @@ fn variances_of_blocks_contain_what_pixels_share() {
         if look.is_multiple_of(PASSES)
             && let Some((_, weight)) = grid.partner(look / PASSES)
         {
-            let shared =
-                |sample| Shared { cell: look / PASSES, weight, samples: [vec![sample], vec![sample]] };
+            let shared = |sample: Sample| Shared {
+                cell: look / PASSES,
+                path: sample.merged.unwrap_or(0),
+                weight,
+                samples: [vec![sample], vec![sample]],
+            };
             pilot.shared.extend(seen.map(shared));
         }
     }
@@ -470,7 +538,7 @@ proptest! {
         }
         let pilot = PilotRender { thinning, samples: Vec::new(), ends: Vec::new(), cells: 0, ..pilot() };
         let looks = sample_pairs::Looks::new(&pilot);
-        let shared = Shared { cell: 0, weight, samples: [own, other] };
+        let shared = Shared { cell: 0, path: 0, weight, samples: [own, other] };
         let found = View::new(&pilot, &looks, &counts).in_common(&shared);
         prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
     }
