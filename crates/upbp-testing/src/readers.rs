@@ -96,7 +96,7 @@ fn replace_between(bytes: &[u8], start: &[u8], end: &[u8], new: &[u8]) -> Vec<u8
 /// A changed state file with a good beginning, lengths and checksums: else nothing behind them would ever be
 /// reached.
 pub fn sealed(bytes: &[u8]) -> Vec<u8> {
-    let mut sealed = b"UPBPSTAT\x08\0\0\0".to_vec();
+    let mut sealed = b"UPBPSTAT\x09\0\0\0".to_vec();
     let mut checksum = 0xcbf2_9ce4_8422_2325_u64;
     let mut rest = bytes.get(12..).unwrap_or_default();
     while let Some((length, tail)) = rest.split_first_chunk() {

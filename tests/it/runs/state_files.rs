@@ -102,7 +102,7 @@ fn sizes_in_a_header_cost_no_memory() {
 
     let huge = header
         .replace("film:(5,5)", "film:(4294967295,4294967295)")
-        .replace("part:(x:0,y:0,width:5,height:5)", "part:(x:0,y:0,width:4294967295,height:4294967295)");
+        .replace("crop:(x:0,y:0,width:5,height:5)", "crop:(x:0,y:0,width:4294967295,height:4294967295)");
     assert_ne!(huge, header);
     let error = State::read(forged(&huge).as_slice()).expect_err("no sums follow");
     assert!(error.to_string().contains("row 0 of 4294967295"), "{error}");
@@ -113,15 +113,15 @@ fn sizes_in_a_header_cost_no_memory() {
     assert!(State::read(bytes.as_slice()).expect_err("a cut file").to_string().contains("ends here"));
 
     for (from, to) in [
-        ("part:(x:0,y:0,width:5,height:5)", "part:(x:1,y:0,width:5,height:5)"),
-        ("part:(x:0,y:0,width:5,height:5)", "part:(x:4294967295,y:0,width:5,height:5)"),
-        ("part:(x:0,y:0,width:5,height:5)", "part:(x:0,y:0,width:0,height:5)"),
+        ("crop:(x:0,y:0,width:5,height:5)", "crop:(x:1,y:0,width:5,height:5)"),
+        ("crop:(x:0,y:0,width:5,height:5)", "crop:(x:4294967295,y:0,width:5,height:5)"),
+        ("crop:(x:0,y:0,width:5,height:5)", "crop:(x:0,y:0,width:0,height:5)"),
         ("[(0,2),(7,8)]", "[(7,8),(0,2)]"),
         ("[(0,2),(7,8)]", "[(0,99999999999)]"),
-        ("parts:{}", "parts:{7:1}"),
-        ("parts:{}", "parts:{3:0}"),
-        ("parts:{}", "parts:{3:256}"),
-        ("parts:{}", "parts:{99999999999:1}"),
+        ("begun:{}", "begun:{7:1}"),
+        ("begun:{}", "begun:{3:0}"),
+        ("begun:{}", "begun:{3:256}"),
+        ("begun:{}", "begun:{99999999999:1}"),
         ("seed:0", "seed:-1"),
         ("seed:0", "seeds:0"),
     ] {
@@ -130,6 +130,21 @@ fn sizes_in_a_header_cost_no_memory() {
         let error = State::read(forged(&changed).as_slice()).expect_err(to);
         assert!(error.to_string().contains("header"), "{to}: {error}");
     }
+}
+
+#[test]
+fn a_state_of_other_samples_is_refused() {
+    let room = upbp_testing::room(5);
+    let mut renderer = renderer(&room);
+    let own = renderer.state().identity().samples;
+    let other = header().replace(&format!("samples:{own},"), &format!("samples:{},", own + 1));
+    assert_ne!(other, header());
+    let rows = &good()[16 + header().len()..];
+    let state = State::read(sealed(&[&good()[..16], other.as_bytes(), rows].concat()).as_slice());
+    let error = renderer.resume(state.expect("a whole state")).expect_err("other samples").to_string();
+    let expected = format!("version of samples is {own} in one and {} in the other", own + 1);
+    assert!(error.contains(&expected), "{error}");
+    assert!(renderer.film().is_empty());
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::error::RenderError;
 use crate::film::{Film, Image};
 use crate::plan::FrozenPlan;
 use crate::settings::CheckedSettings;
-use crate::state::{Identity, PassTimes, Record, State};
+use crate::state::{Identity, PassTimes, Record, SAMPLES, State};
 
 /// A render that has not begun.
 pub(super) struct Prepared<'a> {
@@ -75,10 +75,11 @@ pub(super) fn prepare<'a, S: Scene>(
     let choice = auto::choose(&mut prepared, &settings, plan, &mut budget)?;
     let identity = Identity {
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        samples: SAMPLES,
         scene: String::new(),
         fingerprint: String::new(),
         film: scene.camera().resolution(),
-        part: rect,
+        crop: rect,
         settings: settings.into_inner(),
         support: choice.support,
         plan: choice.plan,

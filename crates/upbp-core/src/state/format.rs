@@ -30,7 +30,7 @@ use crate::film::{IterationSet, MAX_ITERATIONS};
 const MAGIC: [u8; 8] = *b"UPBPSTAT";
 
 /// Version of the format.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 
 /// The longest header, bytes: room for millions of emitters to choose from, and of ranges of iterations.
 const MAX_HEADER: u64 = 1 << 28;
@@ -42,7 +42,7 @@ struct Header {
     identity: Identity,
     iterations: IterationSet,
     /// Iterations that are there in part, with the number of sets of pixels that are.
-    parts: BTreeMap<u64, u32>,
+    begun: BTreeMap<u64, u32>,
     record: Record,
 }
 
@@ -91,7 +91,7 @@ impl State {
         let header = Header {
             identity: self.identity.clone(),
             iterations: self.film.iteration_set().clone(),
-            parts: self.film.parts().clone(),
+            begun: self.film.parts().clone(),
             record: self.record.clone(),
         };
         let text = ron::to_string(&header).map_err(io::Error::other)?;
@@ -104,7 +104,7 @@ impl State {
         let mut checksum = Checksum::new();
         write_block(&mut to, &mut checksum, text.as_bytes())?;
         let mut bytes = Vec::new();
-        for row in 0..self.identity.part.height as usize {
+        for row in 0..self.identity.crop.height as usize {
             self.film.encode_row(row, &mut bytes);
             write_block(&mut to, &mut checksum, &bytes)?;
         }
@@ -128,25 +128,25 @@ impl State {
         let mut checksum = Checksum::new();
         let header = read_block(&mut from, &mut checksum, MAX_HEADER, "header")?;
         let text = str::from_utf8(&header).map_err(|error| damaged("header", &error))?;
-        let Header { identity, iterations, parts, record } =
+        let Header { identity, iterations, begun, record } =
             ron::from_str(text).map_err(|error| damaged("header", &error))?;
 
-        let rect = identity.part;
+        let rect = identity.crop;
         let inside = |start: u32, size: u32, whole: u32| {
             size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
         };
         if !inside(rect.x, rect.width, identity.film.0) || !inside(rect.y, rect.height, identity.film.1) {
             return Err(damaged("header", &"the crop is not inside of the film"));
         }
-        let numbers = iterations.len() + parts.len() as u64;
-        for (iteration, done) in &parts {
+        let numbers = iterations.len() + begun.len() as u64;
+        for (iteration, done) in &begun {
             let whole = iterations.count_in(&(*iteration..iteration.saturating_add(1))) > 0;
             if *iteration >= MAX_ITERATIONS || whole || !(1..SETS).contains(done) {
                 return Err(damaged("header", &format!("no part of an iteration: {iteration}, {done} sets")));
             }
         }
         let mut film =
-            Film::without_sums(rect, identity.plan.techniques, identity.settings.features, iterations, parts);
+            Film::without_sums(rect, identity.plan.techniques, identity.settings.features, iterations, begun);
         let longest = u64::from(rect.width) * (film.all_mut().count() * MAX_ENCODED) as u64;
         for row in 0..rect.height {
             let what = || format!("row {row} of {}", rect.height);

@@ -13,6 +13,10 @@ use crate::radius_schedule::RadiusSchedule;
 use crate::settings::Settings;
 use crate::state::fingerprint;
 
+/// Version of what an iteration samples. Raised by a change that alters images, so that states of code before
+/// and after it are not mixed.
+pub(crate) const SAMPLES: u32 = 1;
+
 /// The identity of a render: whatever its iterations depend on, besides their index.
 ///
 /// The plan is part of it: so slices from machines whose mathematical functions differ in the last bit, and
@@ -21,6 +25,8 @@ use crate::state::fingerprint;
 pub struct Identity {
     /// Version of the renderer.
     pub version: String,
+    /// Version of what an iteration samples: renderers of one version may differ in it between releases.
+    pub samples: u32,
     /// Name of the scene, for people: it may differ.
     pub scene: String,
     /// Fingerprint of the scene's content; empty if the host gave none.
@@ -28,7 +34,7 @@ pub struct Identity {
     /// Width and height of the whole film in pixels.
     pub film: (u32, u32),
     /// The part of the film that is rendered.
-    pub part: PixelRect,
+    pub crop: PixelRect,
     /// Settings as they were given.
     pub settings: Settings,
     /// Techniques that the scene can use.
@@ -63,7 +69,7 @@ impl Identity {
 
     /// Names and values of whatever counts beside the plan, as text: the shortest decimals of two different
     /// numbers differ.
-    fn fields(&self) -> [(&'static str, String); 12] {
+    fn fields(&self) -> [(&'static str, String); 13] {
         let Settings {
             seed,
             min_length,
@@ -85,9 +91,10 @@ impl Identity {
             memory: _,
         } = &self.settings;
         let (width, height) = self.film;
-        let PixelRect { x, y, width: columns, height: rows } = self.part;
+        let PixelRect { x, y, width: columns, height: rows } = self.crop;
         [
             ("version", self.version.clone()),
+            ("version of samples", self.samples.to_string()),
             ("scene", if self.fingerprint.is_empty() { "unnamed".into() } else { self.fingerprint.clone() }),
             ("film", format!("{width} x {height}")),
             ("crop", format!("{columns} x {rows} at ({x}, {y})")),
@@ -153,10 +160,11 @@ mod tests {
     fn identity() -> Identity {
         Identity {
             version: "1.2.3".into(),
+            samples: 4,
             scene: "room".into(),
             fingerprint: "ab".into(),
             film: (40, 30),
-            part: PixelRect { x: 0, y: 0, width: 40, height: 30 },
+            crop: PixelRect { x: 0, y: 0, width: 40, height: 30 },
             settings: Settings::default(),
             support: TechniqueSupport {
                 techniques: TechniqueSet::STANDARD,
@@ -181,11 +189,12 @@ mod tests {
             i.emitters = ron::from_str(&text).unwrap();
         };
         let field = FootprintField { eye: [0.0; 3], offset: 1.0, slope: 0.01, least: 0.5, most: 2.0 };
-        let changes: [Change<'_>; 30] = [
+        let changes: [Change<'_>; 31] = [
             ("version", &|i| i.version = "1.2.4".into()),
+            ("version of samples", &|i| i.samples = 5),
             ("scene", &|i| i.fingerprint = "cd".into()),
             ("film", &|i| i.film.0 = 41),
-            ("crop", &|i| i.part.y = 1),
+            ("crop", &|i| i.crop.y = 1),
             ("seed", &|i| i.settings.seed = 1),
             ("min_length", &|i| i.settings.min_length = 2),
             ("max_length", &|i| i.settings.max_length = 100),

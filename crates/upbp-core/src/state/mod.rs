@@ -11,6 +11,7 @@ mod record;
 use std::path::Path;
 
 pub use identity::Identity;
+pub(crate) use identity::SAMPLES;
 pub use record::{ErrorPoint, ErrorSeries, PassSeconds};
 pub(crate) use record::{PassTimes, Record};
 
