@@ -364,15 +364,20 @@ impl Film {
     /// some pixel has samples of one half only.
     #[must_use]
     pub fn halves(&self) -> Option<[Image; 2]> {
+        /// Part of a sum above all that cutting off leaves, which is some 2⁻³⁵.
+        const CUT: f64 = 1.0 / (1_u64 << 30) as f64;
         if self.counts().as_flattened().contains(&0.0) {
             return None;
         }
         let even = self.collect(|i, [even, _]| exact_sum::values(&self.even[i]).map(|v| v / even));
         let odd = self.collect(|i, [_, odd]| {
             let (total, even) = (self.total(i), exact_sum::values(&self.even[i]));
-            // Sums are cut off far below their last digits in single precision: so may be their difference,
-            // below zero.
-            std::array::from_fn(|c| ((total[c] - even[c]) / odd).max(0.0))
+            // The layers and their total are cut off at different digits: a remainder as small as that may be
+            // of either sign, and is no light that the odd iterations have seen.
+            std::array::from_fn(|c| {
+                let rest = total[c] - even[c];
+                if rest > CUT * total[c] { rest / odd } else { 0.0 }
+            })
         });
         Some([even, odd])
     }

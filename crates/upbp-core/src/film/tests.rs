@@ -69,6 +69,19 @@ fn means_and_halves_are_those_of_the_iterations() {
     assert!((shares[0].1 - 0.75).abs() < 1e-12);
 }
 
+/// Sums of layers and of the whole are cut off at different digits: that is no light.
+#[test]
+fn a_half_has_no_light_that_the_other_alone_has_seen() {
+    let mut film = Film::new(RECT, TechniqueSet::STANDARD);
+    film.add(0, &[pixel(5.0, 5e-5), pixel(5.0, 5e-5)]);
+    film.add(1, &[Pixel::BLACK, pixel(0.0, 1e-6)]);
+    let [even, odd] = film.halves().unwrap();
+    assert!(even.pixels[0].iter().all(|v| *v > 5.0));
+    assert_eq!(odd.pixels[0], [0.0; 3]);
+    // A little light is some.
+    assert!(odd.pixels[1].iter().all(|v| (v / 1e-6 - 1.0).abs() < 1e-3), "{:?}", odd.pixels[1]);
+}
+
 #[test]
 fn parts_add_up_to_the_whole() {
     let rect = PixelRect { x: 1, y: 2, width: 19, height: 17 };
