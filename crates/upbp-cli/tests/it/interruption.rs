@@ -187,30 +187,6 @@ fn rendering(folder: &Path) -> Child {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_second_signal_ends_at_once() {
-    let folder = prepared("second");
-    // Iterations that take long, and a cancellation that has to wait for a row of pixels.
-    let scene = SMALL.replace("width: 8", "width: 4000").replace("sigma_s: 0.5", "sigma_s: (500, 500, 500)");
-    fs::write(folder.join("scene.ron"), scene).expect("a writable folder");
-    let mut child = rendering(&folder);
-    let before = used(&child);
-    signal(&child, "TERM");
-    signal(&child, "INT");
-    while child.try_wait().expect("a status").is_none() {
-        if used(&child) > before + 20.0 {
-            child.kill().expect("it runs still");
-            panic!("it goes on");
-        }
-        sleep(Duration::from_millis(5));
-    }
-    let (code, text) = end(&child.wait_with_output().expect("it has ended"));
-    // Both may arrive as one, or the first may have been enough.
-    assert!(matches!(code, Some(130 | 75)), "{code:?}: {text}");
-    assert_eq!(unfinished(&folder), 0);
-}
-
-#[cfg(target_os = "linux")]
-#[test]
 fn a_second_signal_while_it_writes_leaves_nothing_unfinished() {
     let folder = prepared("writing");
     // Enough pixels for a file to be seen while it is written.
