@@ -136,16 +136,6 @@ impl Film {
         self.layers.iter().map(|(layer, _)| *layer)
     }
 
-    /// The sums of a layer, which is kept from now on.
-    fn keep_layer(&mut self, layer: Layer) -> &mut Vec<Sum3> {
-        let at = self.layers.binary_search_by_key(&(layer as usize), |(own, _)| *own as usize);
-        let at = at.unwrap_or_else(|at| {
-            self.layers.insert(at, (layer, black(self.rect)));
-            at
-        });
-        &mut self.layers[at].1
-    }
-
     /// Number of iterations that are there as a whole.
     #[must_use]
     pub fn iterations(&self) -> u64 {
@@ -259,23 +249,14 @@ impl Film {
         pixels.chunks(width).zip(others).map(row).collect()
     }
 
-    /// Adds another film of the same size that holds other iterations.
+    /// Adds another film of the same size and layers that holds other iterations.
     pub(crate) fn merge(&mut self, other: &Self) {
         debug_assert_eq!(self.rect, other.rect);
+        debug_assert!(self.layers().eq(other.layers()));
         debug_assert_eq!(self.overlap(other), None);
-        let merge = |own: &mut [Sum3], others: &[Sum3]| {
+        for (own, others) in self.all_mut().zip(other.all()) {
             own.par_iter_mut().zip(others).for_each(|(own, other)| exact_sum::merge(own, other));
-        };
-        for (layer, sums) in &other.layers {
-            merge(self.keep_layer(*layer), sums);
         }
-        merge(&mut self.even, &other.even);
-        self.seen.iter_mut().zip(&other.seen).for_each(|(own, others)| merge(own, others));
-        merge(&mut self.squares, &other.squares);
-        let features = self.features.iter_mut().flat_map(FeatureSums::all_mut);
-        features
-            .zip(other.features.iter().flat_map(FeatureSums::all))
-            .for_each(|(own, others)| merge(own, others));
         self.iterations.union(&other.iterations);
         self.parts.extend(&other.parts);
     }

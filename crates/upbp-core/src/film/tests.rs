@@ -139,18 +139,6 @@ fn parts_are_merged_into_their_halves() {
 }
 
 #[test]
-fn merged_films_have_the_layers_of_both() {
-    let (mut a, mut b) = (Film::new(RECT, TechniqueSet::BPT), Film::new(RECT, TechniqueSet::VOLUME_MERGES));
-    a.add(0, &[pixel(1.0, 0.0); 2]);
-    b.add(1, &[pixel(0.0, 3.0); 2]);
-    a.merge(&b);
-    assert_eq!((a.layers().len(), a.image().pixels[1]), (5, [2.0; 3]));
-    let mut all = Film::new(RECT, TechniqueSet::BPT.with(upbp_estimators::Technique::Surf));
-    all.merge(&b);
-    assert_eq!(all.layers().collect::<Vec<_>>(), Layer::ALL);
-}
-
-#[test]
 fn small_additions_do_not_stall() {
     let mut film = Film::new(PixelRect { x: 0, y: 0, width: 1, height: 1 }, TechniqueSet::BPT);
     for i in 0..200_000 {
