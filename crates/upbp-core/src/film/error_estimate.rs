@@ -24,6 +24,9 @@ const REACH: usize = 2;
 /// Side of the blocks of which 3 × 3 make a coarse window: with rare light, one sample in a hundred, its
 /// mean is of six.
 const BLOCK: usize = 8;
+/// Side of the blocks that tell how far neighbours share errors: two of those, about as wide as the widest
+/// kernels.
+const SHARING: usize = 2 * BLOCK;
 /// Part of the pixels that are the tail.
 const TAIL: f64 = 0.01;
 /// Part of the errors by pixels that one half alone has seen, from which on light is rare.
@@ -89,6 +92,8 @@ pub struct ErrorMap {
     upper: Vec<f32>,
     /// Whether both halves have seen light there.
     seen_twice: Vec<bool>,
+    /// Number of pixels that share an error: 1 where errors of neighbours are independent, else more.
+    sharing: f64,
     iterations: u64,
     black: bool,
 }
@@ -113,15 +118,17 @@ impl ErrorMap {
         }
         let lit = |half: &HalfImage<'_>, i: usize| half.image[i] != [0.0; 3];
         let seen_twice = (0..pixels).map(|i| halves.iter().all(|half| lit(half, i))).collect();
-        Self { relative, upper, seen_twice, iterations, black }
+        let sharing = pair.sharing(&relative);
+        Self { relative, upper, seen_twice, sharing, iterations, black }
     }
 
     /// The estimate for the whole image.
     #[must_use]
     pub fn estimate(&self) -> ErrorEstimate {
         let mean = |[r, g, b]: &[f32; 3]| to_f32((f64::from(*r) + f64::from(*g) + f64::from(*b)) / 3.0);
-        let (relative_mse, below) = mean_and_factor(&self.relative.par_iter().map(mean).collect::<Vec<_>>());
-        let (most, above) = mean_and_factor(&self.upper);
+        let means: Vec<f32> = self.relative.par_iter().map(mean).collect();
+        let (relative_mse, below) = mean_and_factor(&means, self.sharing);
+        let (most, above) = mean_and_factor(&self.upper, self.sharing);
         let tail_index = tail_index(&mut self.noisy());
         let doubt = if self.iterations < FEW_ITERATIONS || relative_mse == f64::INFINITY {
             Some(Doubt::FewIterations)
@@ -204,8 +211,8 @@ impl fmt::Display for Doubt {
 }
 
 /// The mean of the pixels' errors, infinite without any, and the factor between it and the ends of its
-/// interval.
-fn mean_and_factor(errors: &[f32]) -> (f64, f64) {
+/// interval, if so many pixels share an error.
+fn mean_and_factor(errors: &[f32], sharing: f64) -> (f64, f64) {
     // Pieces of fixed size, added in their order.
     let add = |[sum, squares]: [f64; 2], t: &f32| [sum + f64::from(*t), squares + f64::from(*t).powi(2)];
     let pieces: Vec<[f64; 2]> =
@@ -214,7 +221,7 @@ fn mean_and_factor(errors: &[f32]) -> (f64, f64) {
     if errors.is_empty() || sum.is_infinite() {
         return (f64::INFINITY, 1.0);
     }
-    let standard_error = if sum > 0.0 { squares.sqrt() / sum } else { 0.0 };
+    let standard_error = if sum > 0.0 { (sharing * squares).sqrt() / sum } else { 0.0 };
     (sum / errors.len() as f64, 1.0 + SIGMAS * standard_error + DENOMINATORS)
 }
 
@@ -323,6 +330,34 @@ impl<'a> Pair<'a> {
             return [f64::INFINITY; 3];
         }
         std::array::from_fn(|c| self.scaled(a[c], b[c]).powi(2))
+    }
+
+    /// Ratio of the errors of the means of square blocks, times their pixels, to those of pixels, as far as it
+    /// is more than the chance of independent errors; at least 1.
+    fn sharing(&self, relative: &[[f32; 3]]) -> f64 {
+        let [a, b] = self.halves.map(|half| half.image);
+        let block_row = |y: usize| {
+            // By block: sums of errors with their signs, by channel, and of their squares.
+            let mut blocks = vec![([0.0; 3], 0.0); self.width.div_ceil(SHARING)];
+            for i in y * self.width..(y + SHARING).min(self.height) * self.width {
+                let (sums, squares) = &mut blocks[i % self.width / SHARING];
+                for (c, sum) in sums.iter_mut().enumerate() {
+                    let square = f64::from(relative[i][c]);
+                    *sum += square.sqrt().copysign(f64::from(a[i][c]) - f64::from(b[i][c]));
+                    *squares += square;
+                }
+            }
+            blocks.iter().fold([0.0; 3], |sums, ([r, g, b], squares)| {
+                [sums[0] + r * r + g * g + b * b, sums[1] + squares, sums[2] + squares * squares]
+            })
+        };
+        let rows: Vec<_> = (0..self.height).into_par_iter().step_by(SHARING).map(block_row).collect();
+        let mut sums = [0.0; 3];
+        rows.into_iter().for_each(|row| add(&mut sums, row));
+        let [blocks, pixels, squares] = sums;
+        let by_chance = SIGMAS * (2.0 * squares).sqrt();
+        // What is no number is not the larger one.
+        ((blocks - by_chance) / pixels).max(1.0)
     }
 
     fn pixel(&self, i: usize) -> Sums {

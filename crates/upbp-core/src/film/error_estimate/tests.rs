@@ -220,6 +220,65 @@ fn photons_that_neighbours_share_do_not_excuse_themselves() {
     assert!((0.67..1.5).contains(&(found / truth)), "{}", found / truth);
 }
 
+/// Two halves of unit light with normal noise, each pixel of which is the mean of a square of `reach` × `reach`
+/// numbers, and the true error of their mean.
+fn blotches(seed: u64, reach: usize) -> ([Vec<[f32; 3]>; 2], f64) {
+    let mut random = Uniform::new(seed);
+    let wide = SIDE + reach - 1;
+    let half = |random: &mut Uniform| -> Vec<[f32; 3]> {
+        let numbers: Vec<f64> = (0..wide * wide).map(|_| random.normal()).collect();
+        let sum_at = |i: usize| -> f64 {
+            let rows = i / SIDE..i / SIDE + reach;
+            rows.flat_map(|y| &numbers[y * wide + i % SIDE..][..reach]).sum()
+        };
+        (0..SIDE * SIDE).map(|i| [(1.0 + 0.1 * sum_at(i) / reach as f64) as f32; 3]).collect()
+    };
+    let halves = [half(&mut random), half(&mut random)];
+    let error = |(a, b): (&[f32; 3], &[f32; 3])| (0.5 * f64::from(a[0] + b[0]) - 1.0).powi(2) / 1.01;
+    let truth = halves[0].iter().zip(&halves[1]).map(error).sum::<f64>() / (SIDE * SIDE) as f64;
+    (halves, truth)
+}
+
+/// An estimate from normal errors that squares of k × k of n pixels share has the relative variance
+/// `2 Σ c² / n ≈ 2 (2k/3)² / n`, with correlations c, and so has the true error, which is independent of it.
+/// An interval of `2 √(3 ρ / n)`, `ρ ≤ Σ c = k²`, is 2.6 standard deviations of their ratio wide to each side.
+/// By S alone, with ρ = 1 and 0.1 for the converged values, it would be 1.05 for k = 7 and 0.7 for k = 11.
+#[test]
+fn what_neighbours_share_makes_the_interval_wider() {
+    for reach in [1, 3, 7, 11] {
+        let outside = (0..SEEDS)
+            .filter(|seed| {
+                let (images, truth) = blotches(*seed, reach);
+                let found = ErrorMap::new(SIDE, halves(&images)).estimate();
+                assert_eq!(found.doubt, None);
+                !(found.low..=found.high).contains(&truth)
+            })
+            .count();
+        assert!(outside <= 1, "{outside} of {SEEDS} intervals are wrong with blotches of {reach} pixels");
+    }
+}
+
+/// The sharing of independent errors is one, however few pixels make them. That of normal errors of squares of
+/// k × k pixels is `Σ c = (k − (k² − 1)/48)²` within blocks, less twice the `√(2 / blocks)` by chance.
+#[test]
+fn sharing_is_the_number_of_pixels_that_share_an_error() {
+    let sharing = |images: &[Vec<[f32; 3]>; 2]| ErrorMap::new(SIDE, halves(images)).sharing;
+    let rare = |random: &mut Uniform, r| if random.next() < 0.01 { 100.0 * r } else { 0.0 };
+    for seed in 0..SEEDS {
+        let independent = sharing(&render(seed, |random, r| r * (1.0 + random.normal())));
+        assert_eq!([independent, sharing(&render(seed, rare))], [1.0; 2]);
+    }
+    let blocks = (SIDE / SHARING).pow(2) as f64;
+    let chance = (2.0 / blocks).sqrt();
+    for reach in [3, 7] {
+        let mean = (0..SEEDS).map(|seed| sharing(&blotches(seed, reach).0)).sum::<f64>() / SEEDS as f64;
+        let within = (reach as f64 - (reach * reach - 1) as f64 / 48.0).powi(2);
+        // Each block tells a square of a normal number: three standard errors.
+        let error = 3.0 * within * chance / (SEEDS as f64).sqrt();
+        assert!((mean - within + SIGMAS * chance).abs() < error, "{mean}, expected {within} ± {error}");
+    }
+}
+
 #[test]
 fn what_cannot_be_told_is_not_told() {
     let image = vec![[1.0_f32, 0.5, 0.0]; 12];
