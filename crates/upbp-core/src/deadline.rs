@@ -81,6 +81,7 @@ impl Stop {
 
 /// A step of the preparation of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Preparing {
     /// Name of the step.
     pub step: &'static str,

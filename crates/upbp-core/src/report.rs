@@ -13,6 +13,7 @@ use crate::state::{ErrorPoint, ErrorSeries, PassSeconds, State};
 
 /// Report of a render. In JSON, numbers that are not finite are `null`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Report {
     /// Version of the renderer.
     pub version: String,

@@ -30,7 +30,7 @@ fn the_preparation_says_what_it_does_and_can_be_cancelled() {
             canceller.cancel();
         }
         let start = Start { canceller, progress: Some(&mut progress), ..Start::default() };
-        let error = room.start_renderer(settings().validate().unwrap(), start).map(|_| ()).unwrap_err();
+        let error = room.start_renderer(settings().validate().unwrap(), start).unwrap_err();
         assert_eq!(error, RenderError::Cancelled);
         assert_eq!(seen, end.max(1), "nothing is begun after it");
     }

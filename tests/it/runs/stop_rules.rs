@@ -62,7 +62,7 @@ fn references_of_another_size_are_refused() {
     ] {
         let settings = Settings::default().validate().expect("valid settings");
         let reference = Some(Image { width, height, pixels: vec![[0.0; 3]; pixels] });
-        let error = room.start_renderer(settings, Start { reference, ..Start::default() }).map(|_| ());
+        let error = room.start_renderer(settings, Start { reference, ..Start::default() });
         assert_eq!(error.expect_err("another size").to_string(), message);
     }
 }
@@ -76,7 +76,7 @@ fn limits_that_are_no_numbers_are_refused() {
         (Stop { error: Some(f64::NAN), ..Stop::default() }, "stop.error"),
     ] {
         let settings = Settings::default().validate().expect("valid settings");
-        let error = room.start_renderer(settings, Start { stop, ..Start::default() }).map(|_| ());
+        let error = room.start_renderer(settings, Start { stop, ..Start::default() });
         assert!(error.expect_err("no limit").to_string().contains(name), "{stop:?}");
     }
 }

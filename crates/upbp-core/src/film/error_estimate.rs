@@ -55,6 +55,7 @@ pub(crate) struct HalfImage<'a> {
 
 /// Estimated relMSE of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ErrorEstimate {
     /// The likely value; infinite where there is nothing to tell it from.
     pub relative_mse: f64,
@@ -71,6 +72,7 @@ pub struct ErrorEstimate {
 
 /// A reason for which the error could be anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub enum Doubt {
     /// Fewer than two halves, or fewer than eight iterations in both together.
     FewIterations,

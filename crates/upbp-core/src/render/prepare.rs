@@ -1,5 +1,6 @@
 //! The preparation of a render, before its first iteration.
 
+use std::fmt;
 use std::time::Instant;
 
 use upbp_estimators::scene::{Camera, PixelRect, Scene};
@@ -43,6 +44,16 @@ pub struct Start<'a> {
     pub reference: Option<Image>,
     /// Is told what comes next, before each step of the preparation.
     pub progress: Option<&'a mut (dyn FnMut(Preparing) + Send)>,
+}
+
+impl fmt::Debug for Start<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Start")
+            .field("plan", &self.plan.as_ref().map(|frozen| frozen.plan))
+            .field("canceller", &self.canceller)
+            .field("stop", &self.stop)
+            .finish_non_exhaustive()
+    }
 }
 
 fn check_reference(image: &Image, rect: PixelRect) -> Result<(), RenderError> {

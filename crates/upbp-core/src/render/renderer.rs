@@ -1,5 +1,6 @@
 //! The scheduler: iterations of three passes each, until a rule says stop.
 
+use std::fmt;
 use std::ops::{ControlFlow, Range};
 use std::time::{Duration, Instant};
 
@@ -38,6 +39,19 @@ pub struct Renderer<'a> {
     estimated_error: ErrorEstimate,
     reference: Option<Image>,
     canceller: Canceller,
+}
+
+impl fmt::Debug for Renderer<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let State { identity, film, .. } = &self.state;
+        f.debug_struct("Renderer")
+            .field("scene", &identity.scene)
+            .field("crop", &identity.crop)
+            .field("plan", &identity.plan)
+            .field("range", &self.range)
+            .field("iterations", film.iteration_set())
+            .finish_non_exhaustive()
+    }
 }
 
 /// A renderer may go to another thread.

@@ -1,11 +1,13 @@
 //! Progress of a render, and the reason why it stopped.
 
-use crate::film::ErrorEstimate;
-use crate::film::Film;
+use std::fmt;
+
+use crate::film::{ErrorEstimate, Film};
 use crate::state::State;
 
 /// The reason for which a render stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum StopReason {
     /// The number of iterations is reached, or nothing is left of the range.
     Iterations,
@@ -18,6 +20,7 @@ pub enum StopReason {
 }
 
 /// Progress of a render, after an iteration.
+#[non_exhaustive]
 pub struct Progress<'a> {
     /// Iterations done.
     pub iterations: u64,
@@ -32,4 +35,15 @@ pub struct Progress<'a> {
     pub film: &'a Film,
     /// The state of the render, to be saved.
     pub state: &'a State,
+}
+
+impl fmt::Debug for Progress<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Progress")
+            .field("iterations", &self.iterations)
+            .field("seconds", &self.seconds)
+            .field("fraction", &self.fraction)
+            .field("estimated_error", &self.estimated_error)
+            .finish_non_exhaustive()
+    }
 }
