@@ -9,15 +9,15 @@ pub(crate) const LARGEST_RADIUS: f32 = 1e12;
 /// The first radius of a kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Radius {
-    /// From a few sub-paths: as many photons in a kernel as smooth well, within bounds relative to what the
-    /// picture shows, and over the scene as the width of a pixel. All techniques have the same radius
-    /// everywhere if one of them has another setting.
+    /// A radius that a few sub-paths tell: as many photons in a kernel as smooth well, within bounds relative
+    /// to what the picture shows, and over the scene as the width of a pixel. All techniques have the same
+    /// radius everywhere if one of them has another setting.
     #[default]
     Auto,
     /// A fraction of the radius of the scene's bounding sphere; what comes of it is bounded as an
     /// [absolute](Self::Absolute) radius is.
     Scene(f32),
-    /// In scene units. Radii from 1e-12 to 1e12 are used as they are, and none below what single precision
+    /// A radius in scene units. From 1e-12 to 1e12 it is used as it is, and none below what single precision
     /// tells apart where the picture is; others are moved to the nearest of these.
     Absolute(f32),
 }
@@ -39,7 +39,7 @@ pub struct Radii {
 }
 
 impl Radii {
-    /// The same first radius of all techniques.
+    /// First radii that are the same for all merge techniques.
     #[must_use]
     pub const fn all(radius: Radius) -> Self {
         Self { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius }

@@ -161,7 +161,7 @@ impl ErrorMap {
 }
 
 impl ErrorEstimate {
-    /// Nothing is known.
+    /// The estimate while nothing is known of the error: anything from zero to infinity.
     pub const UNKNOWN: Self = Self {
         relative_mse: f64::INFINITY,
         low: 0.0,

@@ -42,7 +42,7 @@ pub struct Start<'a> {
     /// An image of the size of what is rendered: [`render`](crate::Renderer::render) compares with it after
     /// each iteration, and the errors are a [series](crate::ErrorSeries) of the state and its report.
     pub reference: Option<Image>,
-    /// Is told what comes next, before each step of the preparation.
+    /// A callback that is told of each step of the preparation before it begins.
     pub progress: Option<&'a mut (dyn FnMut(Preparing) + Send)>,
 }
 

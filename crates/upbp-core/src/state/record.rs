@@ -21,7 +21,7 @@ pub struct PassSeconds {
 }
 
 impl PassSeconds {
-    /// All passes together.
+    /// Wall seconds of all passes together.
     #[must_use]
     pub fn total(&self) -> f64 {
         self.preparation + self.light + self.build + self.camera + self.film
