@@ -4,8 +4,7 @@
 //! known and taken away. Near that part the rest is uncertain: what is below a tenth of it is left out.
 
 use upbp_core::ErrorPoint;
-
-use crate::subject::Floor;
+use upbp_testing::reference::Floor;
 
 /// Part of the floor above which a difference to it means something.
 const CREDIBLE: f64 = 0.1;

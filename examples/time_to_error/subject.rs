@@ -4,20 +4,11 @@ use std::collections::HashSet;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
-use upbp_core::{Image, open_exr, read_exr};
+use upbp_core::{Image, read_exr};
 use upbp_scene::ReadyScene;
 
+use upbp_testing::reference::{Floor, Reference};
 use upbp_testing::shipped::{Group, SCENES, Shipped};
-
-/// Mean errors of a perfect render, due to the noise of the reference; 0 where it is not known.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Floor {
-    /// Mean of `σ² / (r² + 0.01)`.
-    pub(crate) relative_mse: f64,
-    /// Root of the mean of `σ²`.
-    pub(crate) rmse: f64,
-}
 
 /// A scene to render.
 pub(crate) struct Subject {
@@ -63,9 +54,10 @@ impl Subject {
     fn load(files: Files) -> Result<Self, Box<dyn Error>> {
         let scene = ReadyScene::load(&files.scene)?;
         let reference = read_exr(&files.reference)?;
-        let errors = standard_errors(&files.reference)
-            .map_err(|error| format!("cannot read {}: {error}", files.reference.display()))?;
-        let floor = errors.map_or_else(Floor::default, |errors| floor(&reference, &errors));
+        // Standard errors that a file does not have are zero.
+        let floor = Reference::read(&files.reference)
+            .map_err(|error| format!("cannot read {}: {error}", files.reference.display()))?
+            .floor();
         let read = [[files.scene, files.reference].as_slice(), scene.files()].concat();
         Ok(Self { name: files.name, scene, reference, floor, files: read })
     }
@@ -87,31 +79,4 @@ impl Files {
         }
         Ok(Self { name, scene: scene.into(), reference: reference.into() })
     }
-}
-
-/// The channels `stderr.R`, `stderr.G`, `stderr.B`, if there are all three.
-fn standard_errors(path: &Path) -> Result<Option<[Vec<f32>; 3]>, exr::error::Error> {
-    let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
-    let layer = image.all_attributes().from_buffered(open_exr(path)?)?.layer_data;
-    let channel = |name: &str| {
-        let found = layer.channel_data.list.iter().find(|channel| channel.name.to_string() == name)?;
-        Some(found.sample_data.values_as_f32().collect::<Vec<f32>>())
-    };
-    Ok(channel("stderr.R")
-        .zip(channel("stderr.G"))
-        .zip(channel("stderr.B"))
-        .map(|((red, green), blue)| [red, green, blue]))
-}
-
-fn floor(reference: &Image, errors: &[Vec<f32>; 3]) -> Floor {
-    let (mut relative, mut square) = (0.0, 0.0);
-    for (i, pixel) in reference.pixels.iter().enumerate() {
-        for c in 0..3 {
-            let (r, s) = (f64::from(pixel[c]), f64::from(errors[c][i]));
-            relative += s * s / (r * r + 0.01);
-            square += s * s;
-        }
-    }
-    let n = (3 * reference.pixels.len()).max(1) as f64;
-    Floor { relative_mse: relative / n, rmse: (square / n).sqrt() }
 }

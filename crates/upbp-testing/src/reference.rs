@@ -20,8 +20,17 @@ pub struct Reference {
     errors: Vec<[f64; 3]>,
 }
 
+/// Errors that a perfect render seems to have, due to the noise of the reference; 0 where it is not known.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Floor {
+    /// Mean of `σ² / (r² + 0.01)`.
+    pub relative_mse: f64,
+    /// Root of the mean of `σ²`.
+    pub rmse: f64,
+}
+
 impl Reference {
-    /// Reads the channels `R`, `stderr.R` and so on.
+    /// Reads the channels `R`, `stderr.R` and so on; those that are not there are zero.
     pub fn read(path: &Path) -> Result<Self, exr::error::Error> {
         let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
         let layer = image.all_attributes().from_buffered(open_exr(path)?)?.layer_data;
@@ -61,10 +70,14 @@ impl Reference {
         })
     }
 
-    /// relMSE of the reference itself, due to its noise: what a perfect render seems to have.
-    pub fn floor(&self) -> f64 {
+    /// Errors of the reference itself, due to its noise.
+    pub fn floor(&self) -> Floor {
         let pixels = self.pixels.iter().flatten().zip(self.errors.iter().flatten());
-        pixels.map(|(r, s)| s * s / (r * r + 0.01)).sum::<f64>() / (3 * self.pixels.len()) as f64
+        let sums = pixels.fold([0.0; 2], |[relative, squares], (r, s)| {
+            [relative + s * s / (r * r + 0.01), squares + s * s]
+        });
+        let [relative_mse, square] = sums.map(|sum| sum / (3 * self.pixels.len()) as f64);
+        Floor { relative_mse, rmse: square.sqrt() }
     }
 }
 

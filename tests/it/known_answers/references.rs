@@ -44,7 +44,7 @@ fn check(scene_name: &str) {
             result.worst_percent(),
             result.tile,
             result.relative_mse,
-            reference.floor(),
+            reference.floor().relative_mse,
         );
         if result.worst_sigmas() > MEAN || result.tile > TILE {
             failures.push(techniques);
