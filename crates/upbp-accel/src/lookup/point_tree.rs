@@ -131,7 +131,7 @@ impl PointTree {
         if !(radius.largest() > 0.0) {
             return 0;
         }
-        let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin));
+        let region = ThickRay::new(ray, radius);
         self.tree.search(region, AroundRay { ray: *ray, radius, ahead, visit })
     }
 }

@@ -3,11 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::boxes::Exact;
+use super::boxes::{Bounds, Exact};
 use super::closest_approach::{ClosestApproach, Segment, closest_approach};
 use super::query::Query;
 use super::radius::{GrowingAlong, RadiusAlong, SearchRadius};
-use super::region::{Ball, ThickRay};
+use super::region::{Ball, ROUNDING, ThickRay};
 use super::sort::Item;
 use super::split::{Piece, SplitParams, split};
 use super::tree::PackedTree;
@@ -66,8 +66,6 @@ impl Block {
 pub struct SegmentTree {
     tree: PackedTree<Exact, Block>,
     payloads: Vec<u32>,
-    /// The greatest distance of an end from the origin of its segment, scene units.
-    max_distance: f32,
     pieces: usize,
     dropped: usize,
 }
@@ -84,8 +82,9 @@ impl SegmentTree {
         segments.retain(|(segment, _)| segment.is_usable());
         let dropped = count - segments.len();
         let pieces = split(segments.iter().map(|(segment, _)| segment), params);
+        // Without what widens boxes, which must not change the order.
         let item = |index: usize| {
-            let (min, max) = bounds(&segments[pieces[index].segment as usize].0, pieces[index]);
+            let (min, max) = bounds(&segments[pieces[index].segment as usize].0, pieces[index], 0.0);
             (min * 0.5 + max * 0.5, index as u32)
         };
         let items: Vec<_> = (0..pieces.len()).into_par_iter().with_min_len(1024).map(item).collect();
@@ -95,7 +94,7 @@ impl SegmentTree {
         };
         let bounds = |item: &Item<u32>| {
             let (piece, segment) = piece_of(item);
-            bounds(segment, piece)
+            bounds(segment, piece, ROUNDING)
         };
         let tree = PackedTree::build(items, bounds, Block::EMPTY, |block, items| {
             for (lane, item) in items.iter().enumerate() {
@@ -103,17 +102,15 @@ impl SegmentTree {
                 block.set(lane, piece, segment);
             }
         });
-        let ends = segments.iter().flat_map(|(segment, _)| [segment.start, segment.end]);
-        let max_distance = ends.fold(0.0, |max: f32, end| max.max(end.abs()));
         let payloads = segments.into_iter().map(|(_, payload)| payload).collect();
-        Self { tree, payloads, max_distance, pieces: pieces.len(), dropped }
+        Self { tree, payloads, pieces: pieces.len(), dropped }
     }
 
     /// Visits every segment that the ray passes within `radius`, at its closest approach to it, see
     /// [`closest_approach`](crate::closest_approach).
     ///
-    /// If the ray and a segment are parallel within rounding, a hit at the very end of the ray's range may be
-    /// missed.
+    /// If the ray and a segment are nearly parallel, a hit at the very end of the ray's range, or of the
+    /// radius, may be missed.
     pub fn around_ray(
         &self,
         ray: &Ray,
@@ -130,7 +127,7 @@ impl SegmentTree {
         if !(radius.largest() > 0.0) {
             return 0;
         }
-        let region = ThickRay::new(ray, radius, self.tree.extent_from(ray.origin) + self.max_distance);
+        let region = ThickRay::new(ray, radius);
         self.tree.search(region, AroundRay { payloads: &self.payloads, ray: *ray, radius, visit })
     }
 
@@ -142,7 +139,7 @@ impl SegmentTree {
         if !(radius > 0.0) {
             return 0;
         }
-        let ball = Ball::widened(point, radius, self.tree.extent_from(point) + self.max_distance);
+        let ball = Ball::widened(point, radius);
         let radius2 = radius * radius;
         self.tree.search(ball, AroundPoint { payloads: &self.payloads, point, radius2, visit })
     }
@@ -248,10 +245,12 @@ impl SegmentTree {
     }
 }
 
-/// The box of a piece, rounded outwards: far from the origin of the scene, ends are coarser than a radius may
-/// be.
-fn bounds(segment: &Segment, piece: Piece) -> (Vec3, Vec3) {
+/// The box of a piece, wider by `rounding` times the greatest distance along it, and rounded outwards: far
+/// from the origin of the scene, ends are coarser than a radius may be.
+fn bounds(segment: &Segment, piece: Piece, rounding: f32) -> Bounds {
     let at = |s: f32| segment.origin.as_dvec3() + segment.direction.as_dvec3() * f64::from(s);
     let (a, b) = (at(piece.start), at(piece.end));
-    (a.min(b).as_vec3().map(f32::next_down), a.max(b).as_vec3().map(f32::next_up))
+    let margin = f64::from(rounding) * f64::from(piece.start.abs().max(piece.end.abs()));
+    let (min, max) = (a.min(b) - margin, a.max(b) + margin);
+    (min.as_vec3().map(f32::next_down), max.as_vec3().map(f32::next_up))
 }

@@ -4,7 +4,6 @@
 //! are leaves, the nodes above blocks: a leaf's place says where its blocks are, so that it has nothing but
 //! boxes.
 
-use glam::Vec3;
 use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
@@ -46,7 +45,6 @@ pub(super) struct PackedTree<L, B> {
     /// The blocks of a leaf start at eight times its place.
     pub(super) leaves: Vec<L>,
     pub(super) blocks: Vec<B>,
-    bounds: Bounds,
 }
 
 impl<L: Boxes, B: Copy + Send + Sync> PackedTree<L, B> {
@@ -121,19 +119,13 @@ impl<L: Boxes, B: Copy + Send + Sync> PackedTree<L, B> {
             nodes.extend(branch.nodes[1..].iter().map(|node| moved(node, start)));
         }
         let leaves = branches.iter().map(|branch| &branch.leaves[..]).collect::<Vec<_>>().concat();
-        Self { nodes, leaves, blocks, bounds: levels[0].first().copied().unwrap_or_default() }
+        Self { nodes, leaves, blocks }
     }
 }
 
 impl<L, B> PackedTree<L, B> {
     /// A tree over nothing.
-    pub(super) const EMPTY: Self =
-        Self { nodes: Vec::new(), leaves: Vec::new(), blocks: Vec::new(), bounds: (Vec3::ZERO, Vec3::ZERO) };
-
-    /// The greatest sum of coordinate differences between `point` and anything in the tree, scene units.
-    pub(super) fn extent_from(&self, point: Vec3) -> f32 {
-        (self.bounds.0 - point).abs().max((self.bounds.1 - point).abs()).element_sum()
-    }
+    pub(super) const EMPTY: Self = Self { nodes: Vec::new(), leaves: Vec::new(), blocks: Vec::new() };
 
     /// Memory in use, bytes.
     pub(super) fn memory_bytes(&self) -> usize {

@@ -2,10 +2,13 @@
 
 use std::cell::RefCell;
 
-use crate::support::{Random, SCALES_AND_PLACES, SPREADS, any_direction, any_ray, positions};
+use crate::support::{
+    Random, SCALES_AND_PLACES, SPREADS, Spread, any_direction, any_radius, any_ray, far_positions, positions,
+    radius_at,
+};
 use glam::Vec3;
 use proptest::prelude::*;
-use upbp_accel::{PointTree, Ray};
+use upbp_accel::{PointTree, Ray, SearchRadius};
 
 /// A result that can be compared bit by bit, whatever the order.
 type Hits = Vec<(u32, u32, u32)>;
@@ -31,7 +34,7 @@ fn brute_ball(points: &[Vec3], centre: Vec3, radius: f32) -> Hits {
     distance2.zip(0..).filter(|&(d, _)| d < radius * radius).map(|(d, i)| (i, d.to_bits(), 0)).collect()
 }
 
-fn around(tree: &PointTree, ray: &Ray, radius: f32) -> Hits {
+fn around(tree: &PointTree, ray: &Ray, radius: impl Into<SearchRadius>) -> Hits {
     let (mut hits, announced) = (Hits::new(), RefCell::new(Vec::new()));
     let ahead = |index| announced.borrow_mut().push(index);
     tree.around_ray_ahead(ray, radius, ahead, |index, t, distance2| {
@@ -43,13 +46,14 @@ fn around(tree: &PointTree, ray: &Ray, radius: f32) -> Hits {
     hits
 }
 
-fn brute_around(points: &[Vec3], ray: &Ray, radius: f32) -> Hits {
+fn brute_around(points: &[Vec3], ray: &Ray, radius: impl Into<SearchRadius>) -> Hits {
+    let radius = radius.into();
     let mut hits = Vec::new();
     for (&point, index) in points.iter().zip(0..) {
         let from_origin = point - ray.origin;
         let t = from_origin.dot(ray.direction);
         let distance2 = (from_origin - t * ray.direction).length_squared();
-        if distance2 < radius * radius && t >= ray.t_min && t < ray.t_max {
+        if distance2 < radius_at(radius, ray, t).powi(2) && t >= ray.t_min && t < ray.t_max {
             hits.push((index, t.to_bits(), distance2.to_bits()));
         }
     }
@@ -129,13 +133,53 @@ fn rays_from_far_away_with_a_radius_near_rounding_equal_brute_force() {
 }
 
 #[test]
+fn points_near_and_far_equal_brute_force() {
+    let mut random = Random::new(10);
+    let mut hits = [0; 2];
+    for mean in [1e2, 1e4, 1e6] {
+        let mut points = positions(Spread::Uniform, 2000, 1.0, Vec3::ZERO, &mut random);
+        points.extend(far_positions(2000, mean, &mut random));
+        let tree = tree(&points);
+        for _ in 0..600 {
+            let [from, to] = [0; 2].map(|_| points[random.below(points.len())]);
+            let place = if random.unit() < 0.5 { from } else { random.cube() };
+            let ray = any_ray(place, to - place, 0.8, place.distance(to), &mut random);
+            let radius = any_radius(place.distance(to), &mut random);
+            let found = around(&tree, &ray, radius);
+            assert_eq!(found, brute_around(&points, &ray, radius), "{ray:?} {radius:?}");
+            for &(index, ..) in &found {
+                hits[usize::from(index >= 2000)] += 1;
+            }
+        }
+    }
+    assert!(hits.iter().all(|&hits| hits > 300), "{hits:?}");
+}
+
+#[test]
+fn far_points_do_not_widen_the_search_among_near_ones() {
+    let mut random = Random::new(11);
+    let mut points = positions(Spread::Uniform, 10_000, 1.0, Vec3::ZERO, &mut random);
+    let near = tree(&points);
+    points.extend(far_positions(10_000, 1e6, &mut random));
+    let all = tree(&points);
+    let (mut among_near, mut among_all) = (0, 0);
+    for _ in 0..200 {
+        let ray = Ray::new(random.cube(), any_direction(&mut random)).with_range(0.0, 1.0);
+        let radius = any_radius(1.0, &mut random);
+        among_near += near.around_ray(&ray, radius, |_, _, _| {});
+        among_all += all.around_ray(&ray, radius, |_, _, _| {});
+    }
+    assert!(among_all < 2 * among_near, "{among_all} instead of {among_near}");
+}
+
+#[test]
 fn empty_and_extreme_queries_are_answered() {
     let none = tree(&[]);
     assert!(none.is_empty());
     assert!(ball(&none, Vec3::ZERO, f32::INFINITY).is_empty());
     assert!(around(&none, &Ray::new(Vec3::ZERO, Vec3::X), 1.0).is_empty());
 
-    let points = positions(crate::support::Spread::Uniform, 100, 1.0, Vec3::ZERO, &mut Random::new(2));
+    let points = positions(Spread::Uniform, 100, 1.0, Vec3::ZERO, &mut Random::new(2));
     let tree = tree(&points);
     let ray = Ray::new(Vec3::ZERO, Vec3::X).with_range(-10.0, 10.0);
     for radius in [0.0, -1.0, f32::NAN] {
@@ -150,7 +194,7 @@ fn empty_and_extreme_queries_are_answered() {
 
 #[test]
 fn points_that_are_not_finite_are_dropped_and_counted() {
-    let mut points = positions(crate::support::Spread::Uniform, 100, 1.0, Vec3::ZERO, &mut Random::new(3));
+    let mut points = positions(Spread::Uniform, 100, 1.0, Vec3::ZERO, &mut Random::new(3));
     points[10].x = f32::NAN;
     points[20].y = f32::INFINITY;
     points[99].z = f32::NEG_INFINITY;
@@ -164,13 +208,7 @@ fn points_that_are_not_finite_are_dropped_and_counted() {
 #[test]
 fn queries_tell_what_they_look_at() {
     for (count, all) in [(0, 0), (8, 1 + 1 + 8), (64, 1 + 1 + 8), (100, 1 + 2 + 16)] {
-        let points = positions(
-            crate::support::Spread::Uniform,
-            count,
-            1.0,
-            Vec3::ZERO,
-            &mut Random::new(count as u64),
-        );
+        let points = positions(Spread::Uniform, count, 1.0, Vec3::ZERO, &mut Random::new(count as u64));
         let tree = tree(&points);
         assert_eq!(tree.in_ball(Vec3::ZERO, 1e6, |_, _| {}), all, "{count}");
         // The boxes of the root are looked at to find that the ball, or the ray, meets none.
@@ -186,7 +224,7 @@ fn queries_tell_what_they_look_at() {
 
 #[test]
 fn the_number_of_threads_does_not_show() {
-    let points = positions(crate::support::Spread::Clustered, 100_000, 1.0, Vec3::ZERO, &mut Random::new(4));
+    let points = positions(Spread::Clustered, 100_000, 1.0, Vec3::ZERO, &mut Random::new(4));
     let visits = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let tree = pool.install(|| tree(&points));

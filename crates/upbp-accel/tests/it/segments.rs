@@ -1,6 +1,9 @@
 //! Look-ups of segments equal a test of every segment.
 
-use crate::support::{Random, SCALES_AND_PLACES, SPREADS, Spread, any_direction, any_ray, positions};
+use crate::support::{
+    Random, SCALES_AND_PLACES, SPREADS, Spread, any_direction, any_radius, any_ray, far_positions, positions,
+    radius_at,
+};
 use glam::Vec3;
 use proptest::prelude::*;
 use upbp_accel::{
@@ -16,16 +19,24 @@ fn bits(index: u32, hit: &ClosestApproach) -> (u32, [u32; 4]) {
     (index, [hit.t_ray, hit.t_segment, hit.distance, hit.sin_theta].map(f32::to_bits))
 }
 
-fn around_ray(tree: &SegmentTree, ray: &Ray, radius: f32) -> Vec<(u32, [u32; 4])> {
+fn around_ray(tree: &SegmentTree, ray: &Ray, radius: impl Into<SearchRadius>) -> Vec<(u32, [u32; 4])> {
     let mut hits = Vec::new();
     tree.around_ray(ray, radius, |index, hit| hits.push(bits(index, &hit)));
     hits.sort_unstable();
     hits
 }
 
-fn brute_around_ray(segments: &[Segment], ray: &Ray, radius: f32) -> Vec<(u32, [u32; 4])> {
-    let hits = segments.iter().zip(0..);
-    hits.filter_map(|(segment, index)| Some(bits(index, &closest_approach(ray, segment, radius)?))).collect()
+fn brute_around_ray(
+    segments: &[Segment],
+    ray: &Ray,
+    radius: impl Into<SearchRadius>,
+) -> Vec<(u32, [u32; 4])> {
+    let radius = radius.into();
+    let hits = segments.iter().zip(0..).filter_map(|(segment, index)| {
+        let hit = closest_approach(ray, segment, f32::INFINITY)?;
+        (hit.distance < radius_at(radius, ray, hit.t_ray)).then(|| bits(index, &hit))
+    });
+    hits.collect()
 }
 
 fn around_point(tree: &SegmentTree, point: Vec3, radius: f32) -> Vec<(u32, u32, u32)> {
@@ -147,6 +158,78 @@ fn queries_from_far_away_with_a_radius_near_rounding_equal_brute_force() {
         }
     }
     assert!(hits > 1000);
+}
+
+/// Beams in a scene of size one, and beams in clear air around it, measured from where they start or from
+/// the scene.
+fn near_and_far(count: usize, mean: f32, random: &mut Random) -> Vec<Segment> {
+    let near = positions(Spread::Uniform, count, 1.0, Vec3::ZERO, random);
+    let mut beams: Vec<Segment> = near
+        .into_iter()
+        .map(|origin| Segment { origin, direction: any_direction(random), start: 0.0, end: 0.3 })
+        .collect();
+    for place in far_positions(count, mean, random) {
+        let (origin, distance) = (random.cube(), place.length());
+        beams.push(if random.unit() < 0.5 {
+            Segment { origin: place, direction: random.direction(), start: 0.0, end: 0.3 * distance }
+        } else {
+            Segment { origin, direction: place / distance, start: distance, end: 1.5 * distance }
+        });
+    }
+    beams
+}
+
+#[test]
+fn beams_near_and_far_equal_brute_force() {
+    let mut random = Random::new(10);
+    let mut hits = [0; 4];
+    for mean in [1e2, 1e4, 1e6] {
+        let beams = near_and_far(1000, mean, &mut random);
+        let tree = tree(&beams, 4.0);
+        for _ in 0..1000 {
+            let [from, to] = [0; 2].map(|_| {
+                let beam = beams[random.below(beams.len())];
+                beam.at(beam.start + (beam.end - beam.start) * random.unit())
+            });
+            let place = if random.unit() < 0.5 { from } else { random.cube() };
+            let ray = any_ray(place, to - place, 0.8, place.distance(to), &mut random);
+            let radius = any_radius(place.distance(to), &mut random);
+            let found = around_ray(&tree, &ray, radius);
+            assert_eq!(found, brute_around_ray(&beams, &ray, radius), "{ray:?} {radius:?}");
+            for &(index, ..) in &found {
+                hits[usize::from(index >= 1000)] += 1;
+            }
+            let radius = radius_at(radius, &ray, 0.0);
+            let found = around_point(&tree, to, radius);
+            assert_eq!(found, brute_around_point(&beams, to, radius), "{to} {radius}");
+            for &(index, ..) in &found {
+                hits[2 + usize::from(index >= 1000)] += 1;
+            }
+        }
+    }
+    assert!(hits.iter().all(|&hits| hits > 300), "{hits:?}");
+}
+
+#[test]
+fn far_beams_do_not_widen_the_search_among_near_ones() {
+    let mut random = Random::new(11);
+    let beams = near_and_far(10_000, 1e6, &mut random);
+    // Whole: near ones would be split only where they are alone.
+    let (near, all) = (tree(&beams[..10_000], 1.0), tree(&beams, 1.0));
+    let (mut of_rays, mut of_points) = ([0; 2], [0; 2]);
+    for _ in 0..200 {
+        let place = random.cube();
+        let ray = Ray::new(place, any_direction(&mut random)).with_range(0.0, 1.0);
+        let radius = any_radius(1.0, &mut random);
+        for (tree, index) in [(&near, 0), (&all, 1)] {
+            of_rays[index] += tree.around_ray(&ray, radius, |_, _| {});
+            of_points[index] += tree.around_point(place, 0.05, |_, _, _| {});
+        }
+    }
+    for [among_near, among_all] in [of_rays, of_points] {
+        // Some boxes of far beams hold the scene.
+        assert!(among_all < 3 * among_near, "{among_all} instead of {among_near}");
+    }
 }
 
 #[test]

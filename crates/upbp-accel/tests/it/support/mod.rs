@@ -3,9 +3,9 @@
 use glam::Vec3;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
-use upbp_accel::Ray;
 #[cfg(feature = "geometry")]
 use upbp_accel::{Candidate, SceneGeometry, Visit};
+use upbp_accel::{GrowingRadius, Ray, SearchRadius};
 
 /// Uniform numbers from a fixed seed.
 pub(crate) struct Random(Xoshiro256PlusPlus);
@@ -127,4 +127,37 @@ pub(crate) fn any_ray(place: Vec3, toward: Vec3, probability: f32, scale: f32, r
     let t_min = if random.unit() < 0.5 { 0.0 } else { random.unit() * scale };
     let t_max = if random.unit() < 0.5 { f32::INFINITY } else { t_min + random.unit() * 2.0 * scale };
     Ray::new(place, direction).with_range(t_min, t_max)
+}
+
+/// Places at exponential distances, as in clear air around a scene.
+pub(crate) fn far_positions(count: usize, mean: f32, random: &mut Random) -> Vec<Vec3> {
+    (0..count).map(|_| random.direction() * mean * -(1.0 - random.unit()).ln()).collect()
+}
+
+/// Radii of searches in a scene of size one: small, or as small as rounding at a distance; one or growing.
+pub(crate) fn any_radius(distance: f32, random: &mut Random) -> SearchRadius {
+    let least = if random.unit() < 0.5 {
+        10_f32.powf(-3.0 + random.unit())
+    } else {
+        distance.max(1.0) * f32::EPSILON * 10_f32.powf(random.unit() * 2.0 - 1.0)
+    };
+    if random.unit() < 0.5 {
+        return least.into();
+    }
+    let slope = 1e-3 * random.unit();
+    let most = least * 10_f32.powf(random.unit() * 4.0);
+    SearchRadius::Growing(GrowingRadius { centre: random.cube(), offset: 0.0, slope, least, most })
+}
+
+/// The radius of a search at a distance along its ray, rounded as the search does.
+pub(crate) fn radius_at(radius: SearchRadius, ray: &Ray, t: f32) -> f32 {
+    match radius {
+        SearchRadius::Constant(radius) => radius,
+        SearchRadius::Growing(GrowingRadius { centre, offset, slope, least, most }) => {
+            let to_centre = centre - ray.origin;
+            let nearest = to_centre.dot(ray.direction);
+            let height2 = (to_centre - nearest * ray.direction).length_squared();
+            (offset + slope * ((t - nearest).powi(2) + height2).sqrt()).min(most).max(least)
+        }
+    }
 }
