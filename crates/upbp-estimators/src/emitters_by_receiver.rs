@@ -10,7 +10,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::emitter_selection::{EmitterSample, EmitterShares};
-use crate::scene::EmitterId;
+use crate::scene::{BoundingSphere, EmitterId};
 
 /// Shares are multiples of one over this.
 const SHARES: u16 = 4096;
@@ -69,10 +69,15 @@ impl Default for ReceiverShares {
 }
 
 impl ReceiverShares {
-    /// The shares of what was seen.
-    pub(crate) fn fit(samples: &[ClusterSample]) -> Self {
+    /// The shares of what was seen within the bounds of the scene, or anywhere if nothing was seen there:
+    /// receivers far out in clear air would take up the depth of the tree.
+    pub(crate) fn fit(samples: &[ClusterSample], bounds: &BoundingSphere) -> Self {
         let mut samples: Vec<_> =
             samples.iter().filter(|s| s.receiver.is_finite() && s.light > 0.0).copied().collect();
+        let is_near = |s: &ClusterSample| s.receiver.distance(bounds.centre) <= bounds.radius;
+        if samples.iter().any(is_near) {
+            samples.retain(is_near);
+        }
         let mut nodes = Vec::new();
         grow(&mut nodes, &mut samples, MOST_REGIONS, 0);
         Self { nodes }
@@ -228,6 +233,9 @@ fn shares(samples: &[ClusterSample]) -> Vec<(u16, u16)> {
 
 #[cfg(test)]
 mod tests {
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+
     use super::*;
 
     #[test]
@@ -262,9 +270,34 @@ mod tests {
             (0..100_000).map(|i| sample(0.5_f32.powi(i / 800))).collect(),
             vec![sample(1.0); 1000],
         ] {
-            let shares = ReceiverShares::fit(&samples);
+            let everywhere = BoundingSphere { centre: Vec3::ZERO, radius: f32::INFINITY };
+            let shares = ReceiverShares::fit(&samples, &everywhere);
             assert!(shares.fits(1));
             assert!(shares.nodes.len() < 2 * MOST_REGIONS, "{}", shares.nodes.len());
         }
+    }
+
+    #[test]
+    fn receivers_far_out_do_not_take_the_regions_of_the_scene() {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut unit = || (random.next_u64() >> 40) as f32 / (1_u64 << 24) as f32;
+        let mut samples = |least: f32, mean: f32| -> Vec<_> {
+            let sample = |_| {
+                let direction = (Vec3::new(unit(), unit(), unit()) - 0.5).normalize_or(Vec3::X);
+                let receiver = (least - mean * (1.0 - unit()).ln()) * direction;
+                ClusterSample { receiver, cluster: (unit() * 8.0) as u16, light: 1.0, others: 0.0 }
+            };
+            (0..20_000).map(sample).collect()
+        };
+        let (near, far) = (samples(0.0, 0.5), samples(10.0, 1e5));
+        let bounds = |radius| BoundingSphere { centre: Vec3::ZERO, radius };
+        let all = [&far[..], &near].concat();
+        let shares = ReceiverShares::fit(&near, &bounds(10.0));
+        assert!(shares.nodes.len() > 100, "{}", shares.nodes.len());
+        assert_eq!(ReceiverShares::fit(&all, &bounds(10.0)), shares);
+        // They count where there are no others.
+        let shares = ReceiverShares::fit(&far, &bounds(f32::INFINITY));
+        assert!(shares.nodes.len() > 100, "{}", shares.nodes.len());
+        assert_eq!(ReceiverShares::fit(&far, &bounds(10.0)), shares);
     }
 }

@@ -81,7 +81,7 @@ fn choice(lamps: &[Lamp], seen: &Seen) -> Option<(EmitterChoice, EmitterTree)> {
         light,
         others,
     };
-    let receivers = Some(ReceiverShares::fit(&seen.iter().map(sample).collect::<Vec<_>>()));
+    let receivers = Some(ReceiverShares::fit(&seen.iter().map(sample).collect::<Vec<_>>(), &SCENE));
     Some((EmitterChoice { next_event, receivers, ..EmitterChoice::default() }, tree))
 }
 
