@@ -1,6 +1,6 @@
 //! Triangle meshes from Wavefront OBJ files.
 //!
-//! Read are vertices (`v`), normals (`vn`) and faces (`f`); polygons become fans of triangles. Texture
+//! Read are vertices (`v`), normals (`vn`) and faces (`f`); polygons become triangles. Texture
 //! coordinates, groups, materials, lines and points are skipped; anything else, such as a free-form surface,
 //! is an error.
 
@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, Read as _};
 
 use glam::Vec3;
+
+mod polygon;
 
 /// Corners, triangles and normals of a mesh.
 #[derive(Clone, Debug, PartialEq, Default)]
@@ -125,7 +127,14 @@ impl Parser {
                 if self.triangles.len() + corners.len() - 2 > MAX_TRIANGLES {
                     return Err(format!("the mesh has more than {MAX_TRIANGLES} triangles"));
                 }
-                self.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+                if let [a, b, c] = corners[..] {
+                    self.triangles.push([a, b, c]);
+                    return Ok(());
+                }
+                let places: Vec<Vec3> =
+                    corners.iter().map(|corner| self.positions[corner.0 as usize]).collect();
+                let triangles = polygon::triangles(&places)?;
+                self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|place| corners[place])));
             }
             Some(word) if !SKIPPED.contains(&word) => {
                 return Err(format!(
@@ -216,6 +225,14 @@ mod tests {
     }
 
     #[test]
+    fn polygons_with_reflex_corners_do_not_fold() {
+        let text = "v 2 0 0\nv 2 0 -1\nv 1 0 -1\nv 1 0 -2\nv 0 0 -2\nv 0 0 0\nf 1 2 3 4 5 6\n";
+        let ObjMesh { positions, indices, normals } = ObjMesh::parse(text).unwrap();
+        let mesh = upbp_accel::TriangleMesh::new(positions, indices, normals).unwrap();
+        assert_eq!((mesh.triangle_count(), mesh.area()), (4, 3.0));
+    }
+
+    #[test]
     fn negative_numbers_count_from_the_end() {
         let mesh = ObjMesh::parse("v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3/1 -2/1 -1/1").unwrap();
         assert_eq!(mesh.indices, [[0, 1, 2]]);
@@ -294,6 +311,10 @@ mod tests {
             ),
             ("v 0 0 0\nf 1 1 a/b\n", "line 2: expected the number of a vertex, found `a`"),
             ("v 0 0 0\nf 1//1 1//1 1//1\n", "line 2: there is no normal 1 among the 0 before this line"),
+            (
+                "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 4\n",
+                "line 5: the polygon crosses itself: triangulate it",
+            ),
         ];
         for (text, message) in cases {
             assert_eq!(ObjMesh::parse(text).unwrap_err().to_string(), message);
