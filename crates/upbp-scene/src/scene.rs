@@ -11,6 +11,7 @@ use upbp_accel::{BoxTree, Candidate, Ray, SceneGeometry, ShapeId, Visit};
 use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId, Hit, Scene};
 use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
 
+use self::place::largest_width_of_plane;
 use crate::camera::PerspectiveCamera;
 use crate::light::Light;
 use crate::material::Material;
@@ -85,18 +86,13 @@ impl ReadyScene {
         &self.surfaces[candidate.shape.0 as usize]
     }
 
-    /// Keeps the nearer of two candidates; at equal distance one that shines, as a lamp in the plane of a
-    /// ceiling, else that of the earlier shape: the order of the traversal does not matter. Returns the
-    /// distance of the other.
-    fn keep_nearer(&self, nearest: &mut Option<Candidate>, candidate: &Candidate) -> f32 {
-        let is_before = |a: &Candidate, b: &Candidate| {
-            let key = |c: &Candidate| (self.record(c).emitter.is_none(), c.shape, c.primitive);
-            a.t < b.t || a.t == b.t && key(a) <= key(b)
-        };
-        if nearest.as_ref().is_some_and(|nearest| is_before(nearest, candidate)) {
-            return candidate.t;
+    /// Adds an intersection with an opaque surface.
+    #[inline]
+    fn add(&self, ray: &Ray, opaque: &mut Opaque, candidate: &Candidate) {
+        keep_nearer(&mut opaque.nearest, candidate);
+        if self.record(candidate).emitter.is_some() && self.geometry.is_entering(ray, candidate) {
+            keep_nearer(&mut opaque.lamp, candidate);
         }
-        nearest.replace(*candidate).map_or(f32::INFINITY, |farther| farther.t)
     }
 
     fn hit(&self, ray: &Ray, candidate: &Candidate) -> Hit<Material> {
@@ -117,6 +113,27 @@ impl ReadyScene {
     }
 }
 
+/// Opaque surfaces along a ray.
+#[derive(Default)]
+struct Opaque {
+    nearest: Option<Candidate>,
+    /// The nearest that shines towards the start of the ray, if it may be in the plane of the nearest.
+    lamp: Option<Candidate>,
+}
+
+/// Keeps the nearer of two candidates; at equal distance that of the earlier shape: the order of the traversal
+/// does not matter. Returns the distance of the other.
+fn keep_nearer(nearest: &mut Option<Candidate>, candidate: &Candidate) -> f32 {
+    let is_before = |a: &Candidate, b: &Candidate| {
+        let key = |c: &Candidate| (c.shape, c.primitive);
+        a.t < b.t || a.t == b.t && key(a) <= key(b)
+    };
+    if nearest.as_ref().is_some_and(|nearest| is_before(nearest, candidate)) {
+        return candidate.t;
+    }
+    nearest.replace(*candidate).map_or(f32::INFINITY, |farther| farther.t)
+}
+
 /// Sorts crossings by distance; at the same distance into a body before out of one, so that a body that is
 /// only touched is left again.
 fn sort(crossings: &mut [Crossing]) {
@@ -133,7 +150,17 @@ impl Scene for ReadyScene {
     type Camera = PerspectiveCamera;
 
     fn intersect(&self, ray: &Ray) -> Option<Hit<Material>> {
-        self.geometry.closest(*ray).map(|candidate| self.hit(ray, &candidate))
+        let (mut nearest, mut opaque) = (None, Opaque::default());
+        self.geometry.for_each_hit(*ray, |candidate| {
+            keep_nearer(&mut nearest, candidate);
+            if matches!(self.record(candidate).boundary, Boundary::Opaque(_)) {
+                self.add(ray, &mut opaque, candidate);
+            }
+            Visit::ShrinkTo(candidate.t + largest_width_of_plane(ray, candidate.t))
+        });
+        let nearest = nearest?;
+        let lamp = opaque.nearest.filter(|opaque| *opaque == nearest).and(opaque.lamp);
+        lamp.and_then(|lamp| self.lamp_in_plane(ray, &nearest, &lamp)).or(Some(self.hit(ray, &nearest)))
     }
 
     fn bounds(&self) -> BoundingSphere {
@@ -165,7 +192,7 @@ impl Scene for ReadyScene {
     }
 
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Material>> {
-        let (mut opaque, mut refracting) = (None, None);
+        let (mut opaque, mut refracting) = (Opaque::default(), None);
         let mut second = f32::INFINITY;
         self.geometry.for_each_hit(*ray, |candidate| {
             match self.record(candidate).boundary {
@@ -174,22 +201,27 @@ impl Scene for ReadyScene {
                     Visit::Continue
                 }
                 Boundary::Opaque(_) => {
-                    self.keep_nearer(&mut opaque, candidate);
-                    Visit::ShrinkTo(candidate.t.next_up())
+                    self.add(ray, &mut opaque, candidate);
+                    // As far as a lamp may be in its plane.
+                    Visit::ShrinkTo(candidate.t + largest_width_of_plane(ray, candidate.t))
                 }
                 Boundary::Refracting(..) => {
-                    second = second.min(self.keep_nearer(&mut refracting, candidate));
+                    second = second.min(keep_nearer(&mut refracting, candidate));
                     // As far as something may coincide.
                     Visit::ShrinkTo(candidate.t + self.largest_width(ray, candidate.t))
                 }
             }
         });
+        let Opaque { nearest: opaque, lamp } = opaque;
         let nearest = refracting.filter(|refracting| opaque.is_none_or(|opaque| refracting.t < opaque.t));
         let Some(nearest) = nearest.or(opaque) else {
             sort(crossings);
             return None;
         };
-        let mut hit = self.hit(ray, &nearest);
+        let may_coincide = |lamp: &Candidate| lamp.t < nearest.t + largest_width_of_plane(ray, nearest.t);
+        let lamp = lamp.filter(|lamp| Some(nearest) == opaque && *lamp != nearest && may_coincide(lamp));
+        let lamp = lamp.and_then(|lamp| self.lamp_in_plane(ray, &nearest, &lamp));
+        let mut hit = lamp.unwrap_or_else(|| self.hit(ray, &nearest));
         if hit.boundary.interior().is_none() && crossings.is_empty() {
             return Some(hit);
         }

@@ -6,7 +6,7 @@
 use upbp_accel::{Candidate, RAY_OFFSET, Ray, Shape, Visit};
 use upbp_estimators::scene::{Crossing, Hit};
 
-use super::{ReadyScene, sort};
+use super::{Opaque, ReadyScene, sort};
 use crate::material::Material;
 
 /// Distance between surfaces that coincide, relative to the largest coordinate of the place. Rays start
@@ -16,10 +16,26 @@ const COINCIDENT: f32 = 1.25 * RAY_OFFSET;
 /// Distance between planes of triangles that are meant to coincide, relative to the largest coordinate of a
 /// corner: roundings of the corners. It counts where the plane passes near the origin, far from the corners.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
+/// Distance behind an opaque surface at which a lamp is meant to be in its plane, relative to the largest
+/// coordinate of the place. Rays start from a lamp farther off than this, or its light would not get out.
+const IN_PLANE: f32 = 0.875 * RAY_OFFSET;
 /// Roundings of a distance along a ray.
 const DISTANCE: f32 = 2.0 * f32::EPSILON;
 /// Least cosine between a ray and the normal: distances between surfaces grow along rays that graze them.
 const GRAZING: f32 = 0.05;
+
+/// The way along `ray` to what is `across` off the surface that it hits, scene units.
+fn along(across: f32, ray: &Ray, hit: &Hit<Material>) -> f32 {
+    across / hit.geometric_normal.dot(ray.direction).abs().max(GRAZING) + DISTANCE * hit.t
+}
+
+/// Largest distance along `ray`, from an opaque surface at distance `t`, of a lamp in its plane.
+#[inline]
+pub(super) fn largest_width_of_plane(ray: &Ray, t: f32) -> f32 {
+    const MARGIN: f32 = 1.0 + 1e-4;
+    let place = ray.origin.abs().max_element() + t;
+    (IN_PLANE / GRAZING * place + DISTANCE * t) * MARGIN
+}
 
 impl ReadyScene {
     /// Distance along `ray` within which boundaries coincide with the hit of a candidate, scene units.
@@ -32,7 +48,20 @@ impl ReadyScene {
             Shape::Sphere(_) | Shape::Box(_) | Shape::Quad(_) => 0.0,
         };
         let across = (COINCIDENT * hit.position.abs().max_element()).max(ROUNDING * largest_corner);
-        across / hit.geometric_normal.dot(ray.direction).abs().max(GRAZING) + DISTANCE * hit.t
+        along(across, ray, hit)
+    }
+
+    /// The hit of a lamp that is met behind the nearest opaque surface, if it is in its plane.
+    #[cold]
+    pub(super) fn lamp_in_plane(
+        &self,
+        ray: &Ray,
+        nearest: &Candidate,
+        lamp: &Candidate,
+    ) -> Option<Hit<Material>> {
+        let hit = self.hit(ray, lamp);
+        let width = along(IN_PLANE * hit.position.abs().max_element(), ray, &hit);
+        (hit.t < nearest.t + width).then_some(hit)
     }
 
     /// Largest [`width`](Self::width) at distance `t` along `ray`.
@@ -57,13 +86,13 @@ impl ReadyScene {
         let near = ray.with_range((at - width).max(ray.t_min), at + width);
         crossings.retain(|crossing| crossing.t <= near.t_min);
         let first = crossings.len();
-        let (mut opaque, mut end) = (None, at);
+        let (mut opaque, mut end) = (Opaque::default(), at);
         let mut highest: Option<(Candidate, Crossing)> = None;
         let rank = |crossing: &Crossing| (crossing.interior.priority, crossing.entering);
         self.geometry.for_each_hit(near, |candidate| {
             let boundary = &self.record(candidate).boundary;
             let Some(interior) = boundary.interior() else {
-                self.keep_nearer(&mut opaque, candidate);
+                self.add(ray, &mut opaque, candidate);
                 return Visit::Continue;
             };
             end = end.max(candidate.t);
@@ -77,9 +106,10 @@ impl ReadyScene {
             Visit::Continue
         });
         // A glass that stands on a table: the light inside of it must not get below.
-        if let Some(opaque) = opaque {
+        if let Some(nearest) = opaque.nearest {
             crossings.truncate(first);
-            return Some(self.hit(ray, &opaque));
+            let lamp = opaque.lamp.and_then(|lamp| self.lamp_in_plane(ray, &nearest, &lamp));
+            return Some(lamp.unwrap_or_else(|| self.hit(ray, &nearest)));
         }
         for crossing in &mut crossings[first..] {
             crossing.t = end;

@@ -1,7 +1,7 @@
 //! The scene's own traversals against the defaults of the trait, which only know the nearest surface.
 
 use upbp_estimators::check::check_scene;
-use upbp_estimators::scene::Camera as _;
+use upbp_estimators::scene::{Camera as _, Emitter as _};
 use upbp_media::{BodyId, Medium as _};
 
 use super::*;
@@ -367,6 +367,79 @@ fn a_lamp_in_the_plane_of_a_ceiling_shines() {
         assert!(scene.trace(&ALONG_X, &mut Vec::new()).unwrap().emitter.is_some());
         let beside = Ray { origin: Vec3::new(-5.0, 2.0, 0.2), ..ALONG_X };
         assert!(scene.trace(&beside, &mut Vec::new()).unwrap().emitter.is_none());
+    }
+}
+
+/// Its corners are rounded, so that it lies behind the ceiling in places.
+#[test]
+fn a_lamp_in_the_plane_of_a_sloped_ceiling_shines_all_over() {
+    for order in [0, 1] {
+        let mut shapes = [
+            "(geometry: Quad(origin: (-2, 2.5, -2), edge_u: (4, 0, 0), edge_v: (0, 2, 3.464102)), material: \"wall\"),",
+            "(geometry: Quad(origin: (-0.2, 3, -1.133975), edge_u: (0.4, 0, 0), edge_v: (0, 0.2, 0.34641)),
+              material: \"wall\", emission: 1),",
+        ];
+        shapes.rotate_left(order);
+        let scene = scene(MEDIA, &shapes.concat());
+        let lamp = scene.emitters().last().unwrap();
+        let fraction = |i: u32, alpha: f64| (f64::from(i) * alpha).fract() as f32;
+        for i in 1..2000 {
+            let u = [fraction(i, 0.819_172_513), fraction(i, 0.671_043_607)];
+            let on_floor = Vec3::new(4.0 * fraction(i, 0.549_700_478) - 2.0, 0.0, 1.0 - 3.0 * u[0]);
+            let seen = lamp.sample_incident(&scene.bounds(), on_floor, u).unwrap();
+            let ray = Ray::new(on_floor, seen.towards_light);
+            let hit = scene.trace(&ray, &mut Vec::new()).unwrap();
+            assert!(hit.emitter.is_some(), "{ray:?} {hit:?}");
+            assert_eq!(scene.intersect(&ray).unwrap().emitter, hit.emitter);
+            let back = upbp_accel::offset_origin(hit.position, hit.geometric_normal, -ray.direction);
+            let back = Ray { origin: back, direction: -ray.direction, ..ray };
+            assert!(scene.is_clear(&back, &mut Vec::new()), "{back:?}");
+            assert!(scene.trace(&back, &mut Vec::new()).is_none(), "{back:?}");
+        }
+    }
+}
+
+#[test]
+fn a_lamp_that_is_seen_gets_its_light_out() {
+    for x in [1e-3_f32, 1.0, 700.0] {
+        for roundings in -10..80 {
+            let behind = x + roundings as f32 * f32::EPSILON * x;
+            let wide = 0.25 * x;
+            let wall = |x: f32, emission: f32| {
+                format!(
+                    "(geometry: Quad(origin: ({x:?}, {:?}, {:?}), edge_u: (0, 0, {:?}), edge_v: (0, {:?}, 0)),
+                      material: \"wall\", emission: {emission:?}),",
+                    -wide, -wide, 2.0 * wide, 2.0 * wide
+                )
+            };
+            let scene = scene(MEDIA, &(wall(x, 0.0) + &wall(behind, 1.0)));
+            let origin = Vec3::new(-0.5 * x, 0.01 * x, 0.02 * x) - scene.origin();
+            for direction in [Vec3::X, Vec3::new(1.0, 0.05, -0.02).normalize()] {
+                let hit = scene.trace(&Ray::new(origin, direction), &mut Vec::new()).unwrap();
+                // So near that it is meant to be in the plane.
+                assert!(hit.emitter.is_some() || roundings > 16, "{x} {roundings}");
+                if hit.emitter.is_some() {
+                    let out = upbp_accel::offset_origin(hit.position, hit.geometric_normal, -direction);
+                    let back = Ray::new(out, -direction);
+                    assert!(scene.is_clear(&back, &mut Vec::new()), "{x} {roundings}");
+                }
+            }
+        }
+    }
+}
+
+/// A sheet that shines on both sides.
+#[test]
+fn two_lamps_back_to_back_shine_both() {
+    let scene = scene(
+        MEDIA,
+        "(geometry: Quad(origin: (1, -1, -1), edge_u: (0, 0, 2), edge_v: (0, 2, 0)), material: \"wall\", emission: 1),
+         (geometry: Quad(origin: (1, -1, -1), edge_u: (0, 2, 0), edge_v: (0, 0, 2)), material: \"wall\", emission: 2)",
+    );
+    for (origin, direction) in [(-5.0, Vec3::X), (5.0, -Vec3::X)] {
+        let ray = Ray { origin: Vec3::new(origin, 0.1, 0.2), direction, ..ALONG_X };
+        let hit = scene.trace(&ray, &mut Vec::new()).unwrap();
+        assert!(hit.geometric_normal.dot(direction) < 0.0, "{hit:?}");
     }
 }
 
