@@ -112,7 +112,7 @@ fn light_of_media_that_camera_sub_paths_alone_find_is_named() {
         assert!(!says(&with_floor(0.02, ""), names).contains("emit that"), "{names}");
     }
     assert!(says(&with_floor(0.02, ""), "hit").contains(SEEN));
-    assert!(says(&with_floor(1e-5, ""), "auto").contains(SEEN), "too small for positions");
+    assert!(says(&with_floor(1e-6, ""), "auto").contains(SEEN), "too small for distances");
     let around = says(&with_floor(0.02, "outside: \"fire\","), "auto");
     assert!(around.contains(SEEN), "{around}");
     // Without emission hits that is not found at all.

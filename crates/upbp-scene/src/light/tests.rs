@@ -114,16 +114,18 @@ fn the_density_of_next_events_to_a_sphere_integrates_to_one() {
 
 #[test]
 fn a_volume_that_positions_cannot_tell_apart_is_never_chosen() {
-    let light = |radius: f32, sigma_a: f32| {
+    let light = |x: f32, radius: f32, sigma_a: f32| {
         let medium = Homogeneous::new(Spectrum::splat(sigma_a), Spectrum::ZERO, PhaseFunction::Isotropic);
         let medium = medium.unwrap().with_glow(Spectrum::ONE).unwrap();
-        let sphere = Sphere::new(Vec3::ZERO, radius).unwrap();
+        let sphere = Sphere::new(x * Vec3::X, radius).unwrap();
         VolumeLight::new(BodyId(0), &sphere.into(), medium, 4.0).unwrap().power(&BOUNDS)
     };
-    assert!(light(0.5, 0.0) > 0.0 && light(0.5, 1e3) > 0.0);
-    assert_eq!(light(0.5, 1e5), 0.0, "too dense");
-    assert_eq!(light(1e-5, 1.0), 0.0, "too small");
-    assert_eq!(light(1e15, 0.0), 0.0, "too large");
+    assert!(light(0.0, 0.5, 0.0) > 0.0 && light(0.0, 0.5, 1e3) > 0.0);
+    assert_eq!(light(0.0, 0.5, 1e5), 0.0, "too dense");
+    assert!(light(0.1, 1e-5, 1.0) > 0.0);
+    assert_eq!(light(4.0, 1e-5, 1.0), 0.0, "too small for its place");
+    assert_eq!(light(0.0, 1e-6, 1.0), 0.0, "too small for the scene");
+    assert_eq!(light(0.0, 1e15, 0.0), 0.0, "too large");
 }
 
 #[test]

@@ -20,9 +20,13 @@ use crate::sampling;
 /// Density of a uniform direction, sr⁻¹.
 const PDF_DIRECTION: f32 = 0.25 * FRAC_1_PI;
 
-/// Light gets out of a volume from this part of the radius of the scene at least, or rounding of positions
+/// Light gets out of a volume from this part of its largest coordinate at least, or rounding of positions
 /// would decide what it is attenuated by.
 const LEAST_DEPTH: f64 = 3e-5;
+
+/// Light gets out of a volume from this part of the radius of the scene at least, or receivers on the other
+/// side of it could not tell by their distance what is inside.
+const LEAST_DEPTH_FROM_AFAR: f64 = 1e-6;
 
 /// A body whose medium emits.
 #[derive(Clone, Debug)]
@@ -50,8 +54,10 @@ impl VolumeLight {
         let source = f64::from(medium.source(Vec3::ZERO).mean());
         let power = (f64::from(4.0 * PI) * inside.volume() * source) as f32;
         let numbers = [inside.pdf() as f32, (1.0 / depth) as f32, power];
-        let is_fit = numbers.iter().all(|x| x.is_normal()) && depth > LEAST_DEPTH * f64::from(scene_radius);
         let (min, max) = shape.aabb();
+        let largest = f64::from(min.abs().max(max.abs()).max_element());
+        let least = (LEAST_DEPTH * largest).max(LEAST_DEPTH_FROM_AFAR * f64::from(scene_radius));
+        let is_fit = numbers.iter().all(|x| x.is_normal()) && depth > least;
         let bounds = EmitterBounds::all_around(min, max);
         Some(Self { body, inside, bounds, medium, depth, power: if is_fit { power } else { 0.0 } })
     }

@@ -444,6 +444,23 @@ fn two_lamps_back_to_back_shine_both() {
 }
 
 #[test]
+fn a_small_flame_on_a_wide_ground_is_an_emitter() {
+    let flame = |x: f32| {
+        let scene = scene(
+            "\"flame\": Homogeneous(glow: 1)",
+            &format!(
+                "(geometry: Quad(origin: (-1000, 0, -1000), edge_u: (0, 0, 2000), edge_v: (2000, 0, 0)), material: \"wall\"),
+                 (geometry: Sphere(centre: ({x:?}, 1, 0), radius: 0.02), material: \"null\", interior: \"flame\")"
+            ),
+        );
+        scene.emitters().last().unwrap().power(&scene.bounds())
+    };
+    assert!(flame(0.3) > 0.0);
+    // Where coordinates have fewer digits.
+    assert_eq!(flame(990.0), 0.0);
+}
+
+#[test]
 fn a_lamp_alone_in_fog_is_as_far_as_the_camera_sees_it() {
     let text = "(version: 1, outside: \"fog\", media: {\"fog\": Homogeneous(sigma_s: 1)},
         camera: Perspective(origin: (0, 1, 4), target: (0, 1, 0), fov_degrees: 40),
