@@ -43,6 +43,8 @@ pub struct ReadyScene {
     pub(crate) body_boxes: BoxTree,
     pub(crate) lights: Vec<Light>,
     pub(crate) media: Vec<Homogeneous>,
+    /// Whether any surface may scatter light into single directions.
+    pub(crate) is_specular: bool,
     pub(crate) camera: PerspectiveCamera,
     pub(crate) outside: Option<MediumId>,
     /// Largest coordinate of meshes that refract.
@@ -188,7 +190,7 @@ impl Scene for ReadyScene {
     }
 
     fn has_specular_surfaces(&self) -> bool {
-        self.surfaces.iter().filter_map(|surface| surface.boundary.bsdf()).any(Material::is_specular)
+        self.is_specular
     }
 
     fn trace(&self, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Hit<Material>> {

@@ -7,12 +7,13 @@
 use std::cmp::Reverse;
 
 use glam::Vec3;
-use upbp_accel::{BoxTree, GeometryError, Shape, ShapeId, offset_origin};
+use upbp_accel::{BoxTree, GeometryError, SceneGeometry, Shape, ShapeId, offset_origin};
 use upbp_media::{BodyId, Interior};
 
 use super::builder::Builder;
 use super::surfaces::{Inside, ShapeDraft};
-use crate::scene::Body;
+use crate::material::{Material, is_matched};
+use crate::scene::{Body, Surface};
 
 /// A body before it has its rank: the index of its shape in the scene, the shape and the inside.
 type BodyDraft<'a> = (usize, &'a Shape, Inside);
@@ -44,6 +45,30 @@ pub(super) fn rank(drafts: &[ShapeDraft]) -> Result<Vec<Body>, GeometryError> {
         bodies.push(Body { shape: ShapeId(*index as u32), interior });
     }
     Ok(bodies)
+}
+
+/// Whether a rough surface may lie between equal indices of refraction, where it passes light straight: that of
+/// its body and of vacuum, or of a body that may touch it.
+pub(super) fn may_match(bodies: &[Body], surfaces: &[Surface], geometry: &SceneGeometry) -> bool {
+    /// In a scene of more pairs the answer is the one that is always allowed.
+    const MOST_PAIRS: usize = 1 << 24;
+    let material = |body: &Body| surfaces[body.shape.0 as usize].boundary.bsdf();
+    let refracting: Vec<&Body> = bodies.iter().filter(|body| material(body).is_some()).collect();
+    let is_rough = |body: &&&Body| matches!(material(body), Some(Material::RoughDielectric(_)));
+    let rough: Vec<&Body> = refracting.iter().filter(is_rough).copied().collect();
+    let touch = |a: &Body, b: &Body| {
+        let [(min, max), (other_min, other_max)] = [a, b].map(|body| geometry.shape(body.shape).aabb());
+        let corners = [min, max, other_min, other_max].map(|corner| corner.abs().max_element());
+        // Surfaces that coincide may differ by rounding.
+        let rounding = Vec3::splat(1e-5 * corners.into_iter().fold(0.0, f32::max));
+        min.cmple(other_max + rounding).all() && other_min.cmple(max + rounding).all()
+    };
+    let matches = |a: &Body, b: &Body| {
+        a.shape != b.shape && is_matched([a.interior.ior, b.interior.ior]) && touch(a, b)
+    };
+    rough.iter().any(|body| is_matched([body.interior.ior, 1.0]))
+        || rough.len().saturating_mul(refracting.len()) > MOST_PAIRS
+        || rough.iter().any(|body| refracting.iter().any(|other| matches(body, other)))
 }
 
 /// The shapes whose boxes hold a point, in their order: whatever lies inside of a shape has the centre of its

@@ -24,6 +24,7 @@ use self::surfaces::{BoundaryDraft, MeshFiles, ShapeDraft};
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::SceneError;
 use crate::light::{AreaLight, Light, VolumeLight};
+use crate::material::Material;
 use crate::scene::{Body, ReadyScene, Surface};
 
 impl ReadyScene {
@@ -128,6 +129,9 @@ impl Builder<'_> {
         lights.extend(volume_lights(&drafts, &bodies, &media, bounds.radius));
         let geometry = SceneGeometry::build(drafts.into_iter().map(|draft| draft.shape).collect());
         let geometry = geometry.map_err(|error| self.problem("shapes", error)).ok()?;
+        let is_specular =
+            surfaces.iter().filter_map(|surface| surface.boundary.bsdf()).any(Material::is_specular)
+                || bodies::may_match(&bodies, &surfaces, &geometry);
         let body_boxes = BoxTree::new(bodies.iter().map(|body| geometry.shape(body.shape).aabb()));
         let body_boxes = body_boxes.map_err(|error| self.problem("shapes", error)).ok()?;
         let (hash, files) = (self.hash.0, std::mem::take(&mut self.files));
@@ -138,6 +142,7 @@ impl Builder<'_> {
             body_boxes,
             lights,
             media,
+            is_specular,
             camera,
             outside,
             largest_corner,

@@ -25,6 +25,7 @@ pub use self::lambert::Lambert;
 pub use self::mirror::Mirror;
 pub use self::phong::Phong;
 pub use self::rough_dielectric::RoughDielectric;
+pub(crate) use self::rough_dielectric::is_matched;
 pub use self::trowbridge_reitz::TrowbridgeReitz;
 
 /// A material of a ready-made scene. Index-matched boundaries have none.
@@ -45,7 +46,8 @@ pub enum Material {
 }
 
 impl Material {
-    /// Whether the material scatters light into single directions only.
+    /// Whether the material scatters light into single directions only. Rough glass does where the indices on
+    /// both sides are the same, which the material does not know.
     #[must_use]
     pub const fn is_specular(&self) -> bool {
         matches!(self, Self::Mirror(_) | Self::Dielectric(_))

@@ -118,8 +118,9 @@ impl RoughDielectric {
     }
 }
 
-fn is_matched([eta_from, eta_to]: [f32; 2]) -> bool {
-    (eta_from - eta_to).abs() < MATCHED * eta_to
+/// Whether the surface passes light straight, from either side.
+pub(crate) fn is_matched([eta_from, eta_to]: [f32; 2]) -> bool {
+    (eta_from - eta_to).abs() < MATCHED * eta_from.min(eta_to)
 }
 
 impl Bsdf for RoughDielectric {

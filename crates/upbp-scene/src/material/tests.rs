@@ -210,3 +210,16 @@ fn narrow_lobes_keep_their_shape() {
         }
     }
 }
+
+#[test]
+fn rough_glass_is_matched_from_both_sides_or_from_none() {
+    let glass = RoughDielectric { normals: TrowbridgeReitz { alpha: 0.2 } };
+    for below in [1.0, 1.0005, 1.001, 1.0011, 1.0 / 1.001, 0.9991] {
+        let interface = Interface { above: 1.0, below };
+        let from = Vec3::new(0.6, 0.0, 0.8);
+        let is_straight = |from| {
+            glass.sample(from, Walk::Camera, interface, 0.9, [0.3, 0.4]).is_some_and(|sample| sample.delta)
+        };
+        assert_eq!(is_straight(from), is_straight(-from), "{below}");
+    }
+}

@@ -461,6 +461,29 @@ fn a_small_flame_on_a_wide_ground_is_an_emitter() {
 }
 
 #[test]
+fn rough_glass_of_a_matched_index_counts_as_specular() {
+    let rough = |ior: f32, rest: &str| {
+        let text = format!(
+            "(version: 1, camera: Perspective(origin: (0, 0, 9), target: (0, 0, 0), fov_degrees: 40),
+              materials: {{ \"rough\": RoughDielectric(alpha: 0.2, ior: {ior:?}), \"water\": Dielectric(ior: 1.33), \"null\": Null }},
+              shapes: [ (geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"rough\"), {rest} ],
+              lights: [ Point(position: (0, 8, 0), intensity: 1) ])"
+        );
+        let scene = ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}"));
+        if rest.is_empty() {
+            check_scene(&scene).unwrap();
+        }
+        scene.has_specular_surfaces()
+    };
+    assert!(rough(1.0, "") && rough(1.0005, "") && !rough(1.33, ""));
+    let rough_at =
+        |x: f32| format!("(geometry: Sphere(centre: ({x:?}, 0, 0), radius: 0.8), material: \"rough\")");
+    assert!(rough(1.5, &rough_at(1.7)) && !rough(1.5, &rough_at(3.0)));
+    let null = "(geometry: Sphere(centre: (0, 0, 0), radius: 0.8), material: \"null\")";
+    assert!(!rough(1.5, null));
+}
+
+#[test]
 fn a_lamp_alone_in_fog_is_as_far_as_the_camera_sees_it() {
     let text = "(version: 1, outside: \"fog\", media: {\"fog\": Homogeneous(sigma_s: 1)},
         camera: Perspective(origin: (0, 1, 4), target: (0, 1, 0), fov_degrees: 40),
