@@ -18,7 +18,7 @@ pub struct ObjMesh {
     pub positions: Vec<Vec3>,
     /// Triangles as indices of corners.
     pub indices: Vec<[u32; 3]>,
-    /// One per corner, if every face has normals.
+    /// One per corner, if any has one: the others have that of the plane of their triangle.
     pub normals: Option<Vec<Vec3>>,
 }
 
@@ -161,25 +161,30 @@ impl Parser {
 
     fn finish(self) -> ObjMesh {
         let Self { positions, normals, triangles } = self;
-        let smooth = triangles.iter().flatten().all(|corner| corner.1 != NONE);
-        if !smooth {
+        if triangles.iter().flatten().all(|corner| corner.1 == NONE) {
             let indices = triangles.iter().map(|triangle| triangle.map(|corner| corner.0)).collect();
             return ObjMesh { positions, indices, normals: None };
         }
         // A mesh has one normal per corner: corners that share a position but not a normal are told apart.
         let mut numbers = BTreeMap::new();
-        let mut mesh = ObjMesh { normals: Some(Vec::new()), ..ObjMesh::default() };
+        let mut mesh = ObjMesh::default();
+        let mut smooth = Vec::new();
         for triangle in &triangles {
-            mesh.indices.push(triangle.map(|(position, normal)| {
-                *numbers.entry((position, normal)).or_insert_with(|| {
-                    let number = mesh.positions.len() as u32;
+            let [a, b, c] = triangle.map(|(position, _)| positions[position as usize].as_dvec3());
+            let flat = (b - a).cross(c - a).normalize_or_zero().as_vec3();
+            mesh.indices.push(triangle.map(|corner @ (position, normal)| {
+                let mut add = |normal| {
                     mesh.positions.push(positions[position as usize]);
-                    mesh.normals.get_or_insert_default().push(normals[normal as usize]);
-                    number
-                })
+                    smooth.push(normal);
+                    mesh.positions.len() as u32 - 1
+                };
+                match normals.get(normal as usize) {
+                    Some(normal) => *numbers.entry(corner).or_insert_with(|| add(*normal)),
+                    None => add(flat),
+                }
             }));
         }
-        mesh
+        ObjMesh { normals: Some(smooth), ..mesh }
     }
 }
 
@@ -246,6 +251,22 @@ mod tests {
         assert_eq!(mesh.indices, [[0, 1, 2], [3, 2, 4]]);
         assert_eq!(mesh.positions[3], mesh.positions[0]);
         assert_eq!(mesh.normals.unwrap()[3], Vec3::Y);
+    }
+
+    #[test]
+    fn corners_without_a_normal_have_that_of_their_triangle() {
+        // A smooth triangle, a flat one beside it, and one with a single normal.
+        let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 2\nvn 0 1 1\nf 1//1 2//1 3//1\nf 1 4 2\nf 3//1 2 1";
+        let ObjMesh { positions, indices, normals } = ObjMesh::parse(text).unwrap();
+        let normals = normals.unwrap();
+        let given = Vec3::new(0.0, 1.0, 1.0);
+        let normals = indices.iter().map(|triangle| triangle.map(|corner| normals[corner as usize]));
+        let expected = [[given; 3], [Vec3::Y; 3], [given, -Vec3::Z, -Vec3::Z]];
+        assert_eq!(normals.collect::<Vec<_>>(), expected);
+        let places = indices.iter().map(|triangle| triangle.map(|corner| positions[corner as usize]));
+        let places: Vec<_> = places.collect();
+        assert_eq!(places[1], [Vec3::ZERO, 2.0 * Vec3::Z, Vec3::X]);
+        assert_eq!(places[2], [Vec3::new(1.0, 1.0, 0.0), Vec3::X, Vec3::ZERO]);
     }
 
     #[test]

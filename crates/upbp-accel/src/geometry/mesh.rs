@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{Affine3A, DVec3, Vec3};
 
 use super::error::GeometryError;
-use super::placement::Placement;
+use super::placement::{Placement, unit};
 use super::triangle::RayShear;
 use crate::ray::Ray;
 
@@ -35,7 +35,8 @@ struct Surface {
 }
 
 impl TriangleMesh {
-    /// The mesh of triangles that index `positions`; with `normals`, one per position, it is shaded smoothly.
+    /// The mesh of triangles that index `positions`; with `normals`, one per position and of any length, it is
+    /// shaded smoothly. Normals of zero leave it to those of the other corners, or to the plane.
     ///
     /// Triangles without area are dropped and counted, see [`TriangleMesh::dropped_triangles`].
     pub fn new(
@@ -75,6 +76,7 @@ impl TriangleMesh {
             return Err(GeometryError::Degenerate { what: "a mesh" });
         }
         let dropped = count - triangles.len();
+        let normals = normals.map(|normals| normals.into_iter().map(unit).collect());
         let surface = Arc::new(Surface { positions, triangles, normals, border, dropped });
         Ok(Self::with_surface(surface, None))
     }

@@ -76,9 +76,9 @@ impl Placement {
         wide.add3(placed, wide.splat3(self.moved.to_array()))
     }
 
-    /// A normal in the scene, not of unit length.
+    /// A normal in the scene, of unit length, or zero.
     pub(super) fn normal(&self, normal: Vec3) -> Vec3 {
-        self.normals * normal
+        unit(self.normals * normal)
     }
 
     /// A point of the scene in the coordinates of the mesh.
@@ -103,4 +103,9 @@ impl Placement {
         let sum = x_axis.abs() * largest.x + y_axis.abs() * largest.y + z_axis.abs() * largest.z;
         (sum + self.translation.abs() + self.moved.abs()).max_element()
     }
+}
+
+/// The unit vector along a normal of any length; zero stays zero.
+pub(super) fn unit(normal: Vec3) -> Vec3 {
+    normal.as_dvec3().normalize_or_zero().as_vec3()
 }

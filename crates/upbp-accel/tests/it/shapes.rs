@@ -299,6 +299,26 @@ fn shading_normals_are_interpolated_on_the_side_of_the_surface() {
 }
 
 #[test]
+fn the_length_of_a_normal_does_not_matter() {
+    let shading_normal = |lengths: [f32; 3]| {
+        let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        let unit = [Vec3::Z, Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, -0.6, 0.8)];
+        let normals = (0..3).map(|corner| unit[corner] * lengths[corner]).collect();
+        let mesh = TriangleMesh::new(corners, vec![[0, 1, 2]], Some(normals)).unwrap();
+        let scene = SceneGeometry::build(vec![mesh.into()]).unwrap();
+        let ray = Ray::new(Vec3::new(0.3, 0.4, 1.0), -Vec3::Z);
+        scene.surface(&ray, &scene.closest(ray).unwrap()).shading_normal
+    };
+    let expected = shading_normal([1.0; 3]);
+    for lengths in [[1.0, 10.0, 0.5], [1e-30, 3.0, 1e30]] {
+        assert!(shading_normal(lengths).distance(expected) < 1e-6, "{lengths:?}");
+    }
+    // One without a length leaves it to the others.
+    let expected = (0.3 * Vec3::new(0.6, 0.0, 0.8) + 0.4 * Vec3::new(0.0, -0.6, 0.8)).normalize();
+    assert!(shading_normal([0.0, 1.0, 1.0]).distance(expected) < 1e-6);
+}
+
+#[test]
 fn a_ray_that_leaves_a_surface_does_not_meet_it_again() {
     let mut random = Random::new(23);
     let (mut lost, mut total) = (0, 0);
