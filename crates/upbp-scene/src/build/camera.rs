@@ -10,6 +10,10 @@ use super::surfaces::ShapeDraft;
 use crate::camera::{PerspectiveCamera, PerspectiveView};
 use crate::description::Camera;
 
+/// The least width of a pixel in the middle of the image, radians: directions in single precision are up to an
+/// eighth of it apart.
+const LEAST_PIXEL: f64 = 4.0 * f32::EPSILON as f64;
+
 impl Builder<'_> {
     pub(super) fn camera(&mut self) -> Option<PerspectiveCamera> {
         let film = &self.description.film;
@@ -39,6 +43,13 @@ impl Builder<'_> {
             focus_distance: focus_distance
                 .map_or_else(|| origin.get().distance(target.get()), crate::description::Positive::get),
         };
+        let pixel = 2.0 * (0.5 * f64::from(fov_degrees.get()).to_radians()).tan() / f64::from(width);
+        if pixel < LEAST_PIXEL {
+            let message = format!(
+                "`fov_degrees` over the width of the film makes pixels {pixel:.1e} radians wide, expected at least {LEAST_PIXEL:.1e}: narrower ones are lost in single precision"
+            );
+            self.problem("camera", message);
+        }
         let whole = PixelRect { x: 0, y: 0, width, height };
         if view.origin == view.target {
             self.problem("camera", "`origin` and `target` are the same point");

@@ -217,6 +217,18 @@ fn problems_of_shapes_name_the_shape() {
             .replace("BALL", "Sphere(centre: (0, 0, 0), radius: 1)");
         assert_eq!(problem(&format!("{MATERIALS} {LIGHT} shapes: [({shape})]")), expected);
     }
+#[test]
+fn pixels_narrower_than_directions_are_refused() {
+    let camera = |degrees: &str, width: u32| {
+        error(&format!(
+            "(version: 1, camera: Perspective(origin: (0, 1, 4), target: (0, 1, 0), fov_degrees: {degrees}),
+              film: (width: {width}, height: 4), lights: [])"
+        ))
+    };
+    let narrow = "camera: `fov_degrees` over the width of the film makes pixels 3.4e-8 radians wide, expected at least 4.8e-7: narrower ones are lost in single precision";
+    assert!(camera("0.001", 512).contains(narrow), "{}", camera("0.001", 512));
+    assert!(!camera("0.001", 8).contains("camera"));
+    assert!(!camera("0.05", 512).contains("camera"));
 }
 
 #[test]
