@@ -87,31 +87,31 @@ fn centre(shape: &Shape) -> Vec3 {
 }
 
 impl Builder<'_> {
-    /// Reports surfaces that shine all inside of an opaque shape, where they would light nothing.
-    pub(super) fn check_lamps_are_free(&mut self, drafts: &[ShapeDraft], boxes: &BoxTree) {
+    /// Reports surfaces that shine all inside of an opaque shape that the camera is not in.
+    pub(super) fn check_lamps_are_free(&mut self, rooms: &[usize], drafts: &[ShapeDraft], boxes: &BoxTree) {
         for (index, lamp) in drafts.iter().enumerate().filter(|(_, draft)| !draft.emission.is_black()) {
             let is_around = |outer: &usize| {
                 let draft = &drafts[*outer];
-                draft.boundary.inside().is_none() && is_buried(&lamp.shape, &draft.shape)
+                let is_opaque = draft.boundary.inside().is_none() && !rooms.contains(outer);
+                is_opaque && is_buried(&lamp.shape, &draft.shape)
             };
             if let Some(outer) = shapes_around(boxes, centre(&lamp.shape)).into_iter().find(is_around) {
-                let message =
-                    format!("lies inside of the opaque {} (a room is made of quads)", self.shape_item(outer));
-                self.problem(self.shape_item(index), message);
+                self.problem(self.shape_item(index), self.message_of_room(outer));
             }
         }
     }
 
-    /// Reports bodies that lie all inside of an opaque shape, or of a body with a higher priority: they would
-    /// be nowhere.
-    pub(super) fn check_bodies_count(&mut self, drafts: &[ShapeDraft], boxes: &BoxTree) {
+    /// Reports bodies that lie all inside of an opaque shape that the camera is not in, or of a body with a
+    /// higher priority: they would be nowhere.
+    pub(super) fn check_bodies_count(&mut self, rooms: &[usize], drafts: &[ShapeDraft], boxes: &BoxTree) {
         let mut bodies = drafts_of_bodies(drafts);
         let around = |shape: &Shape| -> Vec<_> {
             let around = shapes_around(boxes, centre(shape)).into_iter();
             around.filter(|outer| is_inside(shape, &drafts[*outer].shape)).collect()
         };
         for (index, shape, _) in &bodies {
-            let is_opaque = |outer: &usize| drafts[*outer].boundary.inside().is_none();
+            let is_opaque =
+                |outer: &usize| drafts[*outer].boundary.inside().is_none() && !rooms.contains(outer);
             if let Some(outer) = around(shape).into_iter().find(is_opaque) {
                 let outer = self.shape_item(outer);
                 let message = format!(

@@ -1,12 +1,8 @@
 //! The camera and its film.
 
-use glam::Vec3;
-use upbp_accel::BoxTree;
 use upbp_estimators::scene::PixelRect;
 
-use super::bodies::shapes_around;
 use super::builder::Builder;
-use super::surfaces::ShapeDraft;
 use crate::camera::{PerspectiveCamera, PerspectiveView};
 use crate::description::Camera;
 
@@ -63,23 +59,5 @@ impl Builder<'_> {
             self.problem("camera", message);
         }
         PerspectiveCamera::new(&view, width, height, crop)
-    }
-
-    /// Reports a camera or a light inside of an opaque shape, which would see or light nothing.
-    pub(super) fn check_is_free(
-        &mut self,
-        item: &str,
-        position: Vec3,
-        drafts: &[Option<ShapeDraft>],
-        boxes: &BoxTree,
-    ) {
-        for index in shapes_around(boxes, position) {
-            let Some(draft) = &drafts[index] else { continue };
-            if draft.boundary.inside().is_none() && draft.shape.contains(position) == Some(true) {
-                let message =
-                    format!("lies inside of the opaque {} (a room is made of quads)", self.shape_item(index));
-                self.problem(item, message);
-            }
-        }
     }
 }

@@ -5,11 +5,9 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::Vec3;
-use upbp_accel::BoxTree;
 use upbp_media::{Homogeneous, Medium as _, MediumId};
 
 use super::builder::Builder;
-use super::surfaces::ShapeDraft;
 use crate::description::Light as Description;
 use crate::light::{
     ConstantEnvironment, DirectionalLight, EnvironmentImage, ImageEnvironment, Light, PointLight, SpotCone,
@@ -17,7 +15,7 @@ use crate::light::{
 };
 
 /// The name of a light in messages: its place from 1 and its kind.
-fn item(index: usize, light: &Description) -> String {
+pub(super) fn item(index: usize, light: &Description) -> String {
     let kind = match light {
         Description::Point { .. } => "Point",
         Description::Spot { .. } => "Spot",
@@ -34,7 +32,7 @@ fn is_infinite(light: &Description) -> bool {
 }
 
 /// Whether a light is not black.
-fn shines(light: &Description) -> bool {
+pub(super) fn shines(light: &Description) -> bool {
     match light {
         Description::Point { intensity, .. } | Description::Spot { intensity, .. } => {
             !intensity.get().is_black()
@@ -93,15 +91,6 @@ impl Builder<'_> {
                 Light::Image(ImageEnvironment::new(Arc::new(image), scale.get(), rotation))
             }
         })
-    }
-
-    /// Reports lights inside of an opaque shape, which would light nothing.
-    pub(super) fn check_lights_are_free(&mut self, drafts: &[Option<ShapeDraft>], boxes: &BoxTree) {
-        for (index, light) in self.description.lights.iter().enumerate() {
-            if let Description::Point { position, .. } | Description::Spot { position, .. } = light {
-                self.check_is_free(&item(index, light), position.get(), drafts, boxes);
-            }
-        }
     }
 
     fn environment_image(&mut self, file: &str) -> Result<EnvironmentImage, String> {

@@ -10,6 +10,7 @@ mod camera;
 mod extent;
 mod lights;
 mod media;
+mod rooms;
 mod surfaces;
 
 use std::collections::BTreeMap;
@@ -110,17 +111,19 @@ impl Builder<'_> {
         };
         let boxes = drafts.iter().map(aabb);
         let boxes = BoxTree::new(boxes).map_err(|error| self.problem("shapes", error)).ok()?;
-        if let Some(camera) = &camera {
-            self.check_is_free("camera", camera.origin(), &drafts, &boxes);
+        let rooms = self.rooms_of_camera(&drafts, &boxes);
+        if let Some(media) = &media {
+            let outside = outside.and_then(|id| media.get(id.0 as usize));
+            self.check_camera_is_lit(&rooms, &drafts, media, outside);
         }
-        self.check_lights_are_free(&drafts, &boxes);
+        self.check_lights_are_free(&rooms, &drafts, &boxes);
         if !self.problems.is_empty() {
             return None;
         }
         let (media, mut camera) = (media?, camera?);
         let mut drafts: Vec<_> = drafts.into_iter().collect::<Option<_>>()?;
-        self.check_bodies_count(&drafts, &boxes);
-        self.check_lamps_are_free(&drafts, &boxes);
+        self.check_bodies_count(&rooms, &drafts, &boxes);
+        self.check_lamps_are_free(&rooms, &drafts, &boxes);
         let origin = extent::move_near_origin(&mut drafts, &mut lights, &mut camera);
         let bounds = extent::bounds(&drafts, &lights, &camera);
         let bodies = bodies::rank(&drafts).map_err(|error| self.problem("shapes", error)).ok()?;

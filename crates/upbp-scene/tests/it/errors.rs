@@ -195,10 +195,12 @@ fn problems_of_shapes_name_the_shape() {
             "shape `a`: `min` [0, 0, 0] is not below `max` [1, 0, 1] on every axis",
         ),
         (
-            r#"name: "a", geometry: Box(min: (-5, -5, -5), max: (5, 5, 5)), material: "white""#,
-            "2 problems in the scene
-  camera: lies inside of the opaque shape `a` (a room is made of quads)
-  light 1 (Point): lies inside of the opaque shape `a` (a room is made of quads)",
+            r#"name: "a", geometry: Box(min: (-1, 1.5, -1), max: (1, 2.5, 1)), material: "white""#,
+            "light 1 (Point): lies inside of the opaque shape `a`, and the camera does not",
+        ),
+        (
+            r#"name: "a", geometry: Box(min: (-1, 0, 3), max: (1, 2, 5)), material: "white""#,
+            "camera: lies inside of the opaque shape `a`, and nothing that shines does",
         ),
         (
             r#"name: "a", geometry: BALL, material: "glass"),
@@ -208,7 +210,7 @@ fn problems_of_shapes_name_the_shape() {
         (
             r#"name: "lamp", geometry: BALL, material: "white", emission: 1),
                (name: "a", geometry: Box(min: (-1.5, -1.5, -1.5), max: (1.5, 1.5, 1.5)), material: "white""#,
-            "shape `lamp`: lies inside of the opaque shape `a` (a room is made of quads)",
+            "shape `lamp`: lies inside of the opaque shape `a`, and the camera does not",
         ),
     ];
     for (shape, expected) in cases {
@@ -217,6 +219,49 @@ fn problems_of_shapes_name_the_shape() {
             .replace("BALL", "Sphere(centre: (0, 0, 0), radius: 1)");
         assert_eq!(problem(&format!("{MATERIALS} {LIGHT} shapes: [({shape})]")), expected);
     }
+}
+
+/// Of an opaque sphere of radius 2 that the camera is in, and what else there is.
+#[test]
+fn a_room_may_be_a_closed_shape() {
+    let room = |shapes: &str, rest: &str| {
+        let text = format!(
+            r#"(version: 1, camera: Perspective(origin: (0, 0, 1), target: (0, 0, 0), fov_degrees: 40), {MATERIALS}
+                shapes: [(name: "room", geometry: Sphere(centre: (0, 0, 0), radius: 2), material: "white"), {shapes}], {rest})"#
+        );
+        let text = text.replace("sigma_s: 1", "glow: 1");
+        ReadyScene::from_ron_str(&text, "").map(drop).map_err(|error| error.to_string())
+    };
+    let light = |y: f32| format!("lights: [Point(position: (0, {y:?}, 0), intensity: 1)]");
+    let ball = |y: f32, material: &str| {
+        format!(
+            r#"(name: "ball", geometry: Sphere(centre: (0, {y:?}, 0), radius: 0.1), material: {material}),"#
+        )
+    };
+    assert_eq!(room("", &light(1.0)), Ok(()));
+    assert_eq!(room(&ball(1.0, r#""white", emission: 1"#), ""), Ok(()));
+    assert_eq!(room(&ball(0.0, r#""glass""#), &light(1.0)), Ok(()));
+    // A lamp in its wall, and fog that glows.
+    let lamp = r#"(geometry: Quad(origin: (-0.5, 1.9, -0.5), edge_u: (1, 0, 0), edge_v: (0, 0, 1)), material: "white", emission: 1)"#;
+    assert_eq!(room(lamp, ""), Ok(()));
+    let fog = |y: f32| room(&ball(y, r#""null", interior: "fog""#), "").map_err(|_| ());
+    assert_eq!((fog(0.0), fog(3.0)), (Ok(()), Err(())));
+    let nothing = Err("1 problem in the scene
+  camera: lies inside of the opaque shape `room`, and nothing that shines does"
+        .to_owned());
+    assert_eq!(room("", &light(3.0)), nothing);
+    assert_eq!(room("", "lights: [Constant(1)]"), nothing);
+    assert_eq!(room(&ball(3.0, r#""white", emission: 1"#), ""), nothing);
+    // A light that the camera does not share a room with is no harm outside of it, but in another.
+    let both = "lights: [Point(position: (0, 1, 0), intensity: 1), Constant(1)]";
+    assert_eq!(room("", both), Ok(()));
+    assert_eq!(
+        room(&ball(1.0, r#""white""#), &light(1.0)).unwrap_err(),
+        "1 problem in the scene
+  light 1 (Point): lies inside of the opaque shape `ball`, and the camera does not"
+    );
+}
+
 #[test]
 fn pixels_narrower_than_directions_are_refused() {
     let camera = |degrees: &str, width: u32| {

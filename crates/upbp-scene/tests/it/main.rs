@@ -3,5 +3,6 @@
 mod checkers;
 mod errors;
 mod placement;
+mod rooms;
 mod shipped_scenes;
 mod vessels;
