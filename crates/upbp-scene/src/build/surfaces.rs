@@ -109,8 +109,11 @@ impl Builder<'_> {
                     format!("the material `{name}` is opaque, so that there is no interior for `{interior}`");
                 self.problem(&item, message);
             }
-            let boundary = BoundaryDraft::Opaque(material);
-            return Some(ShapeDraft { shape: geometry.ok()?, boundary, emission });
+            let (shape, boundary) = (geometry.ok()?, BoundaryDraft::Opaque(material));
+            if !emission.is_black() {
+                self.check_winding_of_lamp(&item, &shape);
+            }
+            return Some(ShapeDraft { shape, boundary, emission });
         }
         if !emission.is_black() {
             let message =
@@ -143,6 +146,24 @@ impl Builder<'_> {
             Kind::Null => BoundaryDraft::Null(inside(None)),
         };
         Some(ShapeDraft { shape: geometry, boundary, emission })
+    }
+
+    /// Reports a lamp that shines into itself, unless that is where the camera is.
+    fn check_winding_of_lamp(&mut self, item: &str, lamp: &Shape) {
+        let Shape::Mesh(mesh) = lamp else { return };
+        let description::Camera::Perspective { origin, .. } = &self.description.camera;
+        if mesh.has_mixed_winding() {
+            self.problem(
+                item,
+                "has an emission, but some triangles are wound the other way round than those next to them",
+            );
+        } else if mesh.is_closed() && mesh.signed_volume() < 0.0 && mesh.contains(origin.get()) != Some(true)
+        {
+            self.problem(
+                item,
+                "the triangles are wound the wrong way round: it shines on the side of its normals, which must point out of it",
+            );
+        }
     }
 
     fn geometry(&mut self, geometry: &Geometry) -> Result<Shape, String> {

@@ -263,6 +263,30 @@ fn a_room_may_be_a_closed_shape() {
 }
 
 #[test]
+fn a_lamp_wound_inside_out_is_refused_unless_the_camera_is_inside() {
+    let lamp = |indices: &str, scale: f32| {
+        problem(&format!(
+            r#"{MATERIALS} {LIGHT} shapes: [(name: "lamp", material: "white", emission: 1, geometry: Mesh(
+                positions: [(-1, -1, -1), (3, -1, -1), (-1, 3, -1), (-1, -1, 3)], indices: [{indices}], scale: {scale:?}))]"#
+        ))
+    };
+    let inwards = "(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)";
+    assert_eq!(
+        lamp(inwards, 0.1),
+        "shape `lamp`: the triangles are wound the wrong way round: it shines on the side of its normals, which must point out of it"
+    );
+    assert_eq!(
+        lamp("(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 3, 2)", 0.1),
+        "shape `lamp`: has an emission, but some triangles are wound the other way round than those next to them"
+    );
+    let text = format!(
+        r#"(version: 1, {CAMERA} {MATERIALS} shapes: [(material: "white", emission: 1, geometry: Mesh(
+            positions: [(-1, -1, -1), (3, -1, -1), (-1, 3, -1), (-1, -1, 3)], indices: [{inwards}], scale: 10))])"#
+    );
+    assert!(ReadyScene::from_ron_str(&text, "").is_ok());
+}
+
+#[test]
 fn pixels_narrower_than_directions_are_refused() {
     let camera = |degrees: &str, width: u32| {
         error(&format!(
