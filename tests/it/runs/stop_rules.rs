@@ -53,6 +53,36 @@ fn each_rule_stops() {
     assert_eq!(by_handle.film().iterations(), 2, "an abandoned iteration leaves no trace");
 }
 
+/// One iteration that would take most of a minute.
+#[test]
+fn long_iterations_are_shown_while_they_last() {
+    let room = upbp_testing::room(64);
+    let settings = Settings {
+        techniques: "bpt".parse().expect("technique names"),
+        connections: Some(4000.0),
+        ..Settings::default()
+    };
+    let mut renderer = upbp_testing::renderer(&room, settings);
+    let stop = Stop { iterations: Some(1), ..Stop::default() };
+    let (mut shown, mut last) = (0, 0.0);
+    let reason = renderer.render(&stop, |now| {
+        shown += 1;
+        assert_eq!(now.iterations, 0);
+        let done: f64 = now.film.begun().values().sum();
+        assert!(last < done && done < 1.0, "{done} after {last}");
+        assert_eq!(now.fraction, done);
+        last = done;
+        if shown < 2 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    assert_eq!((reason, shown), (StopReason::Cancelled, 2));
+    assert_eq!(renderer.film().begun().values().sum::<f64>(), last, "what was shown is on the film");
+    // What is given to another renderer is gone on with.
+    let state = renderer.state().clone();
+    let mut other = upbp_testing::renderer(&room, renderer.state().identity().settings.clone());
+    other.resume(state).expect("a state of the same render");
+    assert_eq!(other.film().begun().values().sum::<f64>(), last);
+}
+
 #[test]
 fn references_of_another_size_are_refused() {
     let room = upbp_testing::room(4);

@@ -1,6 +1,7 @@
 //! The progress bar: fits any terminal of 40 columns and more, and stays where it is when a render is
 //! stopped.
 
+use std::cell::Cell;
 use std::io::IsTerminal;
 use std::time::Duration;
 
@@ -13,13 +14,19 @@ const LINE: &str = "{elapsed_precise} {bar:20} {percent:>3} %  {wide_msg}";
 pub(crate) struct Bar {
     bar: ProgressBar,
     lines: bool,
+    /// Iterations that the last line told of.
+    told: Cell<u64>,
 }
 
 impl Bar {
     /// Makes a bar on the standard error; a quiet one shows nothing.
     pub(crate) fn on_stderr(quiet: bool) -> Self {
         let bar = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = Self { bar: Self::on(bar), lines: !quiet && !std::io::stderr().is_terminal() };
+        let bar = Self {
+            bar: Self::on(bar),
+            lines: !quiet && !std::io::stderr().is_terminal(),
+            told: Cell::new(0),
+        };
         // Iterations take seconds: the clock moves meanwhile.
         bar.bar.enable_steady_tick(Duration::from_millis(200));
         bar
@@ -42,7 +49,7 @@ impl Bar {
     /// Shows how many iterations and which fraction of the work are done.
     pub(crate) fn show(&self, iterations: u64, fraction: f64, message: String) {
         let percent = (100.0 * fraction) as u64;
-        if self.lines && iterations.is_power_of_two() {
+        if self.lines && iterations.is_power_of_two() && self.told.replace(iterations) != iterations {
             crate::exit::complain(&format!("{percent:3} %  {message}"));
         }
         self.bar.set_position(percent);
@@ -107,7 +114,7 @@ mod tests {
     fn lines(message: &str, is_done: bool) -> Vec<String> {
         let terminal = Terminal::default();
         let target = ProgressDrawTarget::term_like(Box::new(terminal.clone()));
-        let bar = Bar { bar: Bar::on(target), lines: false };
+        let bar = Bar { bar: Bar::on(target), lines: false, told: Cell::new(0) };
         bar.show(5, 0.379, message.to_owned());
         bar.end(is_done);
         let lines = terminal.0.lock().unwrap();

@@ -127,7 +127,7 @@ pub(crate) struct Saving {
     /// File to go on from if it is there, and to save to: now and then, at the end, and when interrupted
     #[arg(long, value_name = "FILE.state", value_parser = files::path(files::state), value_hint = ValueHint::FilePath)]
     pub(crate) state: Option<PathBuf>,
-    /// Time between two savings of the state; what is lost in a crash is no more than this and an iteration
+    /// Time between two savings of the state; what is lost in a crash is little more than this
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value = "60", requires = "state")]
     save_every: f64,
 }

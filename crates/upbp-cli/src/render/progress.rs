@@ -9,7 +9,7 @@ use upbp_core::{Progress, Renderer, State, Stop, StopReason};
 use super::bar::Bar;
 use crate::exit::{complain, describe};
 
-/// Work to be done after each iteration.
+/// Work to be done after each iteration, and about once a second within long ones.
 pub(crate) struct Beside<'a> {
     /// File for the state, and the time between two savings.
     pub(crate) state: Option<(&'a Path, Duration)>,

@@ -19,6 +19,9 @@ use crate::report::Report;
 use crate::settings::CheckedSettings;
 use crate::state::{Identity, PassSeconds, PassTimes, State, fingerprint};
 
+/// What watches a render.
+type Watcher<'w> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + 'w;
+
 /// A render of one scene.
 ///
 /// Iterations are independent given their index, and the same for any number of threads: the pool that is
@@ -153,17 +156,18 @@ impl<'a> Renderer<'a> {
     /// what is missing of it. `false` if there is none, or if it was cancelled: then some of it may be on the
     /// film.
     pub fn iterate(&mut self) -> bool {
-        self.iterate_until(&Stop::default())
+        self.iterate_until(&Stop::default(), &mut |_| ControlFlow::Continue(())).is_ok()
     }
 
-    /// Renders the next iteration, but ends when the time of `stop` is up.
-    fn iterate_until(&mut self, stop: &Stop) -> bool {
+    /// Renders the next iteration and shows now and then what is done of it, but ends when the time of `stop`
+    /// is up. An error is why it was not done.
+    fn iterate_until(&mut self, stop: &Stop, progress: &mut Watcher<'_>) -> Result<(), StopReason> {
         /// Sets of pixels that are traced together take at most about so long: what is lost when a render is
         /// stopped.
         const PORTION: Duration = Duration::from_millis(200);
-        let Some(iteration) = self.next_iteration() else { return false };
+        let iteration = self.next_iteration().ok_or(StopReason::Iterations)?;
         if self.canceller.is_cancelled() {
-            return false;
+            return Err(StopReason::Cancelled);
         }
         // Before the deadline is set: memory for a large picture is not had in no time.
         self.pixels.resize(self.state.film.len(), Pixel::BLACK);
@@ -171,32 +175,34 @@ impl<'a> Renderer<'a> {
             self.features.resize(self.state.film.len(), Features::NONE);
         }
         let plan = self.iteration_plan(iteration);
-        let halt = Halt { canceller: &self.canceller, deadline: self.deadline(stop) };
-        let State { record, film, .. } = &mut self.state;
-        let rect = film.rect();
+        let canceller = self.canceller.clone();
+        let mut halt = Halt { canceller: &canceller, deadline: self.deadline(stop) };
+        let film = &self.state.film;
+        let (rect, missing, is_first) = (film.rect(), film.missing(iteration), film.is_empty());
         // There is always a picture, however late.
         let unlimited = Halt { deadline: None, ..halt };
-        let light_halt = if film.is_empty() { &unlimited } else { &halt };
         let start = Instant::now();
+        let light_halt = if is_first { &unlimited } else { &halt };
         let light = self.engine.trace_light(&plan, rect, &mut self.pixels, light_halt);
         let Some(light) = light else {
-            record.times.add(&PassTimes { light: start.elapsed(), ..PassTimes::default() });
-            return false;
+            self.state.record.times.add(&PassTimes { light: start.elapsed(), ..PassTimes::default() });
+            return Err(self.interruption());
         };
-        let missing = film.missing(iteration);
         let (mut counters, mut times) = (light.counters, light.times);
         if missing.start > 0 {
             // Counted when the iteration was begun.
             counters = Counters::default();
         }
+        self.state.record.map_bytes = self.state.record.map_bytes.max(light.map_bytes);
         let mut clock = Clock::start();
-        let mut done = missing.start;
+        let (mut added, mut done) = (missing.start, missing.start);
+        let mut shown = start;
         while done < missing.end {
             // Half of what is left: a portion that does not end in time is lost.
             let portion = halt.time_left().map_or(PORTION, |left| PORTION.min(left / 2));
             let fit = self.set_time.map_or(1.0, |time| portion.as_secs_f64() / time.as_secs_f64().max(1e-9));
             let sets = done..done.saturating_add((fit as u32).max(1)).min(missing.end);
-            let camera_halt = if film.is_empty() && done == 0 { &unlimited } else { &halt };
+            let camera_halt = if is_first && done == 0 { &unlimited } else { &halt };
             let buffers = Buffers { pixels: &mut self.pixels, features: &mut self.features };
             let traced = self.engine.trace_camera(&plan, rect, &sets, buffers, camera_halt);
             let time = clock.lap();
@@ -205,17 +211,53 @@ impl<'a> Renderer<'a> {
             counters.add(&own);
             self.set_time = Some(time / sets.len() as u32);
             done = sets.end;
+            if done < missing.end && self.is_to_be_shown(shown) {
+                self.add_part(
+                    iteration,
+                    added..done,
+                    std::mem::take(&mut counters),
+                    std::mem::take(&mut times),
+                );
+                added = done;
+                let _ = clock.lap();
+                if progress(&self.progress(stop)).is_break() {
+                    return Err(StopReason::Cancelled);
+                }
+                // Does not count.
+                let spent = clock.lap();
+                halt.deadline = halt.deadline.and_then(|deadline| deadline.checked_add(spent));
+                shown = Instant::now();
+            }
         }
-        if done > missing.start {
-            counters.dropped += film.add_part(iteration, missing.start..done, &self.pixels, &self.features);
-            times.film = clock.lap();
-            self.film_time = times.film;
-            // What a state file says may be of any size: sums that saturate.
-            record.counters.add(&counters);
+        if done > added {
+            self.add_part(iteration, added..done, counters, times);
+        } else {
+            self.state.record.times.add(&times);
         }
+        if done == missing.end { Ok(()) } else { Err(self.interruption()) }
+    }
+
+    /// Adds sets of pixels of an iteration to the film, and to the record what was done for them.
+    fn add_part(&mut self, iteration: u64, sets: Range<u32>, mut counters: Counters, mut times: PassTimes) {
+        let start = Instant::now();
+        let State { record, film, .. } = &mut self.state;
+        counters.dropped += film.add_part(iteration, sets, &self.pixels, &self.features);
+        times.film = start.elapsed();
+        self.film_time = times.film;
+        // What a state file says may be of any size: sums that saturate.
+        record.counters.add(&counters);
         record.times.add(&times);
-        record.map_bytes = record.map_bytes.max(light.map_bytes);
-        done == missing.end
+    }
+
+    /// Whether what is done of an iteration is to be shown, if something last was at this moment: once a
+    /// second, unless adding it to the film would take much of the time.
+    fn is_to_be_shown(&self, last: Instant) -> bool {
+        last.elapsed() >= Duration::from_secs(1).max(20 * self.film_time)
+    }
+
+    /// Why an iteration was not done.
+    fn interruption(&self) -> StopReason {
+        if self.canceller.is_cancelled() { StopReason::Cancelled } else { StopReason::Time }
     }
 
     fn next_iteration(&self) -> Option<u64> {
@@ -227,54 +269,52 @@ impl<'a> Renderer<'a> {
         self.state.seconds().total()
     }
 
-    /// Renders until a rule of `stop` holds or `progress`, which is called after every whole iteration,
-    /// breaks, and says why it ends. After an iteration that ends in its middle [`film`](Self::film) has what
-    /// is done. Time spent in `progress`, and in comparing with the [reference](Start::reference), does not
-    /// count.
+    /// Renders until a rule of `stop` holds or `progress` breaks, and says why it ends. It is called after
+    /// every whole iteration, and about once a second within those that take longer: then
+    /// [`film`](Self::film) has what is done, as it has after an iteration that ends in its middle. Time spent
+    /// in `progress`, and in comparing with the [reference](Start::reference), does not count.
     pub fn render(
         &mut self,
         stop: &Stop,
-        progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
+        mut progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
     ) -> StopReason {
-        let reason = self.render_until(stop, progress);
+        let reason = self.render_until(stop, &mut progress);
         // Room for what is done with the picture.
         self.engine.shrink();
         reason
     }
 
-    fn render_until(
-        &mut self,
-        stop: &Stop,
-        mut progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
-    ) -> StopReason {
+    fn render_until(&mut self, stop: &Stop, progress: &mut Watcher<'_>) -> StopReason {
         self.estimated_error = self.state.film.estimated_error();
         loop {
             if let Some(reason) = self.reason_to_stop(stop) {
                 return reason;
             }
             let before = self.seconds();
-            if !self.iterate_until(stop) {
+            if let Err(reason) = self.iterate_until(stop, progress) {
                 // With what is done of the iteration, if anything.
                 if self.seconds() > before {
                     self.compare();
                 }
-                let cancelled = self.canceller.is_cancelled();
-                return if cancelled { StopReason::Cancelled } else { StopReason::Time };
+                return reason;
             }
             self.estimate_error();
             self.compare();
-            let film = &self.state.film;
-            let now = Progress {
-                iterations: film.iterations(),
-                seconds: self.seconds(),
-                fraction: self.fraction(stop),
-                estimated_error: self.estimated_error,
-                state: &self.state,
-                film,
-            };
-            if progress(&now).is_break() {
+            if progress(&self.progress(stop)).is_break() {
                 return StopReason::Cancelled;
             }
+        }
+    }
+
+    fn progress(&self, stop: &Stop) -> Progress<'_> {
+        let film = &self.state.film;
+        Progress {
+            iterations: film.iterations(),
+            seconds: self.seconds(),
+            fraction: self.fraction(stop),
+            estimated_error: self.estimated_error,
+            state: &self.state,
+            film,
         }
     }
 
@@ -323,10 +363,11 @@ impl<'a> Renderer<'a> {
 
     fn fraction(&self, stop: &Stop) -> f64 {
         let film = &self.state.film;
-        let in_range = film.iteration_set().count_in(&self.range);
-        let by_range = in_range as f64 / self.range.end.saturating_sub(self.range.start).max(1) as f64;
+        let begun: f64 = film.begun().values().sum();
+        let in_range = film.iteration_set().count_in(&self.range) as f64 + begun;
+        let by_range = in_range / self.range.end.saturating_sub(self.range.start).max(1) as f64;
         let by_iterations =
-            stop.iterations.map_or(0.0, |limit| film.iterations() as f64 / limit.max(1) as f64);
+            stop.iterations.map_or(0.0, |limit| (film.iterations() as f64 + begun) / limit.max(1) as f64);
         let by_time = stop.seconds.map_or(0.0, |limit| self.seconds() / limit);
         // The relMSE falls with the number of iterations.
         let by_error = stop.error.map_or(0.0, |limit| limit / self.estimated_error.high);

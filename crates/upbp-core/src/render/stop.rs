@@ -19,10 +19,10 @@ pub enum StopReason {
     Cancelled,
 }
 
-/// Progress of a render, after an iteration.
+/// Progress of a render, after an iteration or in the middle of a long one.
 #[non_exhaustive]
 pub struct Progress<'a> {
-    /// Iterations done.
+    /// Whole iterations done.
     pub iterations: u64,
     /// Seconds of rendering.
     pub seconds: f64,
