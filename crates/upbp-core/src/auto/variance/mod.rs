@@ -96,7 +96,7 @@ pub(super) struct Variance {
 
 impl Variance {
     /// Takes a pilot render. Samples that say too much are made smaller, and so are those of camera sub-paths
-    /// that do together.
+    /// that do together. Not so what pixels have in common: it is in few light sub-paths by its nature.
     pub(super) fn of(mut pilot: PilotRender) -> Self {
         pilot.make_relative(&relative_to(&surroundings(&pilot.means(), pilot.columns)));
         let per_look = 1.0 / (pilot.cells * pilot.passes) as f64;
@@ -119,12 +119,6 @@ impl Variance {
         }
         let looks = Looks::new(&pilot);
         pilot.samples = Vec::new();
-        let view = View::new(&pilot, &looks, &Counts::of(&pilot.plan, &pilot));
-        let parts: Vec<f64> = pilot.shared.iter().map(|shared| view.in_common(shared)).collect();
-        for (shared, reduction) in pilot.shared.iter_mut().zip(reductions(&parts)) {
-            // A square, as the parts are.
-            shared.weight *= f64::from(reduction * reduction);
-        }
         Self { pilot, looks }
     }
 
