@@ -1,8 +1,12 @@
 //! Scenes far from the origin of their coordinates, and scenes of any size.
 
 use upbp_core::{LightPaths, Radii, Radius, Roulette, Settings, TechniqueSet};
+use upbp_estimators::observer::NoObserver;
+use upbp_estimators::path::{Context, LightChunk, Scratch};
+use upbp_estimators::trace::trace_light_path;
+use upbp_estimators::{PreparedScene, StreamKind};
 use upbp_scene::ReadyScene;
-use upbp_testing::{render, render_channels};
+use upbp_testing::{render, render_channels, renderer};
 
 /// A glass ball in a box of fog under a lamp, and perhaps another light.
 fn scene(scale: f32, offset: f32, light: &str) -> ReadyScene {
@@ -82,6 +86,45 @@ fn a_scene_of_any_size_has_the_same_light() {
                 assert!(sigmas.abs() < 4.0, "{techniques}, 2^{exponent}: {found:?}, {expected:?}");
             }
         }
+    }
+}
+
+/// Photons of the sun have the digits of the place where they are, not those of a start beyond the horizon.
+#[test]
+fn sunlight_scatters_at_any_height_of_a_thin_layer() {
+    const PHOTONS: usize = 1000;
+    for sun in ["(0, -1, 0)", "(0.3, -1, 0.2)"] {
+        let text = format!(
+            "(version: 1, camera: Perspective(origin: (0, 0, 2), target: (0, 0, 0), fov_degrees: 20),
+            film: (width: 8, height: 8), media: {{\"mist\": Homogeneous(sigma_s: 5)}},
+            materials: {{\"null\": Null}},
+            shapes: [(geometry: Box(min: (-1e5, -0.2, -1e5), max: (1e5, 0.2, 1e5)), material: \"null\",
+                      interior: \"mist\")],
+            lights: [Directional(direction: {sun}, irradiance: 1)])"
+        );
+        let scene = ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let settings = Settings {
+            techniques: "pb2d".parse().expect("a technique"),
+            radii: Radii::all(Radius::Absolute(1e-2)),
+            ..Settings::default()
+        };
+        let plan = renderer(&scene, settings).iteration_plan(0);
+        let prepared = PreparedScene::new(&scene).expect("a valid scene");
+        let context = Context { prepared: &prepared, plan: &plan };
+        let (mut scratch, mut chunk) = (Scratch::default(), LightChunk::<_, f64, f64>::default());
+        let mut heights = Vec::new();
+        for path in 0.. {
+            trace_light_path(&context, StreamKind::Light, path, &mut scratch, &mut chunk, &mut NoObserver);
+            let vertices = chunk.vertices.drain(..).filter(|vertex| vertex.depth == 1);
+            heights.extend(vertices.map(|vertex| vertex.position.y));
+            if heights.len() >= PHOTONS {
+                break;
+            }
+        }
+        assert!(heights.iter().all(|height| height.abs() <= 0.2 + 1e-6), "sun {sun}");
+        heights.sort_unstable_by(f32::total_cmp);
+        heights.dedup();
+        assert!(heights.len() > PHOTONS * 9 / 10, "sun {sun}: {} heights", heights.len());
     }
 }
 

@@ -1,7 +1,7 @@
 //! Light sub-paths: they leave vertices, photon beams, and splats of light tracing.
 
 use glam::Vec3;
-use upbp_accel::{Segment, offset_origin};
+use upbp_accel::{Ray, Segment, offset_origin};
 use upbp_media::{Lanes, Medium, MediumId, MediumStack, Spectrum};
 
 use crate::counters::Counters;
@@ -14,7 +14,7 @@ use crate::path::{
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
-use crate::scene::{Emitter, EmitterKind, Scene, Walk};
+use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
 use crate::techniques::light_tracing;
 
@@ -41,7 +41,8 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let Context { prepared, plan } = *context;
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
-    let Some(mut flight) = emit(context, index, &mut stream, &mut out.counters, observer) else { return };
+    let (crossings, counters) = (&mut scratch.crossings, &mut out.counters);
+    let Some(mut flight) = emit(context, index, &mut stream, crossings, counters, observer) else { return };
     let scene = prepared.scene;
     let mut survival = Survival::of_light(plan.roulette, prepared.surroundings());
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
@@ -161,6 +162,7 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     index: u32,
     stream: &mut Stream,
+    crossings: &mut Vec<Crossing>,
     counters: &mut Counters,
     observer: &mut O,
 ) -> Option<Flight<O::Densities, L>> {
@@ -216,6 +218,12 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         _ => f64::from(u8::from(kind.is_hittable())),
     };
     observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
+    let needs_digits = context.plan.stores_medium_photons() || context.plan.stores_beams();
+    let origin = if kind.is_infinite() && (needs_digits || prepared.has_dense_media()) {
+        start_near_scene(prepared.scene, &Ray::new(origin, emission.direction), crossings)?
+    } else {
+        origin
+    };
     Some(Flight {
         origin,
         direction: emission.direction,
@@ -233,6 +241,18 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         infinite: kind.is_infinite(),
         hero,
     })
+}
+
+/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Places in media
+/// that are reached from there have the digits of their own coordinates, not those of a start as far away as the
+/// scene is wide.
+fn start_near_scene<S: Scene>(scene: &S, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Vec3> {
+    crossings.clear();
+    let hit = scene.trace(ray, crossings).map(|hit| hit.t);
+    let first = crossings.iter().map(|crossing| crossing.t).chain(hit).reduce(f32::min)?;
+    let margin = 16.0 * f32::EPSILON * (first + ray.origin.abs().max_element());
+    let along = f64::from((first - margin).max(0.0));
+    Some((ray.origin.as_dvec3() + along * ray.direction.as_dvec3()).as_vec3())
 }
 
 fn store_beams<S: Scene, D: Densities, L: Lanes>(
