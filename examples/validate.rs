@@ -160,7 +160,8 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
                 result.relative_mse,
             )?;
         }
-        println!("| {name} | *the reference itself* | | | | | | | | {:.1e} | |", reference.floor());
+        let floor = reference.floor().relative_mse;
+        println!("| {name} | *the reference itself* | | | | | | | | {floor:.1e} | |");
     }
     if !options.quick {
         let chosen: Vec<&str> = scenes.into_iter().filter(|name| EXPONENT_SCENES.contains(name)).collect();
@@ -188,7 +189,10 @@ fn render<'s>(
     let mut renderer = scene.renderer(settings.validate()?)?;
     let mut spread = Spread::default();
     renderer.render(stop, |now| {
-        spread.add(now.film);
+        // Iteration by iteration.
+        if now.film.begun().is_empty() {
+            spread.add(now.film);
+        }
         ControlFlow::Continue(())
     });
     // Errors need a number of iterations, however long they take.

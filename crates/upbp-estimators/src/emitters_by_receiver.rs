@@ -69,7 +69,7 @@ impl Default for ReceiverShares {
 }
 
 impl ReceiverShares {
-    /// The shares of what was seen within the bounds of the scene, or anywhere if nothing was seen there:
+    /// The shares of what was seen within `bounds`, or anywhere if nothing was seen there:
     /// receivers far out in clear air would take up the depth of the tree.
     pub(crate) fn fit(samples: &[ClusterSample], bounds: &BoundingSphere) -> Self {
         let mut samples: Vec<_> =

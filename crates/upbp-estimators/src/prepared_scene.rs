@@ -172,7 +172,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             Some(ClusterSample { receiver, cluster, light, others: others / within })
         };
         let samples: Vec<_> = samples.iter().filter_map(of_cluster).collect();
-        let receivers = Some(ReceiverShares::fit(&samples, &self.bounds));
+        let receivers = Some(ReceiverShares::fit(&samples, &self.bounds_with_camera));
         self.change(|choice| choice.receivers = receivers);
     }
 

@@ -123,8 +123,8 @@ struct Opaque {
     lamp: Option<Candidate>,
 }
 
-/// Keeps the nearer of two candidates; at equal distance that of the earlier shape: the order of the traversal
-/// does not matter. Returns the distance of the other.
+/// Keeps the nearer of two candidates; at equal distance that of the earlier shape: the order of the
+/// traversal does not matter. Returns the distance of the other.
 fn keep_nearer(nearest: &mut Option<Candidate>, candidate: &Candidate) -> f32 {
     let is_before = |a: &Candidate, b: &Candidate| {
         let key = |c: &Candidate| (c.shape, c.primitive);

@@ -35,8 +35,8 @@ struct Surface {
 }
 
 impl TriangleMesh {
-    /// The mesh of triangles that index `positions`; with `normals`, one per position and of any length, it is
-    /// shaded smoothly. Normals of zero leave it to those of the other corners, or to the plane.
+    /// The mesh of triangles that index `positions`; with `normals`, one per position and of any length, it
+    /// is shaded smoothly. Normals of zero leave it to those of the other corners, or to the plane.
     ///
     /// Triangles without area are dropped and counted, see [`TriangleMesh::dropped_triangles`].
     pub fn new(

@@ -334,8 +334,8 @@ impl<'a> Pair<'a> {
         std::array::from_fn(|c| self.scaled(a[c], b[c]).powi(2))
     }
 
-    /// Ratio of the errors of the means of square blocks, times their pixels, to those of pixels, as far as it
-    /// is more than the chance of independent errors; at least 1.
+    /// Ratio of the errors of the means of square blocks, times their pixels, to those of pixels, as far as
+    /// it is more than the chance of independent errors; at least 1.
     fn sharing(&self, relative: &[[f32; 3]]) -> f64 {
         let [a, b] = self.halves.map(|half| half.image);
         let block_row = |y: usize| {
@@ -355,7 +355,9 @@ impl<'a> Pair<'a> {
         };
         let rows: Vec<_> = (0..self.height).into_par_iter().step_by(SHARING).map(block_row).collect();
         let mut sums = [0.0; 3];
-        rows.into_iter().for_each(|row| add(&mut sums, row));
+        for row in rows {
+            add(&mut sums, row);
+        }
         let [blocks, pixels, squares] = sums;
         let by_chance = SIGMAS * (2.0 * squares).sqrt();
         // What is no number is not the larger one.

@@ -47,8 +47,8 @@ pub(super) fn rank(drafts: &[ShapeDraft]) -> Result<Vec<Body>, GeometryError> {
     Ok(bodies)
 }
 
-/// Whether a rough surface may lie between equal indices of refraction, where it passes light straight: that of
-/// its body and of vacuum, or of a body that may touch it.
+/// Whether a rough surface may lie between equal indices of refraction, where it passes light straight: that
+/// of its body and of vacuum, or of a body that may touch it.
 pub(super) fn may_match(bodies: &[Body], surfaces: &[Surface], geometry: &SceneGeometry) -> bool {
     /// In a scene of more pairs the answer is the one that is always allowed.
     const MOST_PAIRS: usize = 1 << 24;

@@ -6,8 +6,8 @@ use super::builder::Builder;
 use crate::camera::{PerspectiveCamera, PerspectiveView};
 use crate::description::Camera;
 
-/// The least width of a pixel in the middle of the image, radians: directions in single precision are up to an
-/// eighth of it apart.
+/// The least width of a pixel in the middle of the image, radians: directions in single precision are up to
+/// an eighth of it apart.
 const LEAST_PIXEL: f64 = 4.0 * f32::EPSILON as f64;
 
 impl Builder<'_> {

@@ -112,7 +112,7 @@ impl Builder<'_> {
         let boxes = drafts.iter().map(aabb);
         let boxes = BoxTree::new(boxes).map_err(|error| self.problem("shapes", error)).ok()?;
         let rooms = self.rooms_of_camera(&drafts, &boxes);
-        if let Some(media) = &media {
+        if let (Some(_), Some(media)) = (&camera, &media) {
             let outside = outside.and_then(|id| media.get(id.0 as usize));
             self.check_camera_is_lit(&rooms, &drafts, media, outside);
         }

@@ -220,7 +220,7 @@ fn photons_that_neighbours_share_do_not_excuse_themselves() {
     assert!((0.67..1.5).contains(&(found / truth)), "{}", found / truth);
 }
 
-/// Two halves of unit light with normal noise, each pixel of which is the mean of a square of `reach` × `reach`
+/// Two halves of unit light with normal noise, of which each pixel sums a square of `reach` × `reach`
 /// numbers, and the true error of their mean.
 fn blotches(seed: u64, reach: usize) -> ([Vec<[f32; 3]>; 2], f64) {
     let mut random = Uniform::new(seed);
@@ -241,7 +241,7 @@ fn blotches(seed: u64, reach: usize) -> ([Vec<[f32; 3]>; 2], f64) {
 
 /// An estimate from normal errors that squares of k × k of n pixels share has the relative variance
 /// `2 Σ c² / n ≈ 2 (2k/3)² / n`, with correlations c, and so has the true error, which is independent of it.
-/// An interval of `2 √(3 ρ / n)`, `ρ ≤ Σ c = k²`, is 2.6 standard deviations of their ratio wide to each side.
+/// An interval of `2 √(3 ρ / n)`, `ρ ≤ Σ c = k²`, is 2.6 standard deviations of their ratio to each side.
 /// By S alone, with ρ = 1 and 0.1 for the converged values, it would be 1.05 for k = 7 and 0.7 for k = 11.
 #[test]
 fn what_neighbours_share_makes_the_interval_wider() {
@@ -258,8 +258,8 @@ fn what_neighbours_share_makes_the_interval_wider() {
     }
 }
 
-/// The sharing of independent errors is one, however few pixels make them. That of normal errors of squares of
-/// k × k pixels is `Σ c = (k − (k² − 1)/48)²` within blocks, less twice the `√(2 / blocks)` by chance.
+/// The sharing of independent errors is one, however few pixels make them. That of normal errors of squares
+/// of k × k pixels is `Σ c = (k − (k² − 1)/48)²` within blocks, less twice the `√(2 / blocks)` by chance.
 #[test]
 fn sharing_is_the_number_of_pixels_that_share_an_error() {
     let sharing = |images: &[Vec<[f32; 3]>; 2]| ErrorMap::new(SIDE, halves(images)).sharing;
