@@ -102,27 +102,25 @@ fn radii_do_not_depend_on_how_far_walks_get() {
     }
 }
 
-/// Most edges in a room are in the air, where no photons are looked up.
+/// Most edges in a room are in the air, where no photons are looked up: kernels suit the many photons in the
+/// juice, and are not as wide as they may be, 0.3 % of the picture.
 #[test]
-fn radii_in_a_body_do_not_depend_on_the_room_around_it() {
-    let radii_with = |walls: &str| {
-        let text = r#"(version: 1, media: { "juice": Homogeneous(sigma_s: 12, sigma_a: 0.5) },
-            camera: Perspective(origin: (0, 0.3, 1.5), target: (0, 0, 0), fov_degrees: 60),
-            film: (width: 64, height: 48), materials: { "white": Lambert(0.7), "clear": Null },
-            shapes: [WALLS (geometry: Sphere(centre: (0, 0, 0), radius: 0.25), material: "clear", interior: "juice")],
-            lights: [Point(position: (0.5, 1.2, 0.8), intensity: 5)])"#;
-        let scene = ReadyScene::from_ron_str(&text.replace("WALLS", walls), ".").expect("a valid scene");
-        let settings = Settings { light_paths: LightPaths::Count(50_000), ..settings() };
-        plan(&scene, settings).radii
-    };
-    let wall = "(geometry: Box(min: (-2, -0.3, -2), max: (2, -0.28, 2)), material: \"white\"),
-        (geometry: Quad(origin: (-2, -0.3, -2), edge_u: (4, 0, 0), edge_v: (0, 3, 0)), material: \"white\"),
-        (geometry: Quad(origin: (-2, -0.3, -2), edge_u: (0, 3, 0), edge_v: (0, 0, 4)), material: \"white\"),";
-    let [alone, in_a_room] = ["", wall].map(radii_with);
-    println!("{alone:?}\n{in_a_room:?}");
-    for (alone, in_a_room) in [(alone.pb2d, in_a_room.pb2d), (alone.pp3d, in_a_room.pp3d)] {
-        assert!((0.5..2.0).contains(&(in_a_room / alone)), "{in_a_room} in a room, {alone} alone");
-    }
+fn radii_are_those_for_bodies_in_a_room_and_not_for_the_air() {
+    let text = r#"(version: 1, media: { "juice": Homogeneous(sigma_s: 4, sigma_a: 0.2) },
+        camera: Perspective(origin: (0, 0.3, 1.5), target: (0, 0, 0), fov_degrees: 60),
+        film: (width: 64, height: 48), materials: { "white": Lambert(0.7), "clear": Null },
+        shapes: [
+            (geometry: Box(min: (-2, -0.3, -2), max: (2, -0.28, 2)), material: "white"),
+            (geometry: Quad(origin: (-2, -0.3, -2), edge_u: (4, 0, 0), edge_v: (0, 3, 0)), material: "white"),
+            (geometry: Quad(origin: (-2, -0.3, -2), edge_u: (0, 3, 0), edge_v: (0, 0, 4)), material: "white"),
+            (geometry: Sphere(centre: (0, 0, 0), radius: 0.25), material: "clear", interior: "juice"),
+        ],
+        lights: [Point(position: (0, 0, 0), intensity: 5)])"#;
+    let scene = ReadyScene::from_ron_str(text, ".").expect("a valid scene");
+    let radii = plan(&scene, Settings { light_paths: LightPaths::Count(400_000), ..settings() }).radii;
+    println!("{radii:?}");
+    // On surfaces photons are rare.
+    assert!(radii.pb2d < 0.5 * radii.surf, "{radii:?}");
 }
 
 #[test]

@@ -56,10 +56,10 @@ fn each_rule_stops() {
 /// One iteration that would take most of a minute.
 #[test]
 fn long_iterations_are_shown_while_they_last() {
-    let room = upbp_testing::room(64);
+    let room = upbp_testing::room(128);
     let settings = Settings {
         techniques: "bpt".parse().expect("technique names"),
-        connections: Some(4000.0),
+        connections: Some(1000.0),
         ..Settings::default()
     };
     let mut renderer = upbp_testing::renderer(&room, settings);

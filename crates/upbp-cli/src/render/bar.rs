@@ -1,8 +1,8 @@
 //! The progress bar: fits any terminal of 40 columns and more, and stays where it is when a render is
 //! stopped.
 
-use std::cell::Cell;
 use std::io::IsTerminal;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -15,7 +15,7 @@ pub(crate) struct Bar {
     bar: ProgressBar,
     lines: bool,
     /// Iterations that the last line told of.
-    told: Cell<u64>,
+    told: AtomicU64,
 }
 
 impl Bar {
@@ -25,7 +25,7 @@ impl Bar {
         let bar = Self {
             bar: Self::on(bar),
             lines: !quiet && !std::io::stderr().is_terminal(),
-            told: Cell::new(0),
+            told: AtomicU64::new(0),
         };
         // Iterations take seconds: the clock moves meanwhile.
         bar.bar.enable_steady_tick(Duration::from_millis(200));
@@ -49,7 +49,10 @@ impl Bar {
     /// Shows how many iterations and which fraction of the work are done.
     pub(crate) fn show(&self, iterations: u64, fraction: f64, message: String) {
         let percent = (100.0 * fraction) as u64;
-        if self.lines && iterations.is_power_of_two() && self.told.replace(iterations) != iterations {
+        if self.lines
+            && iterations.is_power_of_two()
+            && self.told.swap(iterations, Ordering::Relaxed) != iterations
+        {
             crate::exit::complain(&format!("{percent:3} %  {message}"));
         }
         self.bar.set_position(percent);
@@ -114,7 +117,7 @@ mod tests {
     fn lines(message: &str, is_done: bool) -> Vec<String> {
         let terminal = Terminal::default();
         let target = ProgressDrawTarget::term_like(Box::new(terminal.clone()));
-        let bar = Bar { bar: Bar::on(target), lines: false, told: Cell::new(0) };
+        let bar = Bar { bar: Bar::on(target), lines: false, told: AtomicU64::new(0) };
         bar.show(5, 0.379, message.to_owned());
         bar.end(is_done);
         let lines = terminal.0.lock().unwrap();
