@@ -17,7 +17,7 @@ use crate::settings::Settings;
 /// The techniques that remain, and why others do not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TechniqueSupport {
-    /// Those that the settings allow and the scene can use; a [plan](crate::Plan) runs some of them.
+    /// Techniques that the settings allow and the scene can use; a [plan](crate::Plan) runs some of them.
     pub techniques: TechniqueSet,
     /// Whether there may be light that only merges find: of a light that cannot be hit, through a specular
     /// surface to a place that is seen through another.
