@@ -269,10 +269,12 @@ impl<'a> Renderer<'a> {
         self.state.seconds().total()
     }
 
-    /// Renders until a rule of `stop` holds or `progress` breaks, and says why it ends. It is called after
-    /// every whole iteration, and about once a second within those that take longer: then
-    /// [`film`](Self::film) has what is done, as it has after an iteration that ends in its middle. Time spent
-    /// in `progress`, and in comparing with the [reference](Start::reference), does not count.
+    /// Renders until a rule of `stop` holds or `progress` breaks, and says why it ends.
+    ///
+    /// `progress` is called after every whole iteration, and about once a second within those that take
+    /// longer, with what is done of them on the [film](Progress::film); so there is on that of an iteration
+    /// that ends in its middle. Time spent in `progress`, and in comparing with the
+    /// [reference](Start::reference), does not count.
     pub fn render(
         &mut self,
         stop: &Stop,

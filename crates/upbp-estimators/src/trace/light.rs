@@ -243,9 +243,9 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     })
 }
 
-/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Places in media
-/// that are reached from there have the digits of their own coordinates, not those of a start as far away as the
-/// scene is wide.
+/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Places in
+/// media that are reached from there have the digits of their own coordinates, not those of a start as far
+/// away as the scene is wide.
 fn start_near_scene<S: Scene>(scene: &S, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Vec3> {
     crossings.clear();
     let hit = scene.trace(ray, crossings).map(|hit| hit.t);

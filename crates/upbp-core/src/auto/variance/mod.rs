@@ -250,8 +250,8 @@ impl Moments {
 }
 
 /// Variances of groups, whose sum is no less than it may be. Not each for itself: where a plan has many times
-/// the photons of the pilot render, the noise of a group is larger than its variance, and if groups could only
-/// be too large, so would be their sum.
+/// the photons of the pilot render, the noise of a group is larger than its variance, and if groups could
+/// only be too large, so would be their sum.
 fn variances(groups: &[Moments; GROUPS], light_paths: f64) -> [f64; GROUPS] {
     let mut all = Moments::default();
     groups.iter().for_each(|group| all.add(group));
