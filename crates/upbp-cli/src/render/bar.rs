@@ -13,20 +13,16 @@ const LINE: &str = "{elapsed_precise} {bar:20} {percent:>3} %  {wide_msg}";
 /// A progress bar on a terminal; elsewhere, lines now and then.
 pub(crate) struct Bar {
     bar: ProgressBar,
-    lines: bool,
-    /// Iterations that the last line told of.
-    told: AtomicU64,
+    /// Iterations that the last line told of, where lines stand for the bar.
+    lines: Option<AtomicU64>,
 }
 
 impl Bar {
     /// Makes a bar on the standard error; a quiet one shows nothing.
     pub(crate) fn on_stderr(quiet: bool) -> Self {
         let bar = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = Self {
-            bar: Self::on(bar),
-            lines: !quiet && !std::io::stderr().is_terminal(),
-            told: AtomicU64::new(0),
-        };
+        let lines = !quiet && !std::io::stderr().is_terminal();
+        let bar = Self { bar: Self::on(bar), lines: lines.then(AtomicU64::default) };
         // Iterations take seconds: the clock moves meanwhile.
         bar.bar.enable_steady_tick(Duration::from_millis(200));
         bar
@@ -49,9 +45,9 @@ impl Bar {
     /// Shows how many iterations and which fraction of the work are done.
     pub(crate) fn show(&self, iterations: u64, fraction: f64, message: String) {
         let percent = (100.0 * fraction) as u64;
-        if self.lines
+        if let Some(told) = &self.lines
             && iterations.is_power_of_two()
-            && self.told.swap(iterations, Ordering::Relaxed) != iterations
+            && told.swap(iterations, Ordering::Relaxed) != iterations
         {
             crate::exit::complain(&format!("{percent:3} %  {message}"));
         }
@@ -117,7 +113,7 @@ mod tests {
     fn lines(message: &str, is_done: bool) -> Vec<String> {
         let terminal = Terminal::default();
         let target = ProgressDrawTarget::term_like(Box::new(terminal.clone()));
-        let bar = Bar { bar: Bar::on(target), lines: false, told: AtomicU64::new(0) };
+        let bar = Bar { bar: Bar::on(target), lines: None };
         bar.show(5, 0.379, message.to_owned());
         bar.end(is_done);
         let lines = terminal.0.lock().unwrap();

@@ -112,7 +112,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
         } else {
             RadiusField::Uniform
         };
-        Some(Statistics { lanes, ..light.statistics(&plan, field, queries, scene.bounds.radius) })
+        Some(Statistics { lanes, ..light.statistics(&plan, field, &queries, scene.bounds.radius) })
     };
     allowance.largest(run).ok_or(RenderError::Cancelled)
 }
@@ -220,7 +220,7 @@ impl LightPaths {
         &self,
         plan: &IterationPlan,
         field: RadiusField,
-        queries: Queries,
+        queries: &Queries,
         scale: f32,
     ) -> Statistics {
         let (paths, beam_paths) = (f64::from(self.paths), f64::from(plan.beam_paths));
@@ -349,11 +349,10 @@ impl<B> Observer<B> for QueryRecorder {
     fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
         match vertex.interaction {
             Interaction::Surface(_) if !vertex.delta => self.surfaces.push(vertex.position),
-            Interaction::Surface(_) => {}
             Interaction::Medium(_) if !std::mem::replace(&mut self.known[1], true) => {
                 self.media.push(vertex.position);
             }
-            Interaction::Medium(_) => {}
+            Interaction::Surface(_) | Interaction::Medium(_) => {}
         }
         let between = vertex.position - self.last;
         let length = between.length();

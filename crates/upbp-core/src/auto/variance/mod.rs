@@ -254,7 +254,9 @@ impl Moments {
 /// only be too large, so would be their sum.
 fn variances(groups: &[Moments; GROUPS], light_paths: f64) -> [f64; GROUPS] {
     let mut all = Moments::default();
-    groups.iter().for_each(|group| all.add(group));
+    for group in groups {
+        all.add(group);
+    }
     let missing = (all.least_variance(light_paths) - all.variance()).max(0.0);
     groups.map(|group| group.variance() + missing / GROUPS as f64)
 }
