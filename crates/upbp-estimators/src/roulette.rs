@@ -50,7 +50,7 @@ const FREE_REFLECTIONS: u32 = 256;
 /// that gets out of the wall of a vessel after as many has 2.7 times the throughput.
 const REFLECTS_ON: f32 = 0.998;
 
-/// What a walk gets lost in: a medium around the scene.
+/// A medium around the scene, in which walks get lost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// A sphere around the scene and its camera, within which distance ends no walk.
@@ -80,7 +80,7 @@ pub struct Survival {
     left: f32,
     /// Vertices in a row without a smooth lobe.
     reflections: u32,
-    /// What the walk may get lost in, if anything.
+    /// The medium in which the walk may get lost, if there is one.
     surroundings: Option<Surroundings>,
     /// Part of the walks as far away that go on.
     not_lost: f32,

@@ -120,7 +120,7 @@ fn fluence_around_a_point_source() {
 /// The roulette changes no mean of the light that comes back from far away in a medium that absorbs nothing.
 #[test]
 fn lost_walks_end_without_bias() {
-    /// Edges of a walk at most: it gets some five times as far as the neighbourhood of the scene is wide.
+    /// Edges of a walk at most: it gets some thirty free paths far.
     const LONGEST: u32 = 1000;
     let returning = |roulette, paths| {
         let (mut sums, mut edges) = (Sums::default(), 0);

@@ -22,7 +22,7 @@ pub(super) trait Region {
     fn overlaps<W: Wide>(&self, wide: W, boxes: &impl Boxes) -> u32;
 }
 
-/// How far a point is below and above each of eight boxes along each axis, negative inside.
+/// Distances of a point below and above each of eight boxes along each axis, negative inside.
 struct Offsets<F> {
     below: [F; 3],
     above: [F; 3],

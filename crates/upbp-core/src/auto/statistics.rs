@@ -303,10 +303,11 @@ struct Queries {
     surfaces: Vec<Vec3>,
     media: Vec<Vec3>,
     edges: Vec<Ray>,
+    /// The first vertex of each sub-path that scatters in more than one direction.
     first: Vec<Seen>,
 }
 
-/// What a pixel sees: where a camera sub-path first scatters in more than one direction.
+/// A vertex that a pixel sees.
 struct Seen {
     place: Vec3,
     /// Width of the pixel there, scene units.
@@ -327,8 +328,10 @@ struct QueryRecorder {
     pixel: Option<f32>,
     /// Whether the edge at hand, or one before, is in a medium that scatters.
     in_medium: bool,
-    /// Whether such an edge is written down, and a vertex in a medium.
-    known: [bool; 2],
+    /// Whether an edge of the sub-path in such a medium has been met.
+    has_edge: bool,
+    /// Whether a vertex of it in a medium has been met.
+    has_medium: bool,
 }
 
 impl<B> Observer<B> for QueryRecorder {
@@ -339,7 +342,8 @@ impl<B> Observer<B> for QueryRecorder {
         self.travelled = 0.0;
         self.pixel = Some(ray.pdf.sqrt().recip());
         self.in_medium = false;
-        self.known = [false; 2];
+        self.has_edge = false;
+        self.has_medium = false;
     }
 
     fn call(&mut self, technique: Technique, _: u32) {
@@ -349,15 +353,16 @@ impl<B> Observer<B> for QueryRecorder {
     fn camera_vertex(&mut self, vertex: &ObservedVertex<B>) {
         match vertex.interaction {
             Interaction::Surface(_) if !vertex.delta => self.surfaces.push(vertex.position),
-            Interaction::Medium(_) if !std::mem::replace(&mut self.known[1], true) => {
+            Interaction::Medium(_) if !self.has_medium => {
+                self.has_medium = true;
                 self.media.push(vertex.position);
             }
             Interaction::Surface(_) | Interaction::Medium(_) => {}
         }
         let between = vertex.position - self.last;
         let length = between.length();
-        let is_first = self.in_medium && !std::mem::replace(&mut self.known[0], self.in_medium);
-        if is_first && length > 0.0 && length.is_finite() {
+        if self.in_medium && !self.has_edge && length > 0.0 && length.is_finite() {
+            self.has_edge = true;
             self.edges.push(Ray {
                 origin: self.last,
                 direction: between / length,

@@ -19,7 +19,7 @@ use crate::report::Report;
 use crate::settings::CheckedSettings;
 use crate::state::{Identity, PassSeconds, PassTimes, State, fingerprint};
 
-/// What watches a render.
+/// The callback that is told of the progress of a render.
 type Watcher<'w> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + 'w;
 
 /// A render of one scene.
@@ -255,7 +255,7 @@ impl<'a> Renderer<'a> {
         last.elapsed() >= Duration::from_secs(1).max(20 * self.film_time)
     }
 
-    /// Why an iteration was not done.
+    /// The reason for an iteration that is not done.
     fn interruption(&self) -> StopReason {
         if self.canceller.is_cancelled() { StopReason::Cancelled } else { StopReason::Time }
     }

@@ -102,7 +102,7 @@ impl Builder<'_> {
         }
     }
 
-    /// What is wrong with a light in a room that the camera is not in.
+    /// The message about a light in a room that the camera is not in.
     pub(super) fn message_of_room(&self, room: usize) -> String {
         format!("lies inside of the opaque {}, and the camera does not", self.shape_item(room))
     }
