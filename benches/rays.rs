@@ -89,10 +89,10 @@ fn balls(are_copies: bool) -> Vec<Shape> {
         let place = Vec3::new((number % 3) as f32, (number / 3 % 3) as f32, (number / 9) as f32) - 1.0;
         let turned = Quat::from_rotation_y(number as f32);
         let to_scene = Affine3A::from_scale_rotation_translation(Vec3::splat(0.25), turned, place * 0.6);
-        let copy = ball.placed(&to_scene).expect("a copy");
-        if are_copies { copy } else { copy.unshared() }
+        let copy = if are_copies { ball.placed(&to_scene) } else { ball.transformed(&to_scene) };
+        copy.expect("a copy").into()
     };
-    (0..27).map(|number| copy(number).into()).collect()
+    (0..27).map(copy).collect()
 }
 
 fn rays(coherent: bool) -> Vec<Ray> {

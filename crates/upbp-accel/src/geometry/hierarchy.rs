@@ -98,6 +98,12 @@ impl Node {
         }
         node
     }
+
+    /// The box of a child.
+    fn bounds(&self, lane: usize) -> (Vec3, Vec3) {
+        let corner = |side: usize| Vec3::from_array(self.boxes.map(|planes| planes[side][lane]));
+        (corner(0), corner(1))
+    }
 }
 
 /// A hierarchy of boxes with eight children to a node.
@@ -141,6 +147,31 @@ impl Hierarchy {
             }
         }
         ControlFlow::Continue(())
+    }
+
+    /// The greatest `value` of a block, where no block in a box has more than `most` of that box.
+    pub(super) fn greatest(
+        &self,
+        most: impl Fn((Vec3, Vec3)) -> f32,
+        value: impl Fn(BlockRef) -> f32,
+    ) -> f32 {
+        let mut greatest = f32::NEG_INFINITY;
+        let mut waiting: Vec<_> = self.roots.iter().map(|&root| (f32::INFINITY, root)).collect();
+        while let Some((most_here, child)) = waiting.pop() {
+            if most_here <= greatest {
+                continue;
+            }
+            if child.is_block() {
+                greatest = greatest.max(value(child.as_block()));
+            } else {
+                let (node, first) = (&self.nodes[child.index()], waiting.len());
+                let below =
+                    set_lanes(node.existing).map(|lane| (most(node.bounds(lane)), node.children[lane]));
+                waiting.extend(below);
+                waiting[first..].sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            }
+        }
+        greatest
     }
 
     /// The part of [`traverse`](Self::traverse) below the node `root`.

@@ -5,21 +5,19 @@
 //! mesh were there itself, to the last bit. Boxes are taken to be wider than they are by what both ways round
 //! off.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use super::build::{Boxed, Leaves, build};
 use super::error::GeometryError;
 use super::hierarchy::{BlockRef, Child, Hierarchy, Kind, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, Visit};
 use super::lane_ray::{LaneRay, ROUNDING, SLAB_ROUNDING, SlabRay, Widened};
-use super::mesh::TriangleMesh;
+use super::model::Model;
 use super::placement::Placement;
-use super::primitive::{Blocks, Name, Packing};
-use super::primitive_block::{Block as _, TriangleRay, Triangles};
+use super::primitive_block::{Block as _, TriangleRay};
 use super::shape::Shape;
 use crate::ray::Ray;
 use crate::simd::{Task, Wide, set_lanes};
@@ -29,14 +27,13 @@ use crate::simd::{Task, Wide, set_lanes};
 pub(super) struct Instances {
     hierarchy: Hierarchy,
     copies: Vec<Instance>,
-    models: Vec<Model>,
 }
 
 /// A copy of a mesh.
 #[derive(Clone, Debug)]
 struct Instance {
     shape: u32,
-    model: usize,
+    model: Arc<Model>,
     placement: Placement,
     bounds: (Vec3, Vec3),
     /// The largest number that adds to a coordinate of a corner.
@@ -55,35 +52,21 @@ impl Instance {
 /// number that adds to a coordinate: three products and a sum of four, and a rounding, twice over.
 const PLACING: f32 = 16.0 * f32::EPSILON;
 
-/// A mesh in coordinates of its own.
-#[derive(Clone, Debug)]
-struct Model {
-    hierarchy: Hierarchy,
-    triangles: Blocks<Triangles>,
-}
-
 impl Instances {
     /// The placed meshes of a list of shapes.
     pub(super) fn of(shapes: &[Shape]) -> Result<Self, GeometryError> {
-        let mut numbers = BTreeMap::new();
-        let (mut copies, mut models) = (Vec::new(), Vec::new());
+        let mut copies = Vec::new();
         for (shape, index) in shapes.iter().zip(0..) {
             let Shape::Mesh(mesh) = shape else { continue };
             let Some(placement) = mesh.placement() else { continue };
-            let next = models.len();
-            let model = *numbers.entry(mesh.number()).or_insert(next);
-            if model == next {
-                models.push(mesh.model());
-            }
-            let (min, max) = models[model].aabb();
+            let (min, max) = mesh.bounds_in_mesh();
             let reach = placement.reach(min.abs().max(max.abs()));
-            let (placement, bounds) = (*placement, mesh.aabb());
+            let (model, placement, bounds) = (mesh.model().clone(), *placement, mesh.aabb());
             copies.push(Instance { shape: index, model, placement, bounds, reach });
         }
         if copies.len() > MAX_INDEX {
             return Err(GeometryError::TooManyPrimitives { count: copies.len() });
         }
-        let models = models.iter().map(Model::build).collect::<Result<_, _>>()?;
         let boxed = |instance: &Instance| {
             let (min, max) = instance.bounds;
             Boxed { min, max, kind: Kind::Box }
@@ -91,29 +74,11 @@ impl Instances {
         let boxes: Vec<_> = copies.iter().map(boxed).collect();
         let hierarchy =
             build(&boxes, Leaves::BOXES, &mut |kind, members| Child::block(kind, members[0] as usize, 1));
-        Ok(Self { hierarchy, copies, models })
+        Ok(Self { hierarchy, copies })
     }
 
     pub(super) fn is_empty(&self) -> bool {
         self.copies.is_empty()
-    }
-}
-
-impl Model {
-    fn build(mesh: &TriangleMesh) -> Result<Self, GeometryError> {
-        let count = mesh.triangle_count();
-        if count as usize > MAX_INDEX {
-            return Err(GeometryError::TooManyPrimitives { count: count as usize });
-        }
-        let boxed = |triangle| Boxed::triangle(mesh.corners(triangle));
-        let boxes: Vec<_> = (0..count).into_par_iter().with_min_len(1024).map(boxed).collect();
-        let mut packing = Packing::default();
-        let hierarchy = build(&boxes, Leaves::PRIMITIVES, &mut |kind, members| packing.add(kind, members));
-        let triangles = packing.pack(Kind::Triangle, |triangle| {
-            // Each copy is a shape of its own.
-            Some((Name { shape: u32::MAX, triangle }, mesh.corners(triangle)))
-        });
-        Ok(Self { hierarchy, triangles })
     }
 }
 
@@ -176,7 +141,7 @@ impl<const IN_ORDER: bool> Visitor for EachInstance<'_, IN_ORDER> {
             t_max: f32::INFINITY,
         };
         let margins = placement.size_in_mesh(f64::from(margin)).as_vec3();
-        let model = &instances.models[instance.model];
+        let model = &*instance.model;
         let mut triangles =
             InstanceTriangles { ray, triangle_ray, instance, model, start, t_max: *t_max, visit };
         let mut own_t_max = triangles.own_t_max();

@@ -5,7 +5,10 @@ use std::sync::{Arc, OnceLock};
 use glam::{Affine3A, DVec3, Vec3};
 
 use super::error::GeometryError;
+use super::hierarchy::MAX_INDEX;
+use super::model::Model;
 use super::placement::{Placement, unit};
+use super::surface::{Border, Surface, cross, cumulative_area, normal_cone};
 use super::triangle::RayShear;
 use crate::ray::Ray;
 
@@ -20,18 +23,9 @@ pub struct TriangleMesh {
     surface: Arc<Surface>,
     placement: Option<Placement>,
     bounds: (Vec3, Vec3),
-    /// Area of the triangles up to and including each, once it is asked for.
-    cumulative_area: OnceLock<Vec<f64>>,
-}
-
-/// Triangles in coordinates of their own.
-#[derive(Clone, Debug)]
-struct Surface {
-    positions: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-    normals: Option<Vec<Vec3>>,
-    border: Border,
-    dropped: usize,
+    /// Area of the triangles of a copy up to and including each, if it is not in proportion to that of the
+    /// surface, once it is asked for.
+    stretched_area: OnceLock<Vec<f64>>,
 }
 
 impl TriangleMesh {
@@ -77,69 +71,72 @@ impl TriangleMesh {
         }
         let dropped = count - triangles.len();
         let normals = normals.map(|normals| normals.into_iter().map(unit).collect());
-        let surface = Arc::new(Surface { positions, triangles, normals, border, dropped });
-        Ok(Self::with_surface(surface, None))
+        Ok(Self::with_surface(Surface::new(positions, triangles, normals, border, dropped)))
     }
 
-    fn with_surface(surface: Arc<Surface>, placement: Option<Placement>) -> Self {
-        let mut mesh = Self {
-            surface,
-            placement,
-            bounds: (Vec3::INFINITY, Vec3::NEG_INFINITY),
-            cumulative_area: OnceLock::new(),
-        };
-        for triangle in 0..mesh.triangle_count() {
-            for corner in mesh.corners(triangle) {
-                mesh.bounds = (mesh.bounds.0.min(corner), mesh.bounds.1.max(corner));
-            }
-        }
-        mesh
+    fn with_surface(surface: Surface) -> Self {
+        let bounds = surface.bounds();
+        Self { surface: Arc::new(surface), placement: None, bounds, stretched_area: OnceLock::new() }
     }
 
     /// A copy in another place, which shares the triangles. `to_scene` maps all corners from where they are
     /// in this mesh; it may mirror, stretch and shear, and the normals still point outwards.
     ///
-    /// A scene with many copies of a mesh needs memory for one of them; rays take somewhat longer to find
-    /// their way than to triangles of a mesh of its own, and meet the same.
+    /// A scene with many copies of a mesh needs memory for one of them, and a copy is made without a look at
+    /// each triangle; rays take somewhat longer to find their way than to triangles of a mesh of its own, and
+    /// meet the same.
     pub fn placed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
-        let mut placement = Placement::new(to_scene)?;
-        if let Some(first) = &self.placement {
-            placement = placement.after(first)?;
+        let count = self.triangle_count() as usize;
+        if count > MAX_INDEX {
+            return Err(GeometryError::TooManyPrimitives { count });
         }
-        let mesh = Self::with_surface(self.surface.clone(), Some(placement));
-        let (min, max) = mesh.bounds;
+        let placement = self.placement_by(to_scene)?;
+        let bounds = self.surface.bounds_of_copy(&placement);
+        let (surface, placement) = (self.surface.clone(), Some(placement));
+        Self { surface, placement, bounds, stretched_area: OnceLock::new() }.checked()
+    }
+
+    /// The mesh in another place with triangles of its own: the corners are those of a copy that is
+    /// [placed](Self::placed).
+    pub fn transformed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
+        let placement = self.placement_by(to_scene)?;
+        let Surface { positions, triangles, normals, border, dropped, .. } = &*self.surface;
+        let positions = positions.iter().map(|position| placement.point(*position)).collect();
+        let triangles = triangles.iter().map(|triangle| placement.winding(*triangle)).collect();
+        let normals = normals.as_ref();
+        let normals = normals.map(|normals| normals.iter().map(|normal| placement.normal(*normal)).collect());
+        let surface = Surface::new(positions, triangles, normals, *border, *dropped);
+        if *border == Border::Nowhere {
+            surface.set_signed_volume(self.surface.signed_volume() * placement.volume_ratio());
+        }
+        Self::with_surface(surface).checked()
+    }
+
+    /// The placement of a copy of this mesh.
+    fn placement_by(&self, to_scene: &Affine3A) -> Result<Placement, GeometryError> {
+        let placement = Placement::new(to_scene)?;
+        match &self.placement {
+            Some(first) => placement.after(first),
+            None => Ok(placement),
+        }
+    }
+
+    /// The mesh, unless it has been placed where it is lost in rounding.
+    fn checked(self) -> Result<Self, GeometryError> {
+        let (min, max) = self.bounds;
         if !(min.is_finite() && max.is_finite()) {
             return Err(GeometryError::NonFinite { what: "a corner of a placed mesh" });
         }
-        if (0..mesh.triangle_count()).all(|triangle| cross(mesh.corners(triangle)) == DVec3::ZERO) {
+        if self.each().all(|corners| cross(corners) == DVec3::ZERO) {
             return Err(GeometryError::Degenerate { what: "a placed mesh" });
         }
-        Ok(mesh)
-    }
-
-    /// The same mesh with triangles of its own, in the same place: no copy any more.
-    #[must_use]
-    pub fn unshared(self) -> Self {
-        let Some(placement) = self.placement else { return self };
-        let Surface { positions, triangles, normals, border, dropped } = &*self.surface;
-        let surface = Surface {
-            positions: positions.iter().map(|position| placement.point(*position)).collect(),
-            triangles: (0..triangles.len() as u32).map(|triangle| self.vertices(triangle)).collect(),
-            normals: normals
-                .as_ref()
-                .map(|normals| normals.iter().map(|normal| placement.normal(*normal)).collect()),
-            border: *border,
-            dropped: *dropped,
-        };
-        Self { surface: Arc::new(surface), placement: None, ..self }
+        Ok(self)
     }
 
     pub(super) fn translated(mut self, by: Vec3) -> Self {
         match &mut self.placement {
             Some(placement) => *placement = placement.translated(by),
-            None => {
-                Arc::make_mut(&mut self.surface).positions.iter_mut().for_each(|position| *position += by);
-            }
+            None => Arc::make_mut(&mut self.surface).translate(by),
         }
         let (min, max) = self.bounds;
         Self { bounds: (min + by, max + by), ..self }
@@ -148,7 +145,7 @@ impl TriangleMesh {
     /// The number of triangles that are in use.
     #[must_use]
     pub fn triangle_count(&self) -> u32 {
-        self.surface.triangles.len() as u32
+        self.surface.count()
     }
 
     /// The map to the scene, of a copy.
@@ -156,20 +153,20 @@ impl TriangleMesh {
         self.placement.as_ref()
     }
 
-    /// The mesh in coordinates of its own.
-    pub(super) fn model(&self) -> Self {
-        Self::with_surface(self.surface.clone(), None)
+    /// The hierarchy over the triangles in coordinates of their own, which all copies share.
+    pub(super) fn model(&self) -> &Arc<Model> {
+        self.surface.model()
     }
 
-    /// A number that all copies share, and no other mesh that exists.
-    pub(super) fn number(&self) -> usize {
-        Arc::as_ptr(&self.surface) as usize
+    /// The least and the greatest coordinates before a copy is placed.
+    pub(super) fn bounds_in_mesh(&self) -> (Vec3, Vec3) {
+        self.surface.bounds()
     }
 
     /// Corners of a triangle as numbers of positions.
     fn vertices(&self, triangle: u32) -> [u32; 3] {
-        let [a, b, c] = self.surface.triangles[triangle as usize];
-        if self.placement.is_some_and(|placement| placement.mirrors) { [a, c, b] } else { [a, b, c] }
+        let vertices = self.surface.triangles[triangle as usize];
+        self.placement.map_or(vertices, |placement| placement.winding(vertices))
     }
 
     /// The number of triangles without area that were left out.
@@ -191,42 +188,58 @@ impl TriangleMesh {
         }
     }
 
+    fn each(&self) -> impl Iterator<Item = [Vec3; 3]> {
+        (0..self.triangle_count()).map(|triangle| self.corners(triangle))
+    }
+
     /// Surface area, square scene units.
     #[must_use]
     pub fn area(&self) -> f32 {
-        self.cumulative_area().last().copied().unwrap_or(0.0) as f32
+        let (areas, factor) = self.cumulative_area();
+        (areas.last().copied().unwrap_or(0.0) * factor) as f32
     }
 
-    fn cumulative_area(&self) -> &[f64] {
-        self.cumulative_area.get_or_init(|| {
-            let mut total = 0.0;
-            let up_to = |triangle| {
-                total += 0.5 * cross(self.corners(triangle)).length();
-                total
-            };
-            (0..self.triangle_count()).map(up_to).collect()
-        })
+    /// Areas of the triangles up to and including each, and the factor that they are still to be multiplied
+    /// by. Copies that are scaled evenly share them: the area of a triangle under another map depends on its
+    /// plane, and takes a pass over all triangles.
+    fn cumulative_area(&self) -> (&[f64], f64) {
+        let Some(placement) = &self.placement else { return (self.surface.cumulative_area(), 1.0) };
+        match placement.squared_scale() {
+            Some(factor) => (self.surface.cumulative_area(), factor),
+            None => (self.stretched_area.get_or_init(|| cumulative_area(self.each())), 1.0),
+        }
     }
 
     /// The enclosed volume, cubic scene units: negative if the normals point inwards, and without meaning
     /// if the mesh is not closed.
+    ///
+    /// That of a mesh that is [placed](Self::placed) or [transformed](Self::transformed) is the volume of the
+    /// first one times the determinant of the map: it does not depend on how corners are rounded in their
+    /// place.
     #[must_use]
     pub fn signed_volume(&self) -> f32 {
-        // From a point near the mesh: from a far one the terms cancel.
-        let from = self.bounds.0.as_dvec3();
-        let sum: f64 = (0..self.triangle_count())
-            .map(|triangle| {
-                let [a, b, c] = self.corners(triangle).map(|corner| corner.as_dvec3() - from);
-                a.dot(b.cross(c))
-            })
-            .sum();
-        (sum / 6.0) as f32
+        let volume = self.surface.signed_volume();
+        // The corners of a mirrored copy go round the other way, so that the sign remains.
+        self.placement.map_or(volume, |placement| volume * placement.volume_ratio()) as f32
+    }
+
+    /// The mean direction of the triangles' geometric normals, and the least cosine between it and any of
+    /// them; `None` if the normals cancel.
+    #[must_use]
+    pub fn normal_cone(&self) -> Option<(Vec3, f32)> {
+        let Some(placement) = &self.placement else { return self.surface.normal_cone() };
+        if placement.squared_scale().is_none() {
+            return normal_cone(|| self.each());
+        }
+        let (axis, cos) = self.surface.normal_cone()?;
+        // Normals in the scene are rounded apart from those of the mesh.
+        Some((placement.normal(axis), (cos - 8.0 * f32::EPSILON).max(-1.0)))
     }
 
     /// A point distributed uniformly over the surface, and the geometric normal; `u` in `[0, 1)²`.
     #[must_use]
     pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        let areas = self.cumulative_area();
+        let (areas, _) = self.cumulative_area();
         let total = areas.last().copied().unwrap_or(0.0);
         let target = f64::from(u[0]) * total;
         let triangle = areas.partition_point(|&sum| sum <= target).min(areas.len() - 1);
@@ -259,8 +272,7 @@ impl TriangleMesh {
     pub fn contains(&self, point: Vec3) -> Option<bool> {
         self.contains_by(point, |ray| {
             let shear = RayShear::new(ray.origin, ray.direction);
-            let met =
-                (0..self.triangle_count()).filter_map(|triangle| shear.intersect(self.corners(triangle)));
+            let met = self.each().filter_map(|corners| shear.intersect(corners));
             met.filter(|hit| hit.t > 0.0).count()
         })
     }
@@ -323,58 +335,5 @@ impl TriangleMesh {
     }
 }
 
-/// The normal of a triangle, of twice its area in length; in double precision, so that that of a small
-/// triangle does not vanish.
-fn cross(corners: [Vec3; 3]) -> DVec3 {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
-    (b - a).cross(c - a)
-}
-
-/// The edges at which a mesh ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Border {
-    /// Every edge joins exactly two triangles that are wound alike.
-    Nowhere,
-    /// Every edge joins exactly two triangles, but not all are wound alike.
-    BetweenWindings,
-    /// There are edges of one triangle, or of more than two.
-    Somewhere,
-}
-
-impl Border {
-    /// The border of these triangles; equal positions count as one.
-    fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        // Adding zero turns −0 into +0, which is the same place.
-        let key = |vertex: u32| positions[vertex as usize].to_array().map(|x| (x + 0.0).to_bits());
-        let mut order: Vec<u32> = (0..positions.len() as u32).collect();
-        order.sort_unstable_by_key(|&vertex| key(vertex));
-        let mut place = vec![0; positions.len()];
-        for pair in order.windows(2) {
-            let step = u32::from(key(pair[0]) != key(pair[1]));
-            place[pair[1] as usize] = place[pair[0] as usize] + step;
-        }
-
-        let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * triangles.len());
-        for triangle in triangles {
-            let [a, b, c] = triangle.map(|vertex| place[vertex as usize]);
-            if a == b || b == c || c == a {
-                continue;
-            }
-            edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to)));
-        }
-        edges.sort_unstable();
-        let (pairs, rest) = edges.as_chunks::<2>();
-        // The same edge in two pairs would join four triangles.
-        let joins_two = !pairs.is_empty()
-            && rest.is_empty()
-            && pairs.iter().all(|[first, second]| (first.0, first.1) == (second.0, second.1))
-            && pairs.windows(2).all(|two| (two[0][0].0, two[0][0].1) != (two[1][0].0, two[1][0].1));
-        if !joins_two {
-            Self::Somewhere
-        } else if pairs.iter().all(|[first, second]| first.2 != second.2) {
-            Self::Nowhere
-        } else {
-            Self::BetweenWindings
-        }
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -11,6 +11,7 @@ mod hit;
 mod instances;
 mod lane_ray;
 mod mesh;
+mod model;
 mod placement;
 mod primitive;
 mod primitive_block;
@@ -18,6 +19,7 @@ mod quad;
 mod scene;
 mod shape;
 mod sphere;
+mod surface;
 mod triangle;
 mod volume_sampling;
 

@@ -15,6 +15,8 @@ pub(super) struct Placement {
     to_mesh: DMat3,
     /// Map of normals, without the scale.
     normals: Mat3,
+    /// Factor of all areas, if it is the same for all.
+    squared_scale: Option<f64>,
     /// Whether left and right are exchanged.
     pub(super) mirrors: bool,
 }
@@ -39,6 +41,7 @@ impl Placement {
             moved: Vec3::ZERO,
             to_mesh,
             normals: (to_mesh.transpose() * largest.recip()).as_mat3(),
+            squared_scale: squared_scale(linear.as_dmat3()),
             mirrors: to_mesh.determinant() < 0.0,
         })
     }
@@ -76,6 +79,26 @@ impl Placement {
         wide.add3(placed, wide.splat3(self.moved.to_array()))
     }
 
+    /// Change of a coordinate in the scene with those in the mesh.
+    pub(super) fn gradient(&self, axis: usize) -> Vec3 {
+        self.to_scene.row(axis)
+    }
+
+    /// The corners of a triangle in the order in which they go round in the scene.
+    pub(super) const fn winding(&self, [a, b, c]: [u32; 3]) -> [u32; 3] {
+        if self.mirrors { [a, c, b] } else { [a, b, c] }
+    }
+
+    /// Factor of areas, if it does not depend on their plane: the map turns, mirrors and scales evenly.
+    pub(super) const fn squared_scale(&self) -> Option<f64> {
+        self.squared_scale
+    }
+
+    /// Factor of volumes.
+    pub(super) fn volume_ratio(&self) -> f64 {
+        self.to_scene.as_dmat3().determinant().abs()
+    }
+
     /// A normal in the scene, of unit length, or zero.
     pub(super) fn normal(&self, normal: Vec3) -> Vec3 {
         unit(self.normals * normal)
@@ -103,6 +126,15 @@ impl Placement {
         let sum = x_axis.abs() * largest.x + y_axis.abs() * largest.y + z_axis.abs() * largest.z;
         (sum + self.translation.abs() + self.moved.abs()).max_element()
     }
+}
+
+/// Factor of areas under a linear map that keeps angles, as far as its elements in single precision tell.
+fn squared_scale(linear: DMat3) -> Option<f64> {
+    /// Roundings of three elements, each twice in a product: that of the rotation and that of its scale.
+    const ROUNDING: f64 = 6.0 * f32::EPSILON as f64;
+    let products = linear.transpose() * linear;
+    let scale2 = (products.x_axis.x + products.y_axis.y + products.z_axis.z) / 3.0;
+    products.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(scale2)), ROUNDING * scale2).then_some(scale2)
 }
 
 /// The unit vector along a normal of any length; zero stays zero.

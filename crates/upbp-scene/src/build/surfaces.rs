@@ -212,7 +212,11 @@ impl Builder<'_> {
                 let to_scene = Affine3A::from_mat3_translation(linear, translate);
                 let copies = file.as_deref().map_or(1, |file| self.meshes.copies(file));
                 let is_copy = copies > 1 && mesh.triangle_count() >= COPIED_FROM;
-                let mesh = if in_place && !is_copy { Ok(mesh) } else { mesh.placed(&to_scene) };
+                let mesh = match (is_copy, in_place) {
+                    (true, _) => mesh.placed(&to_scene),
+                    (false, true) => Ok(mesh),
+                    (false, false) => mesh.transformed(&to_scene),
+                };
                 let mesh = mesh.map_err(|error| error.to_string())?;
                 let (min, max) = mesh.aabb();
                 if Vector::new(min).is_err() || Vector::new(max).is_err() {
@@ -222,7 +226,7 @@ impl Builder<'_> {
                         }
                     }
                 }
-                Ok(if is_copy { mesh } else { mesh.unshared() }.into())
+                Ok(mesh.into())
             }
         };
         shape.map_err(|error| error.to_string())

@@ -6,7 +6,7 @@
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{DVec3, Vec3};
-use upbp_accel::{Shape, Sphere, TriangleMesh};
+use upbp_accel::{Shape, Sphere};
 use upbp_estimators::scene::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
     HitDensities, Incident,
@@ -65,19 +65,6 @@ impl AreaLight {
     }
 }
 
-/// Bounds with the normals of a mesh.
-fn with_normals(mesh: &TriangleMesh, bounds: EmitterBounds) -> EmitterBounds {
-    let normal = |triangle: u32| {
-        let [a, b, c] = mesh.corners(triangle);
-        (b - a).cross(c - a).normalize_or_zero()
-    };
-    let normals = || (0..mesh.triangle_count()).map(normal);
-    let sum: Vec3 = normals().sum();
-    let Some(axis) = sum.try_normalize() else { return bounds };
-    let cos = normals().map(|normal| normal.dot(axis)).fold(1.0, f32::min);
-    EmitterBounds { axis, cos_normals: cos.max(-1.0), ..bounds }
-}
-
 impl Emitter for AreaLight {
     fn kind(&self) -> EmitterKind {
         EmitterKind::Area
@@ -92,7 +79,11 @@ impl Emitter for AreaLight {
         let around = EmitterBounds::all_around(min, max);
         Some(match &self.shape {
             Shape::Quad(quad) => EmitterBounds { axis: quad.normal(), cos_normals: 1.0, ..around },
-            Shape::Mesh(mesh) => with_normals(mesh, around),
+            Shape::Mesh(mesh) => mesh.normal_cone().map_or(around, |(axis, cos_normals)| EmitterBounds {
+                axis,
+                cos_normals,
+                ..around
+            }),
             Shape::Sphere(_) | Shape::Box(_) => around,
         })
     }

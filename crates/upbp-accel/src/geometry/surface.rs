@@ -1,0 +1,187 @@
+//! The triangles of a mesh in coordinates of their own, with what all copies of the mesh share.
+
+use std::sync::{Arc, OnceLock};
+
+use glam::{DVec3, Vec3};
+
+use super::model::Model;
+use super::placement::Placement;
+
+/// Triangles in coordinates of their own.
+#[derive(Clone, Debug)]
+pub(super) struct Surface {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) normals: Option<Vec<Vec3>>,
+    pub(super) border: Border,
+    /// Triangles without area that were left out.
+    pub(super) dropped: usize,
+    bounds: (Vec3, Vec3),
+    measures: Measures,
+}
+
+/// Properties of the surface as a whole: each costs a pass over all triangles, once, when it is first asked
+/// for.
+#[derive(Clone, Debug, Default)]
+struct Measures {
+    cumulative_area: OnceLock<Vec<f64>>,
+    signed_volume: OnceLock<f64>,
+    normal_cone: OnceLock<Option<(Vec3, f32)>>,
+    model: OnceLock<Arc<Model>>,
+}
+
+impl Surface {
+    pub(super) fn new(
+        positions: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+        normals: Option<Vec<Vec3>>,
+        border: Border,
+        dropped: usize,
+    ) -> Self {
+        let mut bounds = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for corner in triangles.iter().flatten().map(|&vertex| positions[vertex as usize]) {
+            bounds = (bounds.0.min(corner), bounds.1.max(corner));
+        }
+        Self { positions, triangles, normals, border, dropped, bounds, measures: Measures::default() }
+    }
+
+    /// The least and the greatest coordinates.
+    pub(super) const fn bounds(&self) -> (Vec3, Vec3) {
+        self.bounds
+    }
+
+    pub(super) fn count(&self) -> u32 {
+        self.triangles.len() as u32
+    }
+
+    pub(super) fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
+    }
+
+    fn each(&self) -> impl Iterator<Item = [Vec3; 3]> {
+        (0..self.count()).map(|triangle| self.corners(triangle))
+    }
+
+    /// Area of the triangles up to and including each.
+    pub(super) fn cumulative_area(&self) -> &[f64] {
+        self.measures.cumulative_area.get_or_init(|| cumulative_area(self.each()))
+    }
+
+    /// The enclosed volume: negative if the normals point inwards.
+    pub(super) fn signed_volume(&self) -> f64 {
+        *self.measures.signed_volume.get_or_init(|| {
+            // From a point near the mesh: from a far one the terms cancel.
+            let from = self.bounds.0.as_dvec3();
+            let sum: f64 = self
+                .each()
+                .map(|corners| {
+                    let [a, b, c] = corners.map(|corner| corner.as_dvec3() - from);
+                    a.dot(b.cross(c))
+                })
+                .sum();
+            sum / 6.0
+        })
+    }
+
+    /// Gives the volume, where it is known from elsewhere.
+    pub(super) fn set_signed_volume(&self, volume: f64) {
+        self.measures.signed_volume.get_or_init(|| volume);
+    }
+
+    /// The cone of the normals, see [`normal_cone`].
+    pub(super) fn normal_cone(&self) -> Option<(Vec3, f32)> {
+        *self.measures.normal_cone.get_or_init(|| normal_cone(|| self.each()))
+    }
+
+    /// The hierarchy over the triangles.
+    pub(super) fn model(&self) -> &Arc<Model> {
+        self.measures.model.get_or_init(|| Arc::new(Model::build(self)))
+    }
+
+    /// The least and the greatest coordinates of a copy, to the bit those of its corners.
+    pub(super) fn bounds_of_copy(&self, placement: &Placement) -> (Vec3, Vec3) {
+        self.model().bounds_of_copy(placement)
+    }
+
+    /// Adds a vector to all positions.
+    pub(super) fn translate(&mut self, by: Vec3) {
+        self.positions.iter_mut().for_each(|position| *position += by);
+        self.bounds = (self.bounds.0 + by, self.bounds.1 + by);
+        // The other measures are the same everywhere.
+        self.measures.model = OnceLock::new();
+    }
+}
+
+/// Areas of triangles, each with all before it.
+pub(super) fn cumulative_area(triangles: impl Iterator<Item = [Vec3; 3]>) -> Vec<f64> {
+    let mut total = 0.0;
+    let up_to = |corners| {
+        total += 0.5 * cross(corners).length();
+        total
+    };
+    triangles.map(up_to).collect()
+}
+
+/// The mean of the unit normals of triangles, of unit length, and the least cosine between it and any of
+/// them; `None` if they cancel.
+pub(super) fn normal_cone<I: Iterator<Item = [Vec3; 3]>>(triangles: impl Fn() -> I) -> Option<(Vec3, f32)> {
+    let normals = || triangles().map(|[a, b, c]| (b - a).cross(c - a).normalize_or_zero());
+    let axis = normals().sum::<Vec3>().try_normalize()?;
+    Some((axis, normals().map(|normal| normal.dot(axis)).fold(1.0, f32::min).max(-1.0)))
+}
+
+/// The normal of a triangle, of twice its area in length; in double precision, so that that of a small
+/// triangle does not vanish.
+pub(super) fn cross(corners: [Vec3; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    (b - a).cross(c - a)
+}
+
+/// The edges at which a mesh ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Border {
+    /// Every edge joins exactly two triangles that are wound alike.
+    Nowhere,
+    /// Every edge joins exactly two triangles, but not all are wound alike.
+    BetweenWindings,
+    /// There are edges of one triangle, or of more than two.
+    Somewhere,
+}
+
+impl Border {
+    /// The border of these triangles; equal positions count as one.
+    pub(super) fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        // Adding zero turns −0 into +0, which is the same place.
+        let key = |vertex: u32| positions[vertex as usize].to_array().map(|x| (x + 0.0).to_bits());
+        let mut order: Vec<u32> = (0..positions.len() as u32).collect();
+        order.sort_unstable_by_key(|&vertex| key(vertex));
+        let mut place = vec![0; positions.len()];
+        for pair in order.windows(2) {
+            let step = u32::from(key(pair[0]) != key(pair[1]));
+            place[pair[1] as usize] = place[pair[0] as usize] + step;
+        }
+
+        let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * triangles.len());
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|vertex| place[vertex as usize]);
+            if a == b || b == c || c == a {
+                continue;
+            }
+            edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to)));
+        }
+        edges.sort_unstable();
+        let (pairs, rest) = edges.as_chunks::<2>();
+        // The same edge in two pairs would join four triangles.
+        let joins_two = !pairs.is_empty()
+            && rest.is_empty()
+            && pairs.iter().all(|[first, second]| (first.0, first.1) == (second.0, second.1))
+            && pairs.windows(2).all(|two| (two[0][0].0, two[0][0].1) != (two[1][0].0, two[1][0].1));
+        if !joins_two {
+            Self::Somewhere
+        } else if pairs.iter().all(|[first, second]| first.2 != second.2) {
+            Self::Nowhere
+        } else {
+            Self::BetweenWindings
+        }
+    }
+}
