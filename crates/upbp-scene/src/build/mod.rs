@@ -15,6 +15,7 @@ mod surfaces;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use upbp_accel::{BoxTree, SceneGeometry};
 use upbp_estimators::scene::{Boundary, EmitterId};
@@ -189,6 +190,7 @@ fn volume_lights(
     media: &[Homogeneous],
     scene_radius: f32,
 ) -> impl Iterator<Item = Light> {
+    let media: Vec<_> = media.iter().cloned().map(Arc::new).collect();
     bodies.iter().filter_map(move |Body { shape, interior, .. }| {
         let medium = media.get(interior.medium?.0 as usize)?.clone();
         let shape = &drafts.get(shape.0 as usize)?.shape;

@@ -62,7 +62,7 @@ fn area_lights_satisfy_the_contract() {
 fn volume(shape: impl Into<Shape>, sigma_a: Spectrum) -> Light {
     let medium = Homogeneous::new(sigma_a, Spectrum::splat(0.5), PhaseFunction::Isotropic).unwrap();
     let medium = medium.with_glow(Spectrum::new(3.0, 2.0, 1.0)).unwrap();
-    Light::Volume(VolumeLight::new(BodyId(3), &shape.into(), medium, 4.0).unwrap())
+    Light::Volume(VolumeLight::new(BodyId(3), &shape.into(), Arc::new(medium), 4.0).unwrap())
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn a_volume_that_positions_cannot_tell_apart_is_never_chosen() {
         let medium = Homogeneous::new(Spectrum::splat(sigma_a), Spectrum::ZERO, PhaseFunction::Isotropic);
         let medium = medium.unwrap().with_glow(Spectrum::ONE).unwrap();
         let sphere = Sphere::new(x * Vec3::X, radius).unwrap();
-        VolumeLight::new(BodyId(0), &sphere.into(), medium, 4.0).unwrap().power(&BOUNDS)
+        VolumeLight::new(BodyId(0), &sphere.into(), Arc::new(medium), 4.0).unwrap().power(&BOUNDS)
     };
     assert!(light(0.0, 0.5, 0.0) > 0.0 && light(0.0, 0.5, 1e3) > 0.0);
     assert_eq!(light(0.0, 0.5, 1e5), 0.0, "too dense");

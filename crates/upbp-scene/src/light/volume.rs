@@ -5,6 +5,7 @@
 //! sends, so that neither distance nor extinction make the light uneven (`docs/theory.md`, section 2.9).
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use upbp_accel::{Shape, ShapeVolume, Sphere};
@@ -34,7 +35,8 @@ pub struct VolumeLight {
     body: BodyId,
     inside: ShapeVolume,
     bounds: EmitterBounds,
-    medium: Homogeneous,
+    /// Shared by the lights of all bodies with it.
+    medium: Arc<Homogeneous>,
     /// Length of a ray inside from which light gets out, scene units.
     depth: f64,
     power: f32,
@@ -47,7 +49,7 @@ impl VolumeLight {
     /// Without power, so that it is never chosen, if positions in single precision cannot tell its points
     /// apart.
     #[must_use]
-    pub fn new(body: BodyId, shape: &Shape, medium: Homogeneous, scene_radius: f32) -> Option<Self> {
+    pub fn new(body: BodyId, shape: &Shape, medium: Arc<Homogeneous>, scene_radius: f32) -> Option<Self> {
         let inside = if medium.emits() { ShapeVolume::new(shape)? } else { return None };
         let mean_chord = 4.0 * inside.volume() / f64::from(shape.area());
         let depth = mean_chord.min(f64::from(medium.mean_free_path()));
