@@ -11,38 +11,42 @@ use upbp_accel::{BoxTree, GeometryError, SceneGeometry, Shape, ShapeId, offset_o
 use upbp_media::{BodyId, Interior};
 
 use super::builder::Builder;
-use super::surfaces::{Inside, ShapeDraft};
+use super::rooms::Places;
+use super::surfaces::{Inside, SurfaceDraft};
 use crate::material::{Material, is_matched};
 use crate::scene::{Body, Surface};
 
-/// A body before it has its rank: the index of its shape in the scene, the shape and the inside.
-type BodyDraft<'a> = (usize, &'a Shape, Inside);
+/// A body before it has its rank: its shape and its inside.
+type BodyDraft = (ShapeId, Inside);
 
 /// Bodies among drafts, in their order.
-fn drafts_of_bodies(drafts: &[ShapeDraft]) -> Vec<BodyDraft<'_>> {
-    let drafts = drafts.iter().enumerate();
-    drafts.filter_map(|(index, draft)| Some((index, &draft.shape, draft.boundary.inside()?))).collect()
+fn drafts_of_bodies(drafts: &[SurfaceDraft]) -> Vec<BodyDraft> {
+    let drafts = drafts.iter().zip(0..);
+    drafts.filter_map(|(draft, id)| Some((ShapeId(id), draft.boundary.inside()?))).collect()
 }
 
 /// Puts bodies in order, the lowest first: a body's [`Interior::priority`] is its place.
 ///
 /// # Errors
 /// Shapes without finite bounds, or too many.
-pub(super) fn rank(drafts: &[ShapeDraft]) -> Result<Vec<Body>, GeometryError> {
+pub(super) fn rank(drafts: &[SurfaceDraft], geometry: &SceneGeometry) -> Result<Vec<Body>, GeometryError> {
     let mut drafts = drafts_of_bodies(drafts);
     // Stable, so that the later in the file comes last. No volume is negative, so that its bits are in order.
-    drafts.sort_by_cached_key(|(_, shape, inside)| (inside.priority, Reverse(shape.volume().to_bits())));
-    let boxes = BoxTree::new(drafts.iter().map(|(_, shape, _)| shape.aabb()))?;
+    drafts.sort_by_cached_key(|(id, inside)| {
+        (inside.priority, Reverse(geometry.shape(*id).volume().to_bits()))
+    });
+    let boxes = BoxTree::new(drafts.iter().map(|(id, _)| geometry.shape(*id).aabb()))?;
     let mut bodies: Vec<Body> = Vec::with_capacity(drafts.len());
-    for ((place, (index, shape, inside)), priority) in drafts.iter().enumerate().zip(0..) {
+    for ((place, &(shape, inside)), priority) in drafts.iter().enumerate().zip(0..) {
         let ior = inside.ior.unwrap_or_else(|| {
-            let around = shapes_around(&boxes, centre(shape)).into_iter().rev();
+            let around = shapes_around(&boxes, centre(geometry.shape(shape))).into_iter().rev();
             let mut lower = around.filter(|other| *other < place);
-            let surrounding = lower.find(|other| surrounds(drafts[*other].1, shape));
+            let surrounding =
+                lower.find(|other| surrounds(drafts[*other].0, geometry.shape(shape), geometry));
             surrounding.map_or(1.0, |other| bodies[other].interior.ior)
         });
         let interior = Interior { body: BodyId(place as u32), medium: inside.medium, priority, ior };
-        bodies.push(Body { shape: ShapeId(*index as u32), interior });
+        bodies.push(Body { shape, interior });
     }
     Ok(bodies)
 }
@@ -88,14 +92,15 @@ fn centre(shape: &Shape) -> Vec3 {
 
 impl Builder<'_> {
     /// Reports surfaces that shine all inside of an opaque shape that the camera is not in.
-    pub(super) fn check_lamps_are_free(&mut self, rooms: &[usize], drafts: &[ShapeDraft], boxes: &BoxTree) {
-        for (index, lamp) in drafts.iter().enumerate().filter(|(_, draft)| !draft.emission.is_black()) {
+    pub(super) fn check_lamps_are_free(&mut self, rooms: &[usize], places: Places<'_>) {
+        let Places { drafts, geometry, boxes } = places;
+        for (index, _) in drafts.iter().enumerate().filter(|(_, draft)| !draft.emission.is_black()) {
+            let lamp = places.shape(index);
             let is_around = |outer: &usize| {
-                let draft = &drafts[*outer];
-                let is_opaque = draft.boundary.inside().is_none() && !rooms.contains(outer);
-                is_opaque && is_buried(&lamp.shape, &draft.shape)
+                let is_opaque = drafts[*outer].boundary.inside().is_none() && !rooms.contains(outer);
+                is_opaque && is_buried(lamp, ShapeId(*outer as u32), geometry)
             };
-            if let Some(outer) = shapes_around(boxes, centre(&lamp.shape)).into_iter().find(is_around) {
+            if let Some(outer) = shapes_around(boxes, centre(lamp)).into_iter().find(is_around) {
                 self.problem(self.shape_item(index), self.message_of_room(outer));
             }
         }
@@ -103,33 +108,35 @@ impl Builder<'_> {
 
     /// Reports bodies that lie all inside of an opaque shape that the camera is not in, or of a body with a
     /// higher priority: they would be nowhere.
-    pub(super) fn check_bodies_count(&mut self, rooms: &[usize], drafts: &[ShapeDraft], boxes: &BoxTree) {
+    pub(super) fn check_bodies_count(&mut self, rooms: &[usize], places: Places<'_>) {
+        let Places { drafts, geometry, boxes } = places;
         let mut bodies = drafts_of_bodies(drafts);
-        let around = |shape: &Shape| -> Vec<_> {
+        let around = |id: ShapeId| -> Vec<_> {
+            let shape = geometry.shape(id);
             let around = shapes_around(boxes, centre(shape)).into_iter();
-            around.filter(|outer| is_inside(shape, &drafts[*outer].shape)).collect()
+            around.filter(|outer| is_inside(shape, places.shape(*outer))).collect()
         };
-        for (index, shape, _) in &bodies {
+        for &(id, _) in &bodies {
             let is_opaque =
                 |outer: &usize| drafts[*outer].boundary.inside().is_none() && !rooms.contains(outer);
-            if let Some(outer) = around(shape).into_iter().find(is_opaque) {
+            if let Some(outer) = around(id).into_iter().find(is_opaque) {
                 let outer = self.shape_item(outer);
                 let message = format!(
                     "lies inside of the opaque {outer}: it would be nowhere (a basin is made of quads)"
                 );
-                self.problem(self.shape_item(*index), message);
+                self.problem(self.shape_item(id.0 as usize), message);
             }
         }
-        bodies.sort_by_key(|(.., inside)| inside.priority);
-        for (index, shape, Inside { priority, .. }) in &bodies {
+        bodies.sort_by_key(|(_, inside)| inside.priority);
+        for &(id, Inside { priority, .. }) in &bodies {
             let priority_of = |outer: usize| Some((drafts[outer].boundary.inside()?.priority, outer));
-            let outer = around(shape).into_iter().filter_map(priority_of);
-            if let Some((other, outer)) = outer.filter(|(other, _)| other > priority).min() {
+            let outer = around(id).into_iter().filter_map(priority_of);
+            if let Some((other, outer)) = outer.filter(|(other, _)| *other > priority).min() {
                 let message = format!(
                     "lies inside of {}, whose priority {other} is higher than its own {priority}: it would be nowhere",
                     self.shape_item(outer)
                 );
-                self.problem(self.shape_item(*index), message);
+                self.problem(self.shape_item(id.0 as usize), message);
             }
         }
     }
@@ -161,20 +168,85 @@ fn points_on(shape: &Shape) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
 
 /// Whether a surface is all inside of another closed shape and does not touch it, as far as points on it
 /// tell.
-fn is_buried(shape: &Shape, other: &Shape) -> bool {
-    let [(min, max), (outer_min, outer_max)] = [shape, other].map(Shape::aabb);
+fn is_buried(shape: &Shape, other: ShapeId, geometry: &SceneGeometry) -> bool {
+    let [(min, max), (outer_min, outer_max)] = [shape, geometry.shape(other)].map(Shape::aabb);
     let boxed = outer_min.cmplt(min).all() && max.cmplt(outer_max).all();
-    boxed && points_on(shape).all(|(point, _)| other.contains(point) == Some(true))
+    boxed && points_on(shape).all(|(point, _)| geometry.contains(other, point) == Some(true))
 }
 
 /// Whether a body contains points all over the surface of an index-matched one, which has the index of
 /// refraction of the highest that does: a cloud in a glass block has that of the glass, or a bubble in the
 /// cloud would refract wrongly.
-fn surrounds(outer: &Shape, shape: &Shape) -> bool {
-    let [(min, max), (outer_min, outer_max)] = [shape, outer].map(Shape::aabb);
+fn surrounds(outer: ShapeId, shape: &Shape, geometry: &SceneGeometry) -> bool {
+    let [(min, max), (outer_min, outer_max)] = [shape, geometry.shape(outer)].map(Shape::aabb);
     let boxed = outer_min.cmple(min).all() && max.cmple(outer_max).all();
     // By points just inside of it, so that a body that fills another is surrounded by it.
-    boxed
-        && points_on(shape)
-            .all(|(point, normal)| outer.contains(offset_origin(point, normal, -normal)) == Some(true))
+    let is_around =
+        |(point, normal): (Vec3, Vec3)| geometry.contains(outer, offset_origin(point, normal, -normal));
+    boxed && points_on(shape).all(|sample| is_around(sample) == Some(true))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Affine3A, Quat};
+    use proptest::prelude::*;
+    use upbp_accel::{AxisBox, Quad, Sphere, TriangleMesh};
+
+    use super::*;
+
+    /// A closed mesh of eight triangles with corners at these distances along the axes.
+    fn octahedron(size: [f32; 6]) -> TriangleMesh {
+        let axes = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
+        let positions = axes.iter().zip(size).map(|(axis, size)| *axis * size).collect();
+        let triangle = |[x, y, z]: [u32; 3]| if (x + y + z) % 2 == 0 { [x, y, z] } else { [x, z, y] };
+        let corners =
+            [[0, 2, 4], [1, 2, 4], [0, 3, 4], [1, 3, 4], [0, 2, 5], [1, 2, 5], [0, 3, 5], [1, 3, 5]];
+        TriangleMesh::new(positions, corners.map(triangle).to_vec(), None).unwrap()
+    }
+
+    /// Shapes of very different sizes around the origin, copies of meshes among them.
+    fn shapes() -> impl Strategy<Value = Vec<Shape>> {
+        let place = [-1.0_f32..1.0, -1.0..1.0, -1.0..1.0].prop_map(Vec3::from);
+        let sizes = prop::array::uniform6(0.3_f32..1.0);
+        let part = (0..5, place.clone(), place, -2.0_f32..1.0, sizes.clone());
+        (sizes, prop::collection::vec(part, 2..12)).prop_map(|(of_copies, parts)| {
+            let model = octahedron(of_copies);
+            let shape = |(kind, place, axis, exponent, sizes): (_, Vec3, Vec3, f32, [f32; 6])| {
+                let size = 10_f32.powf(exponent);
+                let turned = Quat::from_axis_angle(axis.normalize_or(Vec3::X), 9.0 * axis.x);
+                let to_scene =
+                    Affine3A::from_scale_rotation_translation(Vec3::splat(size), turned, 0.5 * place);
+                match kind {
+                    0 => Sphere::new(place, size).unwrap().into(),
+                    1 => AxisBox::new(place - size, place + size).unwrap().into(),
+                    2 => Quad::new(place, Vec3::X * size, Vec3::new(0.0, 1.0, 1.0) * size).unwrap().into(),
+                    3 => octahedron(sizes).transformed(&to_scene).unwrap().into(),
+                    _ => model.placed(&to_scene).unwrap().into(),
+                }
+            };
+            parts.into_iter().map(shape).collect()
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn verdicts_by_rays_are_those_of_all_triangles(shapes in shapes()) {
+            let geometry = SceneGeometry::build(shapes.clone()).unwrap();
+            let boxed = |a: &Shape, b: &Shape, is_within: fn(Vec3, Vec3) -> bool| {
+                let [(min, max), (outer_min, outer_max)] = [a, b].map(Shape::aabb);
+                is_within(outer_min, min) && is_within(max, outer_max)
+            };
+            for shape in &shapes {
+                for (outer, id) in shapes.iter().zip((0..).map(ShapeId)) {
+                    let expected = boxed(shape, outer, |a, b| a.cmplt(b).all())
+                        && points_on(shape).all(|(point, _)| outer.contains(point) == Some(true));
+                    prop_assert_eq!(is_buried(shape, id, &geometry), expected);
+                    let below = |(point, normal): (Vec3, Vec3)| offset_origin(point, normal, -normal);
+                    let expected = boxed(shape, outer, |a, b| a.cmple(b).all())
+                        && points_on(shape).all(|sample| outer.contains(below(sample)) == Some(true));
+                    prop_assert_eq!(surrounds(id, shape, &geometry), expected);
+                }
+            }
+        }
+    }
 }

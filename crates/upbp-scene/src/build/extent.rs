@@ -4,21 +4,21 @@ use glam::{DVec3, Vec3};
 use upbp_accel::Shape;
 use upbp_estimators::scene::BoundingSphere;
 
-use super::surfaces::{BoundaryDraft, ShapeDraft};
+use super::surfaces::{BoundaryDraft, SurfaceDraft};
 use crate::camera::PerspectiveCamera;
 use crate::light::Light;
 
 /// Moves a scene that is much farther from its origin than it is large near it, exactly; returns the point of
 /// the description that has become the origin.
 pub(super) fn move_near_origin(
-    drafts: &mut [ShapeDraft],
+    shapes: &mut [Shape],
     lights: &mut [Light],
     camera: &mut PerspectiveCamera,
 ) -> Vec3 {
-    let origin = origin_near(&bounds(drafts, lights, camera));
+    let origin = origin_near(&bounds(shapes, lights, camera));
     if origin != Vec3::ZERO {
-        for draft in drafts {
-            draft.shape = draft.shape.clone().translated(-origin);
+        for shape in shapes {
+            *shape = shape.clone().translated(-origin);
         }
         for light in lights {
             light.translate(-origin);
@@ -45,19 +45,18 @@ fn origin_near(bounds: &BoundingSphere) -> Vec3 {
 
 /// A sphere around all shapes and finite lights, around the centre of their common box and as small as their
 /// own boxes allow.
-pub(super) fn bounds(drafts: &[ShapeDraft], lights: &[Light], camera: &PerspectiveCamera) -> BoundingSphere {
-    let shapes = drafts.iter().map(|draft| &draft.shape);
+pub(super) fn bounds(shapes: &[Shape], lights: &[Light], camera: &PerspectiveCamera) -> BoundingSphere {
     let positions = lights.iter().filter_map(|light| match light {
         Light::Point(light) => Some(light.position),
         Light::Spot(light) => Some(light.position),
         _ => None,
     });
     // Without shapes, how far the camera is from the lights tells best how large things are.
-    let positions = positions.chain(drafts.is_empty().then(|| camera.origin()));
-    let boxes = shapes.clone().map(Shape::aabb).chain(positions.clone().map(|position| (position, position)));
+    let positions = positions.chain(shapes.is_empty().then(|| camera.origin()));
+    let boxes = shapes.iter().map(Shape::aabb).chain(positions.clone().map(|position| (position, position)));
     let (min, max) = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default();
     let centre = 0.5 * min + 0.5 * max;
-    let farthest_of_shapes = shapes.map(|shape| match shape {
+    let farthest_of_shapes = shapes.iter().map(|shape| match shape {
         Shape::Sphere(sphere) => sphere.centre().distance(centre) + sphere.radius(),
         shape => {
             let (min, max) = shape.aabb();
@@ -73,11 +72,13 @@ pub(super) fn bounds(drafts: &[ShapeDraft], lights: &[Light], camera: &Perspecti
 }
 
 /// The largest coordinate of meshes that refract; zero if there are none.
-pub(super) fn largest_corner(drafts: &[ShapeDraft]) -> f32 {
-    let refracting = drafts.iter().filter(|draft| matches!(draft.boundary, BoundaryDraft::Refracting(..)));
-    let meshes = refracting.filter(|draft| matches!(draft.shape, Shape::Mesh(_)));
-    meshes.fold(0.0, |largest, draft| {
-        let (min, max) = draft.shape.aabb();
+pub(super) fn largest_corner(shapes: &[Shape], drafts: &[SurfaceDraft]) -> f32 {
+    let refracting =
+        |(_, draft): &(_, &SurfaceDraft)| matches!(draft.boundary, BoundaryDraft::Refracting(..));
+    let refracting = shapes.iter().zip(drafts).filter(refracting);
+    let meshes = refracting.filter(|(shape, _)| matches!(shape, Shape::Mesh(_)));
+    meshes.fold(0.0, |largest, (shape, _)| {
+        let (min, max) = shape.aabb();
         min.abs().max(max.abs()).max_element().max(largest)
     })
 }

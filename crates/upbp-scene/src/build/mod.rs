@@ -17,12 +17,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use upbp_accel::{BoxTree, SceneGeometry};
+use upbp_accel::{BoxTree, SceneGeometry, Shape};
 use upbp_estimators::scene::{Boundary, EmitterId};
 use upbp_media::Homogeneous;
 
 use self::builder::Builder;
-use self::surfaces::{BoundaryDraft, MeshFiles, ShapeDraft};
+use self::rooms::Places;
+use self::surfaces::{BoundaryDraft, MeshFiles};
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::SceneError;
 use crate::light::{AreaLight, Light, VolumeLight};
@@ -106,33 +107,30 @@ impl Builder<'_> {
         if let Some(media) = &media {
             self.check_shines(media, &medium_ids);
         }
-        // Where a shape could not be made there is a box of nothing.
-        let aabb = |draft: &Option<ShapeDraft>| {
-            draft.as_ref().map_or_else(Default::default, |draft| draft.shape.aabb())
-        };
-        let boxes = drafts.iter().map(aabb);
-        let boxes = BoxTree::new(boxes).map_err(|error| self.problem("shapes", error)).ok()?;
-        let rooms = self.rooms_of_camera(&drafts, &boxes);
-        if let (Some(_), Some(media)) = (&camera, &media) {
-            let outside = outside.and_then(|id| media.get(id.0 as usize));
-            self.check_camera_is_lit(&rooms, &drafts, media, outside);
-        }
-        self.check_lights_are_free(&rooms, &drafts, &boxes);
         if !self.problems.is_empty() {
             return None;
         }
         let (media, mut camera) = (media?, camera?);
-        let mut drafts: Vec<_> = drafts.into_iter().collect::<Option<_>>()?;
-        self.check_bodies_count(&rooms, &drafts, &boxes);
-        self.check_lamps_are_free(&rooms, &drafts, &boxes);
-        let origin = extent::move_near_origin(&mut drafts, &mut lights, &mut camera);
-        let bounds = extent::bounds(&drafts, &lights, &camera);
-        let bodies = bodies::rank(&drafts).map_err(|error| self.problem("shapes", error)).ok()?;
-        let largest_corner = extent::largest_corner(&drafts);
-        let surfaces = self.records(&drafts, &bodies, &mut lights);
-        lights.extend(volume_lights(&drafts, &bodies, &media, bounds.radius));
-        let geometry = SceneGeometry::build(drafts.into_iter().map(|draft| draft.shape).collect());
-        let geometry = geometry.map_err(|error| self.problem("shapes", error)).ok()?;
+        let (mut shapes, drafts): (Vec<_>, Vec<_>) = drafts.into_iter().collect::<Option<_>>()?;
+        let origin = extent::move_near_origin(&mut shapes, &mut lights, &mut camera);
+        let bounds = extent::bounds(&shapes, &lights, &camera);
+        let geometry = SceneGeometry::build(shapes).map_err(|error| self.problem("shapes", error)).ok()?;
+        let boxes = BoxTree::new(geometry.shapes().iter().map(Shape::aabb));
+        let boxes = boxes.map_err(|error| self.problem("shapes", error)).ok()?;
+        let places = Places { drafts: &drafts, geometry: &geometry, boxes: &boxes };
+        let rooms = places.rooms_around(camera.origin());
+        let outside_medium = outside.and_then(|id| media.get(id.0 as usize));
+        self.check_camera_is_lit(&rooms, places, &lights, &media, outside_medium);
+        self.check_lights_are_free(&rooms, places, &lights);
+        if !self.problems.is_empty() {
+            return None;
+        }
+        self.check_bodies_count(&rooms, places);
+        self.check_lamps_are_free(&rooms, places);
+        let bodies = bodies::rank(&drafts, &geometry).map_err(|error| self.problem("shapes", error)).ok()?;
+        let largest_corner = extent::largest_corner(geometry.shapes(), &drafts);
+        let surfaces = self.records(places, &bodies, &mut lights);
+        lights.extend(volume_lights(&geometry, &bodies, &media, bounds.radius));
         let is_specular =
             surfaces.iter().filter_map(|surface| surface.boundary.bsdf()).any(Material::is_specular)
                 || bodies::may_match(&bodies, &surfaces, &geometry);
@@ -158,14 +156,14 @@ impl Builder<'_> {
     }
 
     /// One record per shape; the shapes that shine are added to the lights.
-    fn records(&mut self, drafts: &[ShapeDraft], bodies: &[Body], lights: &mut Vec<Light>) -> Vec<Surface> {
+    fn records(&mut self, places: Places<'_>, bodies: &[Body], lights: &mut Vec<Light>) -> Vec<Surface> {
         let interiors: BTreeMap<usize, _> =
             bodies.iter().map(|body| (body.shape.0 as usize, body.interior)).collect();
-        let mut surfaces = Vec::with_capacity(drafts.len());
-        for (index, draft) in drafts.iter().enumerate() {
+        let mut surfaces = Vec::with_capacity(places.drafts.len());
+        for (index, draft) in places.drafts.iter().enumerate() {
             let emitter = if draft.emission.is_black() {
                 None
-            } else if let Some(light) = AreaLight::new(draft.shape.clone(), draft.emission) {
+            } else if let Some(light) = AreaLight::new(places.shape(index).clone(), draft.emission) {
                 lights.push(Light::Area(light));
                 Some(EmitterId(lights.len() as u32 - 1))
             } else {
@@ -185,7 +183,7 @@ impl Builder<'_> {
 
 /// The bodies whose medium emits, as far as light sub-paths can start there.
 fn volume_lights(
-    drafts: &[ShapeDraft],
+    geometry: &SceneGeometry,
     bodies: &[Body],
     media: &[Homogeneous],
     scene_radius: f32,
@@ -193,7 +191,6 @@ fn volume_lights(
     let media: Vec<_> = media.iter().cloned().map(Arc::new).collect();
     bodies.iter().filter_map(move |Body { shape, interior, .. }| {
         let medium = media.get(interior.medium?.0 as usize)?.clone();
-        let shape = &drafts.get(shape.0 as usize)?.shape;
-        Some(Light::Volume(VolumeLight::new(interior.body, shape, medium, scene_radius)?))
+        Some(Light::Volume(VolumeLight::new(interior.body, geometry.shape(*shape), medium, scene_radius)?))
     })
 }

@@ -1,22 +1,49 @@
 //! Rooms: opaque closed shapes, which part what is inside of them from what is not.
 
 use glam::Vec3;
-use upbp_accel::{BoxTree, Shape};
+use upbp_accel::{BoxTree, SceneGeometry, Shape, ShapeId};
 use upbp_media::{Homogeneous, Medium as _};
 
 use super::bodies::shapes_around;
 use super::builder::Builder;
 use super::lights;
-use super::surfaces::ShapeDraft;
-use crate::description::{Camera, Light};
+use super::surfaces::SurfaceDraft;
+use crate::light::Light;
 
-/// The opaque shapes that a point is inside of, in their order.
-fn rooms_around(point: Vec3, drafts: &[Option<ShapeDraft>], boxes: &BoxTree) -> Vec<usize> {
-    let is_room = |index: &usize| {
-        let Some(draft) = &drafts[*index] else { return false };
-        draft.boundary.inside().is_none() && draft.shape.contains(point) == Some(true)
-    };
-    shapes_around(boxes, point).into_iter().filter(is_room).collect()
+/// The shapes of a scene behind the hierarchies that tell which of them are around a point.
+#[derive(Clone, Copy)]
+pub(super) struct Places<'a> {
+    pub(super) drafts: &'a [SurfaceDraft],
+    pub(super) geometry: &'a SceneGeometry,
+    /// The boxes of the shapes.
+    pub(super) boxes: &'a BoxTree,
+}
+
+impl Places<'_> {
+    pub(super) fn shape(&self, index: usize) -> &Shape {
+        &self.geometry.shapes()[index]
+    }
+
+    /// Whether a point lies strictly inside of a shape.
+    fn is_in(&self, point: Vec3, index: usize) -> bool {
+        self.geometry.contains(ShapeId(index as u32), point) == Some(true)
+    }
+
+    /// The opaque shapes that a point is inside of, in their order.
+    pub(super) fn rooms_around(&self, point: Vec3) -> Vec<usize> {
+        let is_room =
+            |index: &usize| self.drafts[*index].boundary.inside().is_none() && self.is_in(point, *index);
+        shapes_around(self.boxes, point).into_iter().filter(is_room).collect()
+    }
+}
+
+/// The position of a light that has one.
+const fn position(light: &Light) -> Option<Vec3> {
+    match light {
+        Light::Point(light) => Some(light.position),
+        Light::Spot(light) => Some(light.position),
+        _ => None,
+    }
 }
 
 /// Whether the boxes of two shapes overlap.
@@ -35,46 +62,37 @@ enum Source {
 }
 
 impl Builder<'_> {
-    /// The opaque shapes that the camera is inside of.
-    pub(super) fn rooms_of_camera(&self, drafts: &[Option<ShapeDraft>], boxes: &BoxTree) -> Vec<usize> {
-        let Camera::Perspective { origin, .. } = &self.description.camera;
-        rooms_around(origin.get(), drafts, boxes)
-    }
-
     /// Reports a camera in a room without light. What shines from infinity is in none.
     pub(super) fn check_camera_is_lit(
         &mut self,
         rooms: &[usize],
-        drafts: &[Option<ShapeDraft>],
+        places: Places<'_>,
+        lights: &[Light],
         media: &[Homogeneous],
         outside: Option<&Homogeneous>,
     ) {
         let [first, ..] = rooms else { return };
-        let lights = self.description.lights.iter().filter(|light| lights::shines(light));
-        let points = lights.filter_map(|light| match light {
-            Light::Point { position, .. } | Light::Spot { position, .. } => Some(position.get()),
-            Light::Directional { .. } | Light::Constant(_) | Light::Image { .. } => None,
-        });
-        let shines = |draft: &ShapeDraft| {
+        let lights = self.description.lights.iter().zip(lights);
+        let points =
+            lights.filter(|(light, _)| lights::shines(light)).filter_map(|(_, light)| position(light));
+        let shines = |draft: &SurfaceDraft| {
             let medium = draft.boundary.inside().and_then(|inside| media.get(inside.medium?.0 as usize));
             !draft.emission.is_black() || medium.is_some_and(Homogeneous::emits)
         };
-        let shapes = drafts.iter().enumerate().filter(|(_, draft)| draft.as_ref().is_some_and(shines));
+        let shapes = places.drafts.iter().enumerate().filter(|(_, draft)| shines(draft));
         let sources: Vec<Source> = (points.map(Source::Point))
             .chain(shapes.map(|(index, _)| Source::Shape(index)))
             .chain(outside.filter(|medium| medium.emits()).map(|_| Source::Outside))
             .collect();
         // A shape is taken to be in a room if it may be.
-        let is_in = |source: &Source, room: usize| match (source, &drafts[room]) {
-            (Source::Outside, _) | (_, None) => true,
-            (Source::Point(position), Some(draft)) => draft.shape.contains(*position) == Some(true),
+        let is_in = |source: &Source, room: usize| match source {
+            Source::Outside => true,
+            Source::Point(position) => places.is_in(*position, room),
             // A room may shine into itself.
-            (Source::Shape(index), Some(draft)) if *index == room => {
-                matches!(&draft.shape, Shape::Mesh(mesh) if mesh.signed_volume() < 0.0)
+            Source::Shape(index) if *index == room => {
+                matches!(places.shape(room), Shape::Mesh(mesh) if mesh.signed_volume() < 0.0)
             }
-            (Source::Shape(index), Some(draft)) => {
-                drafts[*index].as_ref().is_some_and(|source| boxes_meet(&source.shape, &draft.shape))
-            }
+            Source::Shape(index) => boxes_meet(places.shape(*index), places.shape(room)),
         };
         if sources.iter().any(|source| rooms.iter().all(|room| is_in(source, *room))) {
             return;
@@ -85,18 +103,13 @@ impl Builder<'_> {
     }
 
     /// Reports lights in rooms that the camera is not in.
-    pub(super) fn check_lights_are_free(
-        &mut self,
-        rooms: &[usize],
-        drafts: &[Option<ShapeDraft>],
-        boxes: &BoxTree,
-    ) {
-        for (index, light) in self.description.lights.iter().enumerate() {
-            let (Light::Point { position, .. } | Light::Spot { position, .. }) = light else { continue };
-            for room in rooms_around(position.get(), drafts, boxes) {
+    pub(super) fn check_lights_are_free(&mut self, rooms: &[usize], places: Places<'_>, lights: &[Light]) {
+        for (index, (description, light)) in self.description.lights.iter().zip(lights).enumerate() {
+            let Some(position) = position(light) else { continue };
+            for room in places.rooms_around(position) {
                 if !rooms.contains(&room) {
                     let message = self.message_of_room(room);
-                    self.problem(lights::item(index, light), message);
+                    self.problem(lights::item(index, description), message);
                 }
             }
         }

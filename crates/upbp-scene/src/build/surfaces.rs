@@ -20,10 +20,9 @@ const MAX_FILE: u64 = 1 << 30;
 /// rays find triangles of their own somewhat faster.
 const COPIED_FROM: u32 = 4096;
 
-/// A shape that is checked by itself, but not yet against others.
-#[derive(Clone, Debug)]
-pub(super) struct ShapeDraft {
-    pub(super) shape: Shape,
+/// What a shape is made of, checked by itself, but not yet against others.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SurfaceDraft {
     pub(super) boundary: BoundaryDraft,
     pub(super) emission: Spectrum,
 }
@@ -64,8 +63,11 @@ enum Kind {
 }
 
 impl Builder<'_> {
-    /// One draft per shape; `None` where there is a problem.
-    pub(super) fn surfaces(&mut self, media: &BTreeMap<&str, MediumId>) -> Vec<Option<ShapeDraft>> {
+    /// The shapes, each with its draft; `None` where there is a problem.
+    pub(super) fn surfaces(
+        &mut self,
+        media: &BTreeMap<&str, MediumId>,
+    ) -> Vec<Option<(Shape, SurfaceDraft)>> {
         let mut materials = BTreeMap::new();
         for (name, material) in self.description.materials.iter() {
             match kind(material) {
@@ -88,7 +90,7 @@ impl Builder<'_> {
         shape: &description::Shape,
         materials: &BTreeMap<&str, Option<Kind>>,
         media: &BTreeMap<&str, MediumId>,
-    ) -> Option<ShapeDraft> {
+    ) -> Option<(Shape, SurfaceDraft)> {
         let item = self.shape_item(index);
         let geometry = self.geometry(&shape.geometry);
         if let Err(message) = &geometry {
@@ -113,7 +115,7 @@ impl Builder<'_> {
             if !emission.is_black() {
                 self.check_winding_of_lamp(&item, &shape);
             }
-            return Some(ShapeDraft { shape, boundary, emission });
+            return Some((shape, SurfaceDraft { boundary, emission }));
         }
         if !emission.is_black() {
             let message =
@@ -145,7 +147,7 @@ impl Builder<'_> {
             Kind::Refracting(material, ior) => BoundaryDraft::Refracting(material, inside(Some(ior))),
             Kind::Null => BoundaryDraft::Null(inside(None)),
         };
-        Some(ShapeDraft { shape: geometry, boundary, emission })
+        Some((geometry, SurfaceDraft { boundary, emission }))
     }
 
     /// Reports a lamp that shines into itself, unless that is where the camera is.

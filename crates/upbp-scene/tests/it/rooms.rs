@@ -1,8 +1,13 @@
 //! Rooms that are closed shapes.
 
+use std::fmt::Write as _;
+
+use glam::Vec3;
+use proptest::prelude::*;
+use upbp_accel::TriangleMesh;
 use upbp_core::Settings;
 use upbp_core::check::check_scene;
-use upbp_scene::ReadyScene;
+use upbp_scene::{ReadyScene, SceneError};
 
 /// Radiance in a sphere of radius R and albedo ρ around a light of intensity I is `ρ I / (π R² (1 − ρ))`
 /// everywhere, by camera and by light sub-paths.
@@ -24,5 +29,63 @@ fn light_in_an_integrating_sphere_is_even() {
         let mean = renderer.film().image().mean()[1];
         assert!((mean / expected - 1.0).abs() < 0.02, "{techniques}: {mean} instead of {expected}");
         assert_eq!(renderer.report().counters.lost_walks, 0);
+    }
+}
+
+/// A closed surface with deep dents, of `8 n` triangles.
+fn star(dents: &[f32]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let n = 4 * dents.len() as u32;
+    let around = |i: u32| {
+        let (sin, cos) = (i as f32 / n as f32 * std::f32::consts::TAU).sin_cos();
+        Vec3::new(cos, 0.0, -sin) * dents[i as usize % dents.len()]
+    };
+    let positions = [Vec3::Y, -Vec3::Y].into_iter().chain((0..n).map(around)).collect();
+    let triangles = (0..n).flat_map(|i| {
+        let [here, next] = [2 + i, 2 + (i + 1) % n];
+        [[0, here, next], [1, next, here]]
+    });
+    (positions, triangles.collect())
+}
+
+proptest! {
+    /// By rays and after the scene has been moved near its origin as by all triangles where it is.
+    #[test]
+    fn lights_are_in_a_room_if_all_of_its_triangles_say_so(
+        dents in prop::collection::vec(0.1_f32..1.0, 2..40),
+        places in prop::collection::vec([-1.0_f32..1.0, -1.0..1.0, -1.0..1.0], 60),
+        is_far: bool,
+    ) {
+        // Far away coordinates are no finer than 1/32.
+        let (offset, size) = if is_far { (Vec3::new(3e5, -2e5, 1e5), 100.0) } else { (Vec3::ZERO, 1.0) };
+        let (positions, triangles) = star(&dents);
+        let positions: Vec<_> = positions.into_iter().map(|position| position * size + offset).collect();
+        let vector = |Vec3 { x, y, z }: Vec3| format!("({x:?}, {y:?}, {z:?}),");
+        let mesh = TriangleMesh::new(positions.clone(), triangles.clone(), None).unwrap();
+        let (mut lights, mut expected) = (String::new(), Vec::new());
+        for (number, place) in (1..).zip(places.into_iter().map(|place| Vec3::from(place) * size + offset)) {
+            write!(lights, "Point(position: {} intensity: 1),", vector(place)).unwrap();
+            if mesh.contains(place) == Some(true) {
+                let item = format!("light {number} (Point)");
+                expected.push(format!(
+                    "{item}: lies inside of the opaque shape `star`, and the camera does not"
+                ));
+            }
+        }
+        let positions: String = positions.into_iter().map(vector).collect();
+        let triangle = |[a, b, c]: [u32; 3]| format!("({a}, {b}, {c}),");
+        let indices: String = triangles.into_iter().map(triangle).collect();
+        let text = format!(
+            "(version: 1, camera: Perspective(origin: {} target: {} fov_degrees: 40),
+              materials: {{ \"white\": Lambert(0.5) }}, lights: [{lights}],
+              shapes: [(name: \"star\", geometry: Mesh(positions: [{positions}], indices: [{indices}]), material: \"white\")])",
+            vector(offset + Vec3::Z * 4.0 * size),
+            vector(offset)
+        );
+        let found: Vec<_> = match ReadyScene::from_ron_str(&text, "") {
+            Ok(_) => Vec::new(),
+            Err(SceneError::Invalid { problems, .. }) => problems.iter().map(ToString::to_string).collect(),
+            Err(error) => panic!("{error}"),
+        };
+        prop_assert_eq!(found, expected);
     }
 }
