@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec2;
-use upbp_media::{BodyId, Lanes, Medium, MediumStack, RaySegment, SegmentDensity};
+use upbp_media::{BodyId, Lanes, Medium, MediumId, MediumStack, RaySegment, SegmentDensity};
 
 use crate::emission_guide::EmissionGuide;
 use crate::emitter_choice::EmitterChoice;
@@ -41,7 +41,8 @@ pub struct PreparedScene<'a, S: Scene> {
     /// Emitters that the lens shows out of focus.
     lens_emitters: Option<LensEmitters>,
     emitting_media: bool,
-    dense_media: bool,
+    /// Media that are [dense](Self::is_dense).
+    dense_media: Box<[bool]>,
 }
 
 impl<'a, S: Scene> PreparedScene<'a, S> {
@@ -93,8 +94,9 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         volumes.sort_unstable();
         let camera_stack = camera.is_pinhole().then(|| stack_of_pinhole(scene)).flatten();
         let emitting_media = scene.media().iter().any(Medium::emits);
-        let dense = |medium: &S::Medium| !(medium.mean_free_path() > DENSE * bounds.radius);
-        let dense_media = scene.media().iter().any(|medium| medium.scatters() && dense(medium));
+        let is_dense =
+            |medium: &S::Medium| medium.scatters() && !(medium.mean_free_path() > DENSE * bounds.radius);
+        let dense_media = scene.media().iter().map(is_dense).collect();
         let bounds_with_camera = bounds_with_camera(scene, bounds);
         let power = Selection::new(&powers);
         let choice = Arc::new(EmitterChoice {
@@ -391,12 +393,18 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         self.emitting_media
     }
 
-    /// Whether any medium is so dense that rounding often puts a vertex in it on the other side of its
-    /// boundary. A ray that is followed to the next surface or to infinity finds out; one that is followed to
-    /// the next collision does not.
+    /// Whether a medium is so dense that rounding often puts a vertex in it on the other side of its
+    /// boundary. A ray that is followed from there to the next surface or to infinity finds out; one that is
+    /// followed to the next collision does not.
     #[must_use]
-    pub const fn has_dense_media(&self) -> bool {
-        self.dense_media
+    pub fn is_dense(&self, medium: MediumId) -> bool {
+        self.dense_media.get(medium.0 as usize).is_some_and(|dense| *dense)
+    }
+
+    /// Whether any medium is [dense](Self::is_dense).
+    #[must_use]
+    pub fn has_dense_media(&self) -> bool {
+        self.dense_media.contains(&true)
     }
 
     /// The emitters that may be seen out of focus at a place of the film, with the probabilities of

@@ -1,8 +1,8 @@
 //! Context and buffers of a walk.
 
-use upbp_media::Lanes;
+use upbp_media::{Lanes, MediumStack};
 
-use super::edge::EdgeTrace;
+use super::edge::{EdgeTrace, Extent};
 use crate::iteration::IterationPlan;
 use crate::prepared_scene::PreparedScene;
 use crate::scene::{Crossing, Scene};
@@ -22,6 +22,16 @@ impl<S: Scene> Clone for Context<'_, S> {
 }
 
 impl<S: Scene> Copy for Context<'_, S> {}
+
+impl<S: Scene> Context<'_, S> {
+    /// Distance that must be known along a ray from within the bodies of `stack`: `all` of it if somebody
+    /// else asks for that.
+    #[inline]
+    pub(crate) fn extent(&self, all: bool, stack: &MediumStack) -> Extent {
+        let to_surface = all || stack.medium().is_some_and(|medium| self.prepared.is_dense(medium));
+        if to_surface { Extent::ToSurface } else { Extent::ToStop }
+    }
+}
 
 /// Buffers of one thread, kept from path to path.
 pub struct Scratch<B, L: Lanes = f64> {

@@ -10,8 +10,7 @@ use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, CameraEdge, CameraVertex, Context, Extent, Interaction, Scratch, arrive, ray_origin,
-    scatter,
+    Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, ray_origin, scatter,
 };
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
@@ -51,8 +50,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let [pb2d, bb1d] = [Technique::Pb2d, Technique::Bb1d].map(|one| own.has(one) && plan.merges_by(one));
     let query_beams = pb2d || bb1d;
     let is_long = query_beams && plan.mis.query_beams == BeamExtent::Long;
-    let to_surface = is_long || emission || prepared.has_dense_media();
-    let extent = if to_surface { Extent::ToSurface } else { Extent::ToStop };
+    let needs_all = is_long || emission;
     let mut stack = prepared.stack_at_camera(ray.origin);
     let mut origin = ray.origin;
     let mut direction = ray.direction;
@@ -69,6 +67,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
         edge.depth = depth;
+        let extent = context.extent(needs_all, &stack);
         scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, hero, &mut stream);
         out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
         if depth == 1 {

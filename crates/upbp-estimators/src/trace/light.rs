@@ -8,8 +8,8 @@ use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, Context, EdgeSource, EdgeTrace, Extent, LightChunk, LightVertex, MIN_COSINE,
-    MediumSpan, PhotonBeam, Scratch, arrive, ray_origin, scatter,
+    Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE, MediumSpan,
+    PhotonBeam, Scratch, arrive, ray_origin, scatter,
 };
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
@@ -48,13 +48,13 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
     let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
-    let extent = if long_beams || prepared.has_dense_media() { Extent::ToSurface } else { Extent::ToStop };
 
     // The shortest completion adds one edge, by light tracing or a merge on the camera's first edge.
     for depth in 1..plan.lengths.max {
         out.counters.light_edges += 1;
         let edge_trace = &mut scratch.edge_trace;
         let start = if flight.infinite { f32::NEG_INFINITY } else { 0.0 };
+        let extent = context.extent(long_beams, &flight.stack);
         edge_trace.trace(
             scene,
             flight.origin,
