@@ -51,7 +51,7 @@ pub(super) fn rank(drafts: &[SurfaceDraft], geometry: &SceneGeometry) -> Result<
     Ok(bodies)
 }
 
-/// Whether a rough surface may lie between equal indices of refraction, where it passes light straight: that
+/// Whether a rough surface may lie between equal indices of refraction, where it is as good as smooth: that
 /// of its body and of vacuum, or of a body that may touch it.
 pub(super) fn may_match(bodies: &[Body], surfaces: &[Surface], geometry: &SceneGeometry) -> bool {
     /// In a scene of more pairs the answer is the one that is always allowed.

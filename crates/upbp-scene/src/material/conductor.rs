@@ -4,7 +4,7 @@
 //! equation 20.
 
 use glam::Vec3;
-use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
+use upbp_estimators::scene::{Bsdf, BsdfEvaluation, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
 use super::fresnel;
@@ -47,34 +47,63 @@ pub struct Conductor {
     pub fresnel: MetalFresnel,
 }
 
+/// The small mirrors that reflect between two directions.
+struct Mirrors {
+    /// Their normal, above the surface.
+    normal: Vec3,
+    /// Value of the metal if they reflected all light.
+    value: f32,
+    /// Density of the second direction after arriving from the first.
+    pdf: f32,
+    /// Density of the first direction after arriving from the second.
+    pdf_reverse: f32,
+}
+
 impl Conductor {
-    /// Normal of the mirrors that reflect between the two directions, above the surface.
-    fn half_vector(from: Vec3, to: Vec3) -> Option<Vec3> {
+    /// The small mirrors that reflect between two directions, if these are on the same side.
+    fn between(self, from: Vec3, to: Vec3) -> Option<Mirrors> {
         if from.z * to.z <= 0.0 {
             return None;
         }
         let half = (from + to).try_normalize()?;
-        Some(half * half.z.signum())
+        let normal = half * half.z.signum();
+        // The density of normals that are seen over 4 |from·h|, written out: the dot product cancels.
+        let density = 0.25 * self.normals.density(normal);
+        let visibility = self.normals.visibility(from, to);
+        Some(Mirrors {
+            normal,
+            value: density * visibility.both,
+            pdf: density * visibility.from,
+            pdf_reverse: density * visibility.to,
+        })
+    }
+
+    fn reflected(self, from: Vec3, interface: Interface, mirrors: &Mirrors) -> Spectrum {
+        let [eta_outside, _] = indices(from, interface);
+        let cos_incident = from.dot(mirrors.normal).abs().min(1.0);
+        self.fresnel.reflectance(cos_incident, eta_outside) * mirrors.value
     }
 }
 
 impl Bsdf for Conductor {
     fn eval(&self, towards_light: Vec3, towards_camera: Vec3, interface: Interface) -> Spectrum {
-        let Some(half) = Self::half_vector(towards_light, towards_camera) else {
-            return Spectrum::ZERO;
-        };
-        let [eta_outside, _] = indices(towards_light, interface);
-        let reflectance = self.fresnel.reflectance(towards_light.dot(half).abs().min(1.0), eta_outside);
-        let value = self.normals.density(half)
-            * self.normals.shadowing_masking(towards_light, towards_camera)
-            / (4.0 * towards_light.z * towards_camera.z);
-        reflectance * value
+        let found = self.between(towards_light, towards_camera);
+        found.map_or(Spectrum::ZERO, |found| self.reflected(towards_light, interface, &found))
     }
 
     fn pdf(&self, from: Vec3, to: Vec3, _: Interface) -> f32 {
-        // D_visible / (4 |from·h|), written out: the dot product cancels.
-        Self::half_vector(from, to).map_or(0.0, |half| {
-            self.normals.masking(from) * self.normals.density(half) / (4.0 * from.z.abs())
+        self.between(from, to).map_or(0.0, |found| found.pdf)
+    }
+
+    fn evaluate(&self, from: Vec3, to: Vec3, _: Walk, interface: Interface) -> Option<BsdfEvaluation> {
+        let found = self.between(from, to)?;
+        let value = self.reflected(from, interface, &found);
+        (!value.is_black()).then(|| BsdfEvaluation {
+            value,
+            pdf: found.pdf,
+            pdf_reverse: found.pdf_reverse,
+            continuation: self.continuation(from),
+            continuation_reverse: self.continuation(to),
         })
     }
 
@@ -86,20 +115,14 @@ impl Bsdf for Conductor {
         let above = from * side;
         let normal = self.normals.sample_visible(above, u)?;
         let to = (2.0 * above.dot(normal) * normal - above).normalize() * side;
-        let pdf = self.pdf(from, to, interface);
+        let Mirrors { value, pdf, pdf_reverse, .. } = self.between(from, to)?;
         if pdf <= 0.0 || !pdf.is_finite() {
             return None;
         }
         let [eta_outside, _] = indices(from, interface);
         let reflectance = self.fresnel.reflectance(above.dot(normal).clamp(0.0, 1.0), eta_outside);
-        let unmasked = self.normals.shadowing_masking(from, to) / self.normals.masking(from);
-        Some(BsdfSample {
-            to,
-            weight: reflectance * unmasked,
-            pdf,
-            pdf_reverse: self.pdf(to, from, interface),
-            delta: false,
-        })
+        let weight = reflectance * (value * to.z.abs() / pdf);
+        Some(BsdfSample { to, weight, pdf, pdf_reverse, delta: false })
     }
 
     fn is_connectible(&self) -> bool {

@@ -150,7 +150,19 @@ pub(super) struct Lobe {
     to: Side,
     /// Share of the lobe that passes the surface.
     passes: f32,
+    /// The same for light from the other side.
+    passes_back: f32,
     eta_to: f32,
+}
+
+/// The lobe between two directions, for light from the first and for light from the second.
+pub(super) struct LobeParts {
+    /// Value, without the index that compresses radiance.
+    pub(super) value: f32,
+    /// Shares of the light that the lobe scatters.
+    pub(super) shares: [f32; 2],
+    /// Densities of the direction that the light leaves in.
+    pub(super) pdfs: [f32; 2],
 }
 
 impl Lobe {
@@ -163,7 +175,7 @@ impl Lobe {
         }
         let ratio = (eta_to / eta_from).powi(2) * to.mean / from.mean;
         let passes = from.passed.min(to.passed * ratio);
-        Some(Self { from, to, passes, eta_to })
+        Some(Self { from, to, passes, passes_back: passes / ratio, eta_to })
     }
 
     /// Share of the light from this direction that the lobe scatters.
@@ -177,20 +189,19 @@ impl Lobe {
         if u_side < self.passes { Vec3::new(to.x, to.y, -to.z) } else { to }
     }
 
-    /// Value between two directions, without the index that compresses radiance.
-    pub(super) fn symmetric_value(&self, cos_from: f32, cos_to: f32) -> f32 {
-        let missing = FRAC_1_PI * self.from.missing(cos_from);
-        if cos_from * cos_to > 0.0 {
-            (1.0 - self.passes) * missing * self.from.missing(cos_to) / self.from.mean
+    /// The lobe between two directions. They are cosine-weighted on either side.
+    pub(super) fn between(&self, cos_from: f32, cos_to: f32) -> LobeParts {
+        let (side, parts, eta) = if cos_from * cos_to > 0.0 {
+            (&self.from, [1.0 - self.passes; 2], 1.0)
         } else {
-            self.passes * missing * self.to.missing(cos_to) / (self.to.mean * self.eta_to * self.eta_to)
+            (&self.to, [self.passes, self.passes_back], self.eta_to)
+        };
+        let shares = [self.from.missing(cos_from), side.missing(cos_to)];
+        LobeParts {
+            value: FRAC_1_PI * parts[0] * shares[0] * shares[1] / (side.mean * eta * eta),
+            shares,
+            pdfs: [parts[0] * cos_to.abs(), parts[1] * cos_from.abs()].map(|pdf| FRAC_1_PI * pdf),
         }
-    }
-
-    /// Density of the lobe's direction: cosine-weighted on either side.
-    pub(super) fn pdf(&self, cos_from: f32, cos_to: f32) -> f32 {
-        let side = if cos_from * cos_to > 0.0 { 1.0 - self.passes } else { self.passes };
-        side * cos_to.abs() * FRAC_1_PI
     }
 }
 

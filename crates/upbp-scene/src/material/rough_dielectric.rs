@@ -5,18 +5,19 @@
 //! and 21. Equation 21 compresses radiance: `f(l, c) / η_c² = f(c, l) / η_l²`.
 
 use glam::Vec3;
-use upbp_estimators::scene::{Bsdf, BsdfSample, Interface, Walk};
+use upbp_estimators::scene::{Bsdf, BsdfEvaluation, BsdfSample, Interface, Walk};
 use upbp_media::Spectrum;
 
-use super::energy_compensation::Lobe;
+use super::dielectric::Dielectric;
+use super::energy_compensation::{Lobe, LobeParts};
 use super::facet::scattered;
 use super::fresnel::refraction;
 use super::local::indices;
 use super::trowbridge_reitz::TrowbridgeReitz;
 
-/// Relative difference of indices below which the surface passes light straight, whatever its
-/// roughness. The reflectance that is left out is below 10⁻⁶; the normal that would refract between two
-/// given directions has no digits left there.
+/// Relative difference of indices below which the surface is taken to be smooth: it bends light by less than
+/// any roughness would spread it, and the normal that would refract between two given directions has no
+/// digits left.
 const MATCHED: f32 = 1e-3;
 
 /// Rough glass. The indices come from the bodies on both sides.
@@ -36,6 +37,21 @@ struct Facet {
     reflects: bool,
     /// `(η_from from·h + η_to to·h)²`, of use only for refraction.
     denominator: f32,
+}
+
+/// Scattering between two directions.
+#[derive(Clone, Copy)]
+struct Scattering {
+    /// Value without the index that compresses radiance.
+    value: f32,
+    /// Density of the second direction after arriving from the first.
+    pdf: f32,
+    /// Density of the first direction after arriving from the second.
+    pdf_reverse: f32,
+}
+
+impl Scattering {
+    const NONE: Self = Self { value: 0.0, pdf: 0.0, pdf_reverse: 0.0 };
 }
 
 impl RoughDielectric {
@@ -59,46 +75,44 @@ impl RoughDielectric {
         Some(Facet { normal, reflectance, reflects, denominator: sum * sum })
     }
 
-    /// Value of single scattering, without the index that compresses radiance.
-    fn single_value(self, from: Vec3, to: Vec3, facet: &Facet) -> f32 {
-        let spread = self.normals.density(facet.normal) * self.normals.shadowing_masking(from, to)
-            / (from.z * to.z).abs();
-        if facet.reflects {
-            0.25 * facet.reflectance * spread
+    /// Single scattering between two directions.
+    fn single(self, from: Vec3, to: Vec3, eta @ [eta_from, eta_to]: [f32; 2]) -> Option<Scattering> {
+        let facet = Self::facet(from, to, eta)?;
+        let visibility = self.normals.visibility(from, to);
+        let density = self.normals.density(facet.normal);
+        let (spread, eta2) = if facet.reflects {
+            (0.25 * facet.reflectance * density, [1.0; 2])
         } else {
             let cosines = (from.dot(facet.normal) * to.dot(facet.normal)).abs();
-            (1.0 - facet.reflectance) * spread * cosines / facet.denominator
-        }
+            let spread = (1.0 - facet.reflectance) * density * cosines / facet.denominator;
+            (spread, [eta_to * eta_to, eta_from * eta_from])
+        };
+        let found = Scattering {
+            value: spread * visibility.both,
+            pdf: spread * visibility.from * eta2[0],
+            pdf_reverse: spread * visibility.to * eta2[1],
+        };
+        (found.value.is_finite() && found.pdf.is_finite() && found.pdf_reverse.is_finite()).then_some(found)
     }
 
-    /// Density of single scattering.
-    fn single_pdf(self, from: Vec3, to: Vec3, facet: &Facet, eta_to: f32) -> f32 {
-        let visible = self.normals.visible_density(from, facet.normal);
-        let cos_to = to.dot(facet.normal).abs();
-        if facet.reflects {
-            facet.reflectance * visible / (4.0 * cos_to)
-        } else {
-            (1.0 - facet.reflectance) * visible * eta_to * eta_to * cos_to / facet.denominator
-        }
-    }
-
-    /// Value without the index that compresses radiance, and density; both zero at the horizon.
-    fn value_and_pdf(self, from: Vec3, to: Vec3, eta: [f32; 2]) -> [f32; 2] {
+    /// All scattering between two directions, with the lobe of these indices; none at the horizon.
+    fn scattering(self, from: Vec3, to: Vec3, eta: [f32; 2], lobe: Option<&Lobe>) -> Scattering {
         if from.z == 0.0 || to.z == 0.0 {
-            return [0.0; 2];
+            return Scattering::NONE;
         }
-        let [mut value, mut pdf] = Self::facet(from, to, eta).map_or([0.0; 2], |facet| {
-            [self.single_value(from, to, &facet), self.single_pdf(from, to, &facet, eta[1])]
-        });
-        if !(value.is_finite() && pdf.is_finite()) {
-            [value, pdf] = [0.0; 2];
+        let single = self.single(from, to, eta).unwrap_or(Scattering::NONE);
+        let Some(lobe) = lobe else { return single };
+        let LobeParts { value, shares: [share, share_reverse], pdfs } = lobe.between(from.z, to.z);
+        Scattering {
+            value: single.value + value,
+            pdf: (1.0 - share) * single.pdf + share * pdfs[0],
+            pdf_reverse: (1.0 - share_reverse) * single.pdf_reverse + share_reverse * pdfs[1],
         }
-        if let Some(lobe) = Lobe::new(self.normals, eta) {
-            let share = lobe.share(from.z);
-            value += lobe.symmetric_value(from.z, to.z);
-            pdf = (1.0 - share) * pdf + share * lobe.pdf(from.z, to.z);
-        }
-        [value, pdf]
+    }
+
+    /// All scattering between two directions; `None` where the surface is smooth.
+    fn between(self, from: Vec3, to: Vec3, eta: [f32; 2]) -> Option<Scattering> {
+        (!is_matched(eta)).then(|| self.scattering(from, to, eta, Lobe::new(self.normals, eta).as_ref()))
     }
 
     /// Draws a direction by single scattering.
@@ -118,7 +132,7 @@ impl RoughDielectric {
     }
 }
 
-/// Whether the surface passes light straight, from either side.
+/// Whether the surface is as good as smooth, from either side.
 pub(crate) fn is_matched([eta_from, eta_to]: [f32; 2]) -> bool {
     (eta_from - eta_to).abs() < MATCHED * eta_from.min(eta_to)
 }
@@ -126,17 +140,26 @@ pub(crate) fn is_matched([eta_from, eta_to]: [f32; 2]) -> bool {
 impl Bsdf for RoughDielectric {
     fn eval(&self, towards_light: Vec3, towards_camera: Vec3, interface: Interface) -> Spectrum {
         let eta @ [_, eta_camera] = indices(towards_light, interface);
-        if is_matched(eta) {
-            return Spectrum::ZERO;
-        }
-        let [value, _] = self.value_and_pdf(towards_light, towards_camera, eta);
         let passes = towards_light.z * towards_camera.z < 0.0;
-        Spectrum::splat(value * compression(passes, eta_camera))
+        let found = self.between(towards_light, towards_camera, eta);
+        Spectrum::splat(found.map_or(0.0, |found| found.value * compression(passes, eta_camera)))
     }
 
     fn pdf(&self, from: Vec3, to: Vec3, interface: Interface) -> f32 {
-        let eta = indices(from, interface);
-        if is_matched(eta) { 0.0 } else { self.value_and_pdf(from, to, eta)[1] }
+        self.between(from, to, indices(from, interface)).map_or(0.0, |found| found.pdf)
+    }
+
+    fn evaluate(&self, from: Vec3, to: Vec3, walk: Walk, interface: Interface) -> Option<BsdfEvaluation> {
+        let eta @ [eta_from, eta_to] = indices(from, interface);
+        let Scattering { value, pdf, pdf_reverse } = self.between(from, to, eta)?;
+        let eta_camera = if walk == Walk::Camera { eta_from } else { eta_to };
+        (value > 0.0).then(|| BsdfEvaluation {
+            value: Spectrum::splat(value * compression(from.z * to.z < 0.0, eta_camera)),
+            pdf,
+            pdf_reverse,
+            continuation: 1.0,
+            continuation_reverse: 1.0,
+        })
     }
 
     fn sample(
@@ -152,21 +175,15 @@ impl Bsdf for RoughDielectric {
         }
         let eta @ [eta_from, eta_to] = indices(from, interface);
         if is_matched(eta) {
-            return Some(BsdfSample {
-                to: -from,
-                weight: Spectrum::ONE,
-                pdf: 1.0,
-                pdf_reverse: 1.0,
-                delta: true,
-            });
+            return Dielectric.sample(from, walk, interface, u_lobe, u);
         }
         let lobe = Lobe::new(self.normals, eta);
         let share = lobe.as_ref().map_or(0.0, |lobe| lobe.share(from.z));
-        let to = match lobe {
+        let to = match &lobe {
             Some(lobe) if u_lobe < share => lobe.sample(from, u_lobe / share, u),
             _ => self.sample_single(from, eta, (u_lobe - share) / (1.0 - share), u)?,
         };
-        let [value, pdf] = self.value_and_pdf(from, to, eta);
+        let Scattering { value, pdf, pdf_reverse } = self.scattering(from, to, eta, lobe.as_ref());
         if pdf <= 0.0 {
             return None;
         }
@@ -176,7 +193,7 @@ impl Bsdf for RoughDielectric {
             to,
             weight: Spectrum::splat(weight),
             pdf,
-            pdf_reverse: self.pdf(to, from, interface),
+            pdf_reverse,
             delta: false,
         })
     }

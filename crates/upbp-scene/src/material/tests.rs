@@ -118,14 +118,17 @@ fn rough_glass_loses_nothing() {
 
 #[test]
 fn radiance_is_compressed_where_flux_is_not() {
-    let interface = Interface { above: 1.0, below: 1.5 };
     let smooth = Material::Dielectric(Dielectric);
     let rough = Material::RoughDielectric(RoughDielectric { normals: TrowbridgeReitz { alpha: 0.2 } });
-    for material in [smooth, rough] {
-        let weights = |walk| material.sample(Vec3::Z, walk, interface, 0.9, [0.3, 0.4]).unwrap();
-        let (light, camera) = (weights(Walk::Light), weights(Walk::Camera));
-        assert!(light.to.z < 0.0);
-        assert!((camera.weight.r() * 2.25 / light.weight.r() - 1.0).abs() < 1e-5);
+    for (above, below) in [(1.0, 1.5), (1.4986, 1.5)] {
+        for material in [smooth, rough] {
+            let interface = Interface { above, below };
+            let weights = |walk| material.sample(Vec3::Z, walk, interface, 0.9, [0.3, 0.4]).unwrap();
+            let (light, camera) = (weights(Walk::Light), weights(Walk::Camera));
+            assert!(light.to.z < 0.0);
+            let compressed = camera.weight.r() / light.weight.r() * (below / above).powi(2);
+            assert!((compressed - 1.0).abs() < 1e-5, "{material:?} {above} : {below}: {compressed}");
+        }
     }
 }
 

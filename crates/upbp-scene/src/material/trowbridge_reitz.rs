@@ -15,6 +15,16 @@ pub struct TrowbridgeReitz {
     pub alpha: f32,
 }
 
+/// Shares of the small mirrors that directions see, per area of the surface as they see it.
+pub(super) struct Visibility {
+    /// `G_1(from) / |from_z|`.
+    pub(super) from: f32,
+    /// `G_1(to) / |to_z|`.
+    pub(super) to: f32,
+    /// `G(from, to) / |from_z to_z|`: that which both see; their heights are correlated.
+    pub(super) both: f32,
+}
+
 impl TrowbridgeReitz {
     /// Density of normals `D`, per steradian of the normal and area of the surface; `normal.z > 0`.
     pub(super) fn density(self, normal: Vec3) -> f32 {
@@ -43,12 +53,18 @@ impl TrowbridgeReitz {
         1.0 / (1.0 + self.lambda(a) + self.lambda(b))
     }
 
-    /// Density of [`sample_visible`](Self::sample_visible): the small mirrors as `from` sees them.
-    pub(super) fn visible_density(self, from: Vec3, normal: Vec3) -> f32 {
-        self.masking(from) * self.density(normal) * from.dot(normal).abs() / from.z.abs()
+    /// All that is known of two directions.
+    pub(super) fn visibility(self, from: Vec3, to: Vec3) -> Visibility {
+        let [of_from, of_to] = [from, to].map(|direction| self.lambda(direction));
+        Visibility {
+            from: 1.0 / ((1.0 + of_from) * from.z.abs()),
+            to: 1.0 / ((1.0 + of_to) * to.z.abs()),
+            both: 1.0 / ((1.0 + of_from + of_to) * (from.z * to.z).abs()),
+        }
     }
 
-    /// Draws a normal that faces `from`, which is above the surface.
+    /// Draws a normal that faces `from`, which is above the surface: with the density
+    /// `D(normal) |from·normal|` times the [visibility](Self::visibility) of `from`.
     pub(super) fn sample_visible(self, from: Vec3, u: [f32; 2]) -> Option<Vec3> {
         let stretched = Vec3::new(from.x * self.alpha, from.y * self.alpha, from.z).try_normalize()?;
         // A cap of the sphere, uniform by area.
