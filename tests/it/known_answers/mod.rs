@@ -15,7 +15,7 @@
 //! | `canonical_variance` | all | [`canonical_variance`] |
 //!
 //! Bodies in layers, in a white furnace of their own: [`layers`]. Layers for denoisers: [`features`].
-//! Facets of smoothly shaded meshes: [`shading_normals`].
+//! Facets of smoothly shaded meshes: [`shading_normals`]. A disc of the sky: [`sun`].
 //!
 //! Not covered: the furnace with a density grid (no such medium); half-spaces of albedo 1, whose finite slabs
 //! converge as 1/τ only (`slab_RT` has slabs of albedo 1).
@@ -34,3 +34,4 @@ mod references;
 mod shading_normals;
 mod single_scatter;
 mod slab;
+mod sun;

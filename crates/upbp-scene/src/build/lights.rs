@@ -11,7 +11,7 @@ use super::builder::Builder;
 use crate::description::Light as Description;
 use crate::light::{
     ConstantEnvironment, DirectionalLight, EnvironmentImage, ImageEnvironment, Light, PointLight, SpotCone,
-    SpotLight,
+    SpotLight, SunLight,
 };
 
 /// The name of a light in messages: its place from 1 and its kind.
@@ -20,6 +20,7 @@ pub(super) fn item(index: usize, light: &Description) -> String {
         Description::Point { .. } => "Point",
         Description::Spot { .. } => "Spot",
         Description::Directional { .. } => "Directional",
+        Description::Sun { .. } => "Sun",
         Description::Constant(_) => "Constant",
         Description::Image { .. } => "Image",
     };
@@ -28,7 +29,13 @@ pub(super) fn item(index: usize, light: &Description) -> String {
 
 /// Whether a light is infinitely far away.
 fn is_infinite(light: &Description) -> bool {
-    matches!(light, Description::Directional { .. } | Description::Constant(_) | Description::Image { .. })
+    matches!(
+        light,
+        Description::Directional { .. }
+            | Description::Sun { .. }
+            | Description::Constant(_)
+            | Description::Image { .. }
+    )
 }
 
 /// Whether a light is not black.
@@ -37,7 +44,9 @@ pub(super) fn shines(light: &Description) -> bool {
         Description::Point { intensity, .. } | Description::Spot { intensity, .. } => {
             !intensity.get().is_black()
         }
-        Description::Directional { irradiance, .. } => !irradiance.get().is_black(),
+        Description::Directional { irradiance, .. } | Description::Sun { irradiance, .. } => {
+            !irradiance.get().is_black()
+        }
         Description::Constant(radiance) => !radiance.get().is_black(),
         Description::Image { .. } => true,
     }
@@ -81,6 +90,11 @@ impl Builder<'_> {
             Description::Directional { direction, irradiance } => {
                 let direction = unit(direction.get()).ok_or("`direction` is zero")?;
                 Light::Directional(DirectionalLight { direction, irradiance: irradiance.get() })
+            }
+            Description::Sun { direction, irradiance, diameter_degrees } => {
+                let direction = unit(direction.get()).ok_or("`direction` is zero")?;
+                let diameter = diameter_degrees.get().to_radians();
+                Light::Sun(SunLight::new(direction, irradiance.get(), diameter))
             }
             Description::Constant(radiance) => {
                 Light::Constant(ConstantEnvironment { radiance: radiance.get() })

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::single_value;
-use super::value::{BeamAngle, Colour, CutoffAngle, Degrees, Positive, Vector, is_default};
+use super::value::{AngularDiameter, BeamAngle, Colour, CutoffAngle, Degrees, Positive, Vector, is_default};
 
 /// A light. Surfaces that shine are [shapes](super::Shape) with an emission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +41,16 @@ pub enum Light {
         /// Irradiance on a plane perpendicular to the direction, W m⁻².
         irradiance: Colour,
     },
+    /// A disc of the sky of even radiance, infinitely far away.
+    Sun {
+        /// Direction of propagation from its middle, a vector of any length.
+        direction: Vector,
+        /// Irradiance on a plane perpendicular to the direction, W m⁻².
+        irradiance: Colour,
+        /// Angle that the disc takes up, degrees.
+        #[serde(default = "default_diameter", skip_serializing_if = "is_default_diameter")]
+        diameter_degrees: AngularDiameter,
+    },
     /// A constant environment: the same radiance, W m⁻² sr⁻¹, from all directions, infinitely far away.
     #[serde(deserialize_with = "single_value::radiance")]
     Constant(Colour),
@@ -55,6 +65,15 @@ pub enum Light {
         #[serde(default = "default_rotation", skip_serializing_if = "is_default")]
         rotation_degrees: Degrees,
     },
+}
+
+fn default_diameter() -> AngularDiameter {
+    AngularDiameter::OF_THE_SUN
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_default_diameter(diameter: &AngularDiameter) -> bool {
+    *diameter == AngularDiameter::OF_THE_SUN
 }
 
 fn default_scale() -> Positive {

@@ -29,6 +29,7 @@ pub use self::scene::SceneDescription;
 pub use self::shape::{Geometry, Rotation, Shape};
 pub(crate) use self::text::Fnv1a;
 pub use self::value::{
-    Asymmetries, Asymmetry, BeamAngle, Colour, Count, CutoffAngle, Degrees, Diameter, Exponent, FieldOfView,
-    Ior, NonNegative, Positive, Reflectance, Roughness, Share, ValueError, Vector, Version,
+    AngularDiameter, Asymmetries, Asymmetry, BeamAngle, Colour, Count, CutoffAngle, Degrees, Diameter,
+    Exponent, FieldOfView, Ior, NonNegative, Positive, Reflectance, Roughness, Share, ValueError, Vector,
+    Version,
 };

@@ -49,6 +49,7 @@ const KINDS: [(&str, &[&str]); 6] = [
             "Point(position: (0, 3, 0), intensity: 5)",
             "Spot(position: (0, 3, 0), target: (0, 0, 0), intensity: 5, cutoff_degrees: 20)",
             "Directional(direction: (0, -1, 0), irradiance: 1)",
+            "Sun(direction: (-1, -3, 1), irradiance: 3)",
             "Constant(1)",
             "Image(file: \"sky.exr\")",
         ],
@@ -448,7 +449,11 @@ mod tests {
             ),
             ("lights", "Constant", "9: Expected opening `(`, as in `Constant(1)`"),
             ("lights", r#"Image("sky.exr")"#, r#"7: Expected a name, as in `Image(file: "sky.exr")`"#),
-            ("lights", "5", "1: Expected a name, one of `Point`, `Spot`, `Directional`, `Constant`, `Image`"),
+            (
+                "lights",
+                "5",
+                "1: Expected a name, one of `Point`, `Spot`, `Directional`, `Sun`, `Constant`, `Image`",
+            ),
         ] {
             assert_eq!(read(field, kind).unwrap_err(), expected, "{kind}");
         }

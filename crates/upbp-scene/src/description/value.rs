@@ -125,6 +125,10 @@ number!(
     CutoffAngle(f32), "an angle from 0.01 to 180 degrees", |x| (0.01..=180.0).contains(&x)
 );
 number!(
+    /// Full angle of a disc of the sky in degrees, in `[0.01, 180]`.
+    AngularDiameter(f32), "an angle from 0.01 to 180 degrees", |x| (0.01..=180.0).contains(&x)
+);
+number!(
     /// An angle in degrees, in `[-360, 360]`.
     Degrees(f32), "an angle from -360 to 360 degrees", |x| (-360.0..=360.0).contains(&x)
 );
@@ -132,6 +136,11 @@ number!(
 impl NonNegative {
     /// Zero.
     pub const ZERO: Self = Self(0.0);
+}
+
+impl AngularDiameter {
+    /// The sun's from the earth, half a degree.
+    pub const OF_THE_SUN: Self = Self(0.53);
 }
 
 impl Positive {

@@ -11,6 +11,7 @@ mod image;
 mod infinite;
 mod point;
 mod spot;
+mod sun;
 mod volume;
 
 use glam::Vec3;
@@ -25,6 +26,7 @@ pub use self::directional::DirectionalLight;
 pub use self::image::{EnvironmentImage, EnvironmentImageError, ImageEnvironment};
 pub use self::point::PointLight;
 pub use self::spot::{SpotCone, SpotLight};
+pub use self::sun::SunLight;
 pub use self::volume::VolumeLight;
 
 /// A light of a ready-made scene.
@@ -38,6 +40,8 @@ pub enum Light {
     Spot(SpotLight),
     /// Parallel light.
     Directional(DirectionalLight),
+    /// A small disc of the sky.
+    Sun(SunLight),
     /// Equal light from all directions.
     Constant(ConstantEnvironment),
     /// Light from all directions, by an image.
@@ -47,13 +51,27 @@ pub enum Light {
 }
 
 impl Light {
+    /// The position of a point or spot light.
+    pub(crate) const fn position(&self) -> Option<Vec3> {
+        match self {
+            Self::Point(light) => Some(light.position),
+            Self::Spot(light) => Some(light.position),
+            _ => None,
+        }
+    }
+
     /// Moves a point or spot light. A surface or volume that shines is made of a shape that has been moved
     /// already.
     pub(crate) fn translate(&mut self, by: Vec3) {
         match self {
             Self::Point(light) => light.position += by,
             Self::Spot(light) => light.position += by,
-            Self::Area(_) | Self::Directional(_) | Self::Constant(_) | Self::Image(_) | Self::Volume(_) => {}
+            Self::Area(_)
+            | Self::Directional(_)
+            | Self::Sun(_)
+            | Self::Constant(_)
+            | Self::Image(_)
+            | Self::Volume(_) => {}
         }
     }
 }
@@ -65,6 +83,7 @@ macro_rules! dispatch {
             Light::Point($light) => $call,
             Light::Spot($light) => $call,
             Light::Directional($light) => $call,
+            Light::Sun($light) => $call,
             Light::Constant($light) => $call,
             Light::Image($light) => $call,
             Light::Volume($light) => $call,

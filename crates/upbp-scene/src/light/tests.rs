@@ -167,9 +167,43 @@ fn points_and_spots_satisfy_the_contract() {
 fn infinite_lights_satisfy_the_contract() {
     let direction = Vec3::new(0.2, -1.0, 0.3).normalize();
     check(Light::Directional(DirectionalLight { direction, irradiance: Spectrum::splat(2.0) }));
+    for diameter in [2e-4, 0.01, 0.3, 1.5, PI] {
+        check(Light::Sun(SunLight::new(direction, Spectrum::new(2.0, 1.0, 0.5), diameter)));
+    }
     check(Light::Constant(ConstantEnvironment { radiance: Spectrum::new(1.0, 0.5, 0.2) }));
     check(Light::Image(ImageEnvironment::new(image(), 1.0, 0.0)));
     check(Light::Image(ImageEnvironment::new(image(), 0.3, 2.1)));
+}
+
+#[test]
+fn the_sun_lights_a_plane_by_its_irradiance() {
+    let direction = Vec3::new(0.2, -1.0, 0.3).normalize();
+    for diameter in [2e-4, 0.01, 0.3, 1.5, PI] {
+        let light = SunLight::new(direction, Spectrum::splat(2.0), diameter);
+        let steps = 300;
+        let mut sum = 0.0;
+        for i in 0..steps * steps {
+            let u = [i % steps, i / steps].map(|i| (i as f32 + 0.5) / steps as f32);
+            let Some(found) = light.sample_incident(&BOUNDS, Vec3::ZERO, u) else { continue };
+            sum -= f64::from(found.radiance.mean() / found.pdf * found.towards_light.dot(direction));
+            // It is seen where it shines from, and nowhere else.
+            assert!(light.hit(&BOUNDS, &found.point, -found.towards_light, Vec3::ZERO).is_some());
+        }
+        let irradiance = sum / f64::from(steps * steps);
+        assert!((irradiance / 2.0 - 1.0).abs() < 1e-4, "{diameter}: {irradiance}");
+        let rim = 0.5 * diameter;
+        let (tangent, _) = upbp_media::orthonormal_basis(direction);
+        for (angle, is_seen) in [(0.0, true), (0.99 * rim, true), (1.01 * rim, false), (PI, false)] {
+            let along = (angle.cos() * direction + angle.sin() * tangent).normalize();
+            let point = EmitterPoint { position: Vec3::ZERO, normal: along };
+            assert_eq!(
+                light.hit(&BOUNDS, &point, along, Vec3::ZERO).is_some(),
+                is_seen,
+                "{diameter} {angle}"
+            );
+            assert_eq!(light.emission_coordinates(&BOUNDS, &point, along, BOUNDS.centre).is_some(), is_seen);
+        }
+    }
 }
 
 #[test]
@@ -202,6 +236,8 @@ fn power_is_what_emission_carries() {
     let (sphere, cuboid) = (Sphere::new(Vec3::Y, 0.3).unwrap(), AxisBox::new(Vec3::ZERO, Vec3::ONE).unwrap());
     let infinite = [
         Light::Directional(DirectionalLight { direction: Vec3::NEG_Y, irradiance: Spectrum::splat(2.0) }),
+        Light::Sun(SunLight::new(Vec3::NEG_Y, Spectrum::splat(2.0), 0.01)),
+        Light::Sun(SunLight::new(Vec3::NEG_Y, Spectrum::splat(2.0), 2.0)),
         Light::Constant(ConstantEnvironment { radiance: Spectrum::new(1.0, 0.5, 0.2) }),
         Light::Image(ImageEnvironment::new(image(), 3.0, 0.4)),
     ];
