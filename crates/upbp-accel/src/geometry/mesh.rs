@@ -8,7 +8,7 @@ use super::error::GeometryError;
 use super::hierarchy::MAX_INDEX;
 use super::model::Model;
 use super::placement::{Placement, unit};
-use super::surface::{Border, Surface, cross, cumulative_area, normal_cone};
+use super::surface::{Areas, Border, Surface, cross, normal_cone};
 use super::triangle::RayShear;
 use crate::ray::Ray;
 
@@ -23,9 +23,9 @@ pub struct TriangleMesh {
     surface: Arc<Surface>,
     placement: Option<Placement>,
     bounds: (Vec3, Vec3),
-    /// Area of the triangles of a copy up to and including each, if it is not in proportion to that of the
-    /// surface, once it is asked for.
-    stretched_area: OnceLock<Vec<f64>>,
+    /// Areas of the triangles of a copy, if they are not in proportion to those of the surface, once they are
+    /// asked for.
+    own_areas: OnceLock<Areas>,
 }
 
 impl TriangleMesh {
@@ -76,14 +76,14 @@ impl TriangleMesh {
 
     fn with_surface(surface: Surface) -> Self {
         let bounds = surface.bounds();
-        Self { surface: Arc::new(surface), placement: None, bounds, stretched_area: OnceLock::new() }
+        Self { surface: Arc::new(surface), placement: None, bounds, own_areas: OnceLock::new() }
     }
 
     /// A copy in another place, which shares the triangles. `to_scene` maps all corners from where they are
     /// in this mesh; it may mirror, stretch and shear, and the normals still point outwards.
     ///
-    /// A scene with many copies of a mesh needs memory for one of them, and a copy is made without a look at
-    /// each triangle; rays take somewhat longer to find their way than to triangles of a mesh of its own, and
+    /// A scene with many copies of a mesh needs memory for one of them, and all but the first are made without
+    /// a look at each triangle; rays take somewhat longer to find their way than to triangles of a mesh of its own, and
     /// meet the same.
     pub fn placed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
         let count = self.triangle_count() as usize;
@@ -91,9 +91,9 @@ impl TriangleMesh {
             return Err(GeometryError::TooManyPrimitives { count });
         }
         let placement = self.placement_by(to_scene)?;
-        let bounds = self.surface.bounds_of_copy(&placement);
+        let bounds = self.surface.model().bounds_of_copy(&placement);
         let (surface, placement) = (self.surface.clone(), Some(placement));
-        Self { surface, placement, bounds, stretched_area: OnceLock::new() }.checked()
+        Self { surface, placement, bounds, own_areas: OnceLock::new() }.checked()
     }
 
     /// The mesh in another place with triangles of its own: the corners are those of a copy that is
@@ -134,12 +134,16 @@ impl TriangleMesh {
     }
 
     pub(super) fn translated(mut self, by: Vec3) -> Self {
-        match &mut self.placement {
-            Some(placement) => *placement = placement.translated(by),
-            None => Arc::make_mut(&mut self.surface).translate(by),
-        }
-        let (min, max) = self.bounds;
-        Self { bounds: (min + by, max + by), ..self }
+        self.bounds = if let Some(placement) = &mut self.placement {
+            *placement = placement.translated(by);
+            self.surface.model().bounds_of_copy(placement)
+        } else {
+            let surface = Arc::make_mut(&mut self.surface);
+            surface.translate(by);
+            surface.bounds()
+        };
+        self.own_areas = OnceLock::new();
+        self
     }
 
     /// The number of triangles that are in use.
@@ -195,19 +199,29 @@ impl TriangleMesh {
     /// Surface area, square scene units.
     #[must_use]
     pub fn area(&self) -> f32 {
-        let (areas, factor) = self.cumulative_area();
-        (areas.last().copied().unwrap_or(0.0) * factor) as f32
+        let (areas, factor) = self.areas();
+        (areas.total() * factor) as f32
     }
 
-    /// Areas of the triangles up to and including each, and the factor that they are still to be multiplied
-    /// by. Copies that are scaled evenly share them: the area of a triangle under another map depends on its
-    /// plane, and takes a pass over all triangles.
-    fn cumulative_area(&self) -> (&[f64], f64) {
-        let Some(placement) = &self.placement else { return (self.surface.cumulative_area(), 1.0) };
-        match placement.squared_scale() {
-            Some(factor) => (self.surface.cumulative_area(), factor),
-            None => (self.stretched_area.get_or_init(|| cumulative_area(self.each())), 1.0),
+    /// Areas of the triangles, and the factor that they are still to be multiplied by.
+    fn areas(&self) -> (&Areas, f64) {
+        if self.placement.is_none() {
+            return (self.surface.areas(), 1.0);
         }
+        match self.even_factor() {
+            Some(factor) => (self.surface.areas(), factor),
+            None => (self.own_areas.get_or_init(|| Areas::of(self.each())), 1.0),
+        }
+    }
+
+    /// Factor of all areas of a copy that is scaled evenly, in a place where its corners keep their digits.
+    /// The area of a triangle under another map depends on its plane.
+    fn even_factor(&self) -> Option<f64> {
+        let placement = self.placement.as_ref()?;
+        let factor = placement.squared_scale()?;
+        let (min, max) = self.surface.bounds();
+        let rounding = f64::from(f32::EPSILON * placement.reach(min.abs().max(max.abs())));
+        self.surface.areas().allow(rounding / factor.sqrt()).then_some(factor)
     }
 
     /// The enclosed volume, cubic scene units: negative if the normals point inwards, and without meaning
@@ -228,7 +242,7 @@ impl TriangleMesh {
     #[must_use]
     pub fn normal_cone(&self) -> Option<(Vec3, f32)> {
         let Some(placement) = &self.placement else { return self.surface.normal_cone() };
-        if placement.squared_scale().is_none() {
+        if self.even_factor().is_none() {
             return normal_cone(|| self.each());
         }
         let (axis, cos) = self.surface.normal_cone()?;
@@ -239,9 +253,9 @@ impl TriangleMesh {
     /// A point distributed uniformly over the surface, and the geometric normal; `u` in `[0, 1)²`.
     #[must_use]
     pub fn sample_area(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        let (areas, _) = self.cumulative_area();
-        let total = areas.last().copied().unwrap_or(0.0);
-        let target = f64::from(u[0]) * total;
+        let (areas, _) = self.areas();
+        let target = f64::from(u[0]) * areas.total();
+        let areas = &areas.cumulative;
         let triangle = areas.partition_point(|&sum| sum <= target).min(areas.len() - 1);
         let before = if triangle == 0 { 0.0 } else { areas[triangle - 1] };
         // The rest of the random number inside the triangle is uniform again.

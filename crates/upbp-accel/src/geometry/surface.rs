@@ -5,7 +5,6 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec3, Vec3};
 
 use super::model::Model;
-use super::placement::Placement;
 
 /// Triangles in coordinates of their own.
 #[derive(Clone, Debug)]
@@ -24,10 +23,46 @@ pub(super) struct Surface {
 /// for.
 #[derive(Clone, Debug, Default)]
 struct Measures {
-    cumulative_area: OnceLock<Vec<f64>>,
+    areas: OnceLock<Areas>,
     signed_volume: OnceLock<f64>,
     normal_cone: OnceLock<Option<(Vec3, f32)>>,
     model: OnceLock<Arc<Model>>,
+}
+
+/// Areas of the triangles of a surface.
+#[derive(Clone, Debug)]
+pub(super) struct Areas {
+    /// That of the triangles up to and including each.
+    pub(super) cumulative: Vec<f64>,
+    /// Sum of the lengths of all edges, those that two triangles share twice.
+    edges: f64,
+}
+
+impl Areas {
+    /// Those of triangles one after the other.
+    pub(super) fn of(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
+        let (mut total, mut edges) = (0.0, 0.0);
+        let up_to = |corners: [Vec3; 3]| {
+            let [a, b, c] = corners;
+            edges += f64::from(a.distance(b) + b.distance(c) + c.distance(a));
+            total += 0.5 * cross(corners).length();
+            total
+        };
+        let cumulative = triangles.map(up_to).collect();
+        Self { cumulative, edges }
+    }
+
+    pub(super) fn total(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    /// Whether corners may be off by as much, in some direction, and triangles are about as large as before.
+    pub(super) fn allow(&self, error: f64) -> bool {
+        /// The most by which areas may change relative to all: not all in the same sense, since errors of
+        /// rounding have either.
+        const PART: f64 = 0.03;
+        self.edges * error <= PART * self.total()
+    }
 }
 
 impl Surface {
@@ -62,9 +97,8 @@ impl Surface {
         (0..self.count()).map(|triangle| self.corners(triangle))
     }
 
-    /// Area of the triangles up to and including each.
-    pub(super) fn cumulative_area(&self) -> &[f64] {
-        self.measures.cumulative_area.get_or_init(|| cumulative_area(self.each()))
+    pub(super) fn areas(&self) -> &Areas {
+        self.measures.areas.get_or_init(|| Areas::of(self.each()))
     }
 
     /// The enclosed volume: negative if the normals point inwards.
@@ -95,31 +129,24 @@ impl Surface {
 
     /// The hierarchy over the triangles.
     pub(super) fn model(&self) -> &Arc<Model> {
-        self.measures.model.get_or_init(|| Arc::new(Model::build(self)))
-    }
-
-    /// The least and the greatest coordinates of a copy, to the bit those of its corners.
-    pub(super) fn bounds_of_copy(&self, placement: &Placement) -> (Vec3, Vec3) {
-        self.model().bounds_of_copy(placement)
+        let model = &self.measures.model;
+        if let Some(built) = model.get() {
+            return built;
+        }
+        // Not inside of the cell: while a thread builds in parallel it may take up the work of another copy,
+        // and would wait for itself.
+        let built = Arc::new(Model::build(self));
+        model.get_or_init(|| built)
     }
 
     /// Adds a vector to all positions.
     pub(super) fn translate(&mut self, by: Vec3) {
         self.positions.iter_mut().for_each(|position| *position += by);
         self.bounds = (self.bounds.0 + by, self.bounds.1 + by);
-        // The other measures are the same everywhere.
-        self.measures.model = OnceLock::new();
+        // The volume does not depend on how corners are rounded in their place.
+        let signed_volume = std::mem::take(&mut self.measures.signed_volume);
+        self.measures = Measures { signed_volume, ..Measures::default() };
     }
-}
-
-/// Areas of triangles, each with all before it.
-pub(super) fn cumulative_area(triangles: impl Iterator<Item = [Vec3; 3]>) -> Vec<f64> {
-    let mut total = 0.0;
-    let up_to = |corners| {
-        total += 0.5 * cross(corners).length();
-        total
-    };
-    triangles.map(up_to).collect()
 }
 
 /// The mean of the unit normals of triangles, of unit length, and the least cosine between it and any of

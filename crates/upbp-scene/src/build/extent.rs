@@ -46,11 +46,7 @@ fn origin_near(bounds: &BoundingSphere) -> Vec3 {
 /// A sphere around all shapes and finite lights, around the centre of their common box and as small as their
 /// own boxes allow.
 pub(super) fn bounds(shapes: &[Shape], lights: &[Light], camera: &PerspectiveCamera) -> BoundingSphere {
-    let positions = lights.iter().filter_map(|light| match light {
-        Light::Point(light) => Some(light.position),
-        Light::Spot(light) => Some(light.position),
-        _ => None,
-    });
+    let positions = lights.iter().filter_map(Light::position);
     // Without shapes, how far the camera is from the lights tells best how large things are.
     let positions = positions.chain(shapes.is_empty().then(|| camera.origin()));
     let boxes = shapes.iter().map(Shape::aabb).chain(positions.clone().map(|position| (position, position)));

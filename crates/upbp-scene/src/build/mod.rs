@@ -122,9 +122,6 @@ impl Builder<'_> {
         let outside_medium = outside.and_then(|id| media.get(id.0 as usize));
         self.check_camera_is_lit(&rooms, places, &lights, &media, outside_medium);
         self.check_lights_are_free(&rooms, places, &lights);
-        if !self.problems.is_empty() {
-            return None;
-        }
         self.check_bodies_count(&rooms, places);
         self.check_lamps_are_free(&rooms, places);
         let bodies = bodies::rank(&drafts, &geometry).map_err(|error| self.problem("shapes", error)).ok()?;

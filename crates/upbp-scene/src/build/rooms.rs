@@ -37,15 +37,6 @@ impl Places<'_> {
     }
 }
 
-/// The position of a light that has one.
-const fn position(light: &Light) -> Option<Vec3> {
-    match light {
-        Light::Point(light) => Some(light.position),
-        Light::Spot(light) => Some(light.position),
-        _ => None,
-    }
-}
-
 /// Whether the boxes of two shapes overlap.
 fn boxes_meet(a: &Shape, b: &Shape) -> bool {
     let [(min, max), (other_min, other_max)] = [a, b].map(Shape::aabb);
@@ -74,7 +65,7 @@ impl Builder<'_> {
         let [first, ..] = rooms else { return };
         let lights = self.description.lights.iter().zip(lights);
         let points =
-            lights.filter(|(light, _)| lights::shines(light)).filter_map(|(_, light)| position(light));
+            lights.filter(|(light, _)| lights::shines(light)).filter_map(|(_, light)| light.position());
         let shines = |draft: &SurfaceDraft| {
             let medium = draft.boundary.inside().and_then(|inside| media.get(inside.medium?.0 as usize));
             !draft.emission.is_black() || medium.is_some_and(Homogeneous::emits)
@@ -105,7 +96,7 @@ impl Builder<'_> {
     /// Reports lights in rooms that the camera is not in.
     pub(super) fn check_lights_are_free(&mut self, rooms: &[usize], places: Places<'_>, lights: &[Light]) {
         for (index, (description, light)) in self.description.lights.iter().zip(lights).enumerate() {
-            let Some(position) = position(light) else { continue };
+            let Some(position) = light.position() else { continue };
             for room in places.rooms_around(position) {
                 if !rooms.contains(&room) {
                     let message = self.message_of_room(room);

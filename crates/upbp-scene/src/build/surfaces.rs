@@ -20,7 +20,7 @@ const MAX_FILE: u64 = 1 << 30;
 /// rays find triangles of their own somewhat faster.
 const COPIED_FROM: u32 = 4096;
 
-/// What a shape is made of, checked by itself, but not yet against others.
+/// Boundary and emission of a shape, checked by themselves, but not yet against other shapes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfaceDraft {
     pub(super) boundary: BoundaryDraft,
