@@ -82,9 +82,9 @@ impl TriangleMesh {
     /// A copy in another place, which shares the triangles. `to_scene` maps all corners from where they are
     /// in this mesh; it may mirror, stretch and shear, and the normals still point outwards.
     ///
-    /// A scene with many copies of a mesh needs memory for one of them, and all but the first are made without
-    /// a look at each triangle; rays take somewhat longer to find their way than to triangles of a mesh of its own, and
-    /// meet the same.
+    /// A scene with many copies of a mesh needs memory for one of them, and all but the first are made
+    /// without a look at each triangle; rays take somewhat longer to find their way than to triangles of a
+    /// mesh of its own, and meet the same.
     pub fn placed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
         let count = self.triangle_count() as usize;
         if count > MAX_INDEX {
