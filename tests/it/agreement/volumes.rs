@@ -72,7 +72,7 @@ fn shapes_and_media() {
 fn surroundings() {
     let sphere = |x: f32, radius: f32| format!("Sphere(centre: ({x}, 0.2, 0), radius: {radius})");
     let smoke = body("Box(min: (-1.8, -0.5, -1.8), max: (1.8, 2, 1.9))", "null", "smoke");
-    let sets = ["hit+nee", "hit", "hit+lt", "hit+bb1d", "hit+pb2d", "all"];
+    let sets = ["hit+nee", "hit+lt", "hit+pb2d", "all"];
     for (name, camera, flame, bodies) in [
         ("in smoke", OUTSIDE, THIN, smoke.clone() + &body(&sphere(0.0, 0.5), "null", "flame")),
         (
