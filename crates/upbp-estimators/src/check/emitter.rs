@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::{Check, DRAWS, Random, direction, is_density, is_light, is_unit, require, same, same_spectrum};
 use crate::scene::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint};
@@ -268,6 +268,49 @@ fn check_point_directions(emitter: &impl Emitter, bounds: &BoundingSphere, rando
     power.agrees((flux, 0.006 * flux), "emission carries the flux that receivers see")
 }
 
+/// A distribution of directions: every other one anywhere, and every other one in a cone around where light
+/// comes from, which uniform directions may miss altogether.
+struct Sources {
+    axis: DVec3,
+    /// One minus the cosine of the cone's half angle.
+    height: f64,
+}
+
+impl Sources {
+    /// By what the emitter draws: a cone of twice their angle.
+    fn of(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Self {
+        let drawn: Vec<DVec3> = (0..1000)
+            .filter_map(|_| emitter.sample_emission(bounds, random.pair(), random.pair()))
+            .map(|emission| emission.direction.as_dvec3())
+            .collect();
+        let axis = drawn.iter().sum::<DVec3>().normalize_or(DVec3::Z);
+        let farthest = drawn.iter().map(|direction| versine(axis, *direction)).fold(0.0, f64::max);
+        Self { axis, height: (4.0 * farthest).clamp(1e-12, 2.0) }
+    }
+
+    fn sample(&self, random: &mut Random) -> Vec3 {
+        if random.next() < 0.5 {
+            return random.direction();
+        }
+        let [u, v] = random.pair().map(f64::from);
+        let (below_pole, (sin_phi, cos_phi)) = (u * self.height, (TAU * v).sin_cos());
+        let sine = (below_pole * (2.0 - below_pole)).sqrt();
+        let (tangent, bitangent) = self.axis.any_orthonormal_pair();
+        let across = sine * (cos_phi * tangent + sin_phi * bitangent);
+        (across + (1.0 - below_pole) * self.axis).as_vec3().normalize()
+    }
+
+    fn pdf(&self, direction: Vec3) -> f64 {
+        let is_inside = versine(self.axis, direction.as_dvec3()) <= self.height;
+        0.5 / (2.0 * TAU) + if is_inside { 0.5 / (TAU * self.height) } else { 0.0 }
+    }
+}
+
+/// One minus the cosine of the angle between two unit vectors.
+fn versine(a: DVec3, b: DVec3) -> f64 {
+    0.5 * a.distance_squared(b)
+}
+
 /// `∫ pdf dω = 1` over all directions, and the same flux by emission, by choice and by quadrature.
 fn check_environment_directions(
     emitter: &impl Emitter,
@@ -276,11 +319,13 @@ fn check_environment_directions(
 ) -> Check {
     let anywhere = EmitterPoint { position: bounds.centre, normal: Vec3::Z };
     let (mut density, mut flux) = (Mean::default(), Mean::default());
+    let sources = Sources::of(emitter, bounds, random);
     for _ in 0..20 * DRAWS {
-        let direction = random.direction();
+        let direction = sources.sample(random);
+        let pdf = sources.pdf(direction);
         let seen = emitter.hit(bounds, &anywhere, direction, bounds.centre);
-        density.add(seen.map_or(0.0, |seen| f64::from(seen.pdf_position) * 2.0 * TAU));
-        flux.add(seen.map_or(0.0, |seen| f64::from(seen.radiance.mean()) * 2.0 * TAU));
+        density.add(seen.map_or(0.0, |seen| f64::from(seen.pdf_position) / pdf));
+        flux.add(seen.map_or(0.0, |seen| f64::from(seen.radiance.mean()) / pdf));
     }
     density.agrees((1.0, 0.0), "the density of directions integrates to one")?;
     let (mut chosen, mut emitted) = (Mean::default(), Mean::default());
