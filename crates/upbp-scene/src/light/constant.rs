@@ -8,7 +8,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::infinite::{Parallel, disc_area};
+use super::infinite::{Environment, Parallel, disc_area, environment};
 use crate::sampling;
 
 /// A constant environment.
@@ -21,56 +21,22 @@ pub struct ConstantEnvironment {
 /// Density of a uniform direction, sr⁻¹.
 const PDF_UNIFORM: f32 = 0.25 * FRAC_1_PI;
 
-impl ConstantEnvironment {
-    /// The light that goes in a direction.
-    fn along(&self, direction: Vec3) -> Parallel {
-        Parallel { direction, radiance: self.radiance, pdf: PDF_UNIFORM }
+impl Environment for ConstantEnvironment {
+    fn power_through(&self, area: f32) -> f32 {
+        area * 4.0 * PI * self.radiance.mean()
+    }
+
+    fn along(&self, direction: Vec3) -> Option<Parallel> {
+        Some(Parallel { direction, radiance: self.radiance, pdf: PDF_UNIFORM })
+    }
+
+    fn sample(&self, u: [f32; 2]) -> Option<Parallel> {
+        self.along(sampling::sphere(u))
+    }
+
+    fn coordinates(&self, direction: Vec3) -> [f32; 2] {
+        sampling::sphere_inverse(direction)
     }
 }
 
-impl Emitter for ConstantEnvironment {
-    fn kind(&self) -> EmitterKind {
-        EmitterKind::Environment
-    }
-
-    fn power(&self, bounds: &BoundingSphere) -> f32 {
-        disc_area(bounds) * 4.0 * PI * self.radiance.mean()
-    }
-
-    fn sample_emission(
-        &self,
-        bounds: &BoundingSphere,
-        u: [f32; 2],
-        u_direction: [f32; 2],
-    ) -> Option<Emission> {
-        Some(self.along(sampling::sphere(u_direction)).emission(bounds, u, [0.5; 2]))
-    }
-
-    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
-        Some(self.along(-sampling::sphere(u)).incident(bounds, receiver))
-    }
-
-    fn hit(
-        &self,
-        bounds: &BoundingSphere,
-        _: &EmitterPoint,
-        direction: Vec3,
-        _: Vec3,
-    ) -> Option<HitDensities> {
-        Some(self.along(direction).hit(bounds))
-    }
-
-    fn emission_coordinates(
-        &self,
-        bounds: &BoundingSphere,
-        _: &EmitterPoint,
-        direction: Vec3,
-        on_ray: Vec3,
-    ) -> Option<EmissionCoordinates> {
-        let position = self.along(direction).place(bounds, on_ray)?;
-        Some(EmissionCoordinates {
-            position: Some(position),
-            direction: Some(sampling::sphere_inverse(direction)),
-        })
-    }
-}
+environment!(ConstantEnvironment);

@@ -18,7 +18,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::infinite::{Parallel, disc_area};
+use super::infinite::{Environment, Parallel, disc_area, environment};
 use crate::description::Fnv1a;
 
 /// The most pixels that an environment may have: 16384 × 8192.
@@ -307,63 +307,28 @@ impl ImageEnvironment {
         let (radiance, pdf) = self.image.lookup(self.rotation.inverse().apply(towards_light));
         (radiance * self.scale, pdf)
     }
+}
 
-    /// Draws a direction; none in the rare case that rounding moves it into a black pixel.
+impl Environment for ImageEnvironment {
     fn sample(&self, u: [f32; 2]) -> Option<Parallel> {
-        let light = self.along(-self.rotation.apply(self.image.sample(u)).normalize());
+        let light = self.along(-self.rotation.apply(self.image.sample(u)).normalize())?;
         (light.pdf > 0.0).then_some(light)
     }
 
-    /// The light that goes in a direction.
-    fn along(&self, direction: Vec3) -> Parallel {
+    fn along(&self, direction: Vec3) -> Option<Parallel> {
         let (radiance, pdf) = self.radiance_and_pdf(-direction);
-        Parallel { direction, radiance, pdf }
-    }
-}
-
-impl Emitter for ImageEnvironment {
-    fn kind(&self) -> EmitterKind {
-        EmitterKind::Environment
+        Some(Parallel { direction, radiance, pdf })
     }
 
-    fn power(&self, bounds: &BoundingSphere) -> f32 {
-        let power = disc_area(bounds) * self.scale * self.image.total_mean as f32;
+    fn coordinates(&self, direction: Vec3) -> [f32; 2] {
+        self.image.coordinates(self.rotation.inverse().apply(-direction))
+    }
+
+    fn power_through(&self, area: f32) -> f32 {
+        let power = area * self.scale * self.image.total_mean as f32;
         // A scale that is no number is for the renderer to refuse.
         if power == f32::INFINITY && self.scale.is_finite() { f32::MAX } else { power }
     }
-
-    fn sample_emission(
-        &self,
-        bounds: &BoundingSphere,
-        u: [f32; 2],
-        u_direction: [f32; 2],
-    ) -> Option<Emission> {
-        Some(self.sample(u_direction)?.emission(bounds, u, [0.5; 2]))
-    }
-
-    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
-        Some(self.sample(u)?.incident(bounds, receiver))
-    }
-
-    fn hit(
-        &self,
-        bounds: &BoundingSphere,
-        _: &EmitterPoint,
-        direction: Vec3,
-        _: Vec3,
-    ) -> Option<HitDensities> {
-        Some(self.along(direction).hit(bounds))
-    }
-
-    fn emission_coordinates(
-        &self,
-        bounds: &BoundingSphere,
-        _: &EmitterPoint,
-        direction: Vec3,
-        on_ray: Vec3,
-    ) -> Option<EmissionCoordinates> {
-        let position = self.along(direction).place(bounds, on_ray)?;
-        let direction = self.image.coordinates(self.rotation.inverse().apply(-direction));
-        Some(EmissionCoordinates { position: Some(position), direction: Some(direction) })
-    }
 }
+
+environment!(ImageEnvironment);

@@ -61,6 +61,77 @@ impl Parallel {
     }
 }
 
+/// Light that comes from many directions, infinitely far away.
+pub(super) trait Environment {
+    /// The power through a disc of an area that is turned towards each direction, W.
+    fn power_through(&self, area: f32) -> f32;
+
+    /// The light that goes in a direction, if there is any.
+    fn along(&self, direction: Vec3) -> Option<Parallel>;
+
+    /// Draws a direction; none in the rare case that rounding moves it to where no light comes from.
+    fn sample(&self, u: [f32; 2]) -> Option<Parallel>;
+
+    /// The random numbers that a direction is drawn by.
+    fn coordinates(&self, direction: Vec3) -> [f32; 2];
+}
+
+/// Implements [`Emitter`](upbp_estimators::scene::Emitter) for an [`Environment`].
+macro_rules! environment {
+    ($light:ty) => {
+        impl Emitter for $light {
+            fn kind(&self) -> EmitterKind {
+                EmitterKind::Environment
+            }
+
+            fn power(&self, bounds: &BoundingSphere) -> f32 {
+                self.power_through(disc_area(bounds))
+            }
+
+            fn sample_emission(
+                &self,
+                bounds: &BoundingSphere,
+                u: [f32; 2],
+                u_direction: [f32; 2],
+            ) -> Option<Emission> {
+                Some(self.sample(u_direction)?.emission(bounds, u, [0.5; 2]))
+            }
+
+            fn sample_incident(
+                &self,
+                bounds: &BoundingSphere,
+                receiver: Vec3,
+                u: [f32; 2],
+            ) -> Option<Incident> {
+                Some(self.sample(u)?.incident(bounds, receiver))
+            }
+
+            fn hit(
+                &self,
+                bounds: &BoundingSphere,
+                _: &EmitterPoint,
+                direction: Vec3,
+                _: Vec3,
+            ) -> Option<HitDensities> {
+                Some(self.along(direction)?.hit(bounds))
+            }
+
+            fn emission_coordinates(
+                &self,
+                bounds: &BoundingSphere,
+                _: &EmitterPoint,
+                direction: Vec3,
+                on_ray: Vec3,
+            ) -> Option<EmissionCoordinates> {
+                let position = self.along(direction)?.place(bounds, on_ray)?;
+                let direction = self.coordinates(direction);
+                Some(EmissionCoordinates { position: Some(position), direction: Some(direction) })
+            }
+        }
+    };
+}
+pub(super) use environment;
+
 /// Area of the disc that parallel light starts from, square scene units.
 pub(super) fn disc_area(bounds: &BoundingSphere) -> f32 {
     PI * bounds.radius * bounds.radius

@@ -8,7 +8,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::infinite::{Parallel, disc_area};
+use super::infinite::{Environment, Parallel, disc_area, environment};
 use crate::sampling;
 
 /// A disc of the sky of even radiance. Other than a [directional light](super::DirectionalLight) it is seen:
@@ -33,69 +33,31 @@ impl SunLight {
         let height = 2.0 * sine(0.25 * diameter).powi(2);
         Self { direction, radiance: irradiance * projected.recip() as f32, height: height as f32 }
     }
+}
 
-    /// The light that goes in a direction, if it comes from the disc.
+impl Environment for SunLight {
+    fn power_through(&self, area: f32) -> f32 {
+        area * TAU * self.height * self.radiance.mean()
+    }
+
     fn along(&self, direction: Vec3) -> Option<Parallel> {
         let pdf = 1.0 / (TAU * self.height);
-        (self.place_on_disc(direction)[0] <= 1.0).then_some(Parallel {
+        (self.coordinates(direction)[0] <= 1.0).then_some(Parallel {
             direction,
             radiance: self.radiance,
             pdf,
         })
     }
 
-    /// Draws a direction; none in the rare case that rounding moves it beside the disc.
     fn sample(&self, u: [f32; 2]) -> Option<Parallel> {
         let (axis, height) = (self.direction.as_dvec3(), f64::from(self.height));
         self.along(sampling::fine::cone(axis, height, u.map(f64::from)).as_vec3().normalize())
     }
 
-    /// The random numbers that a direction is drawn by; the first is above 1 beside the disc.
-    fn place_on_disc(&self, direction: Vec3) -> [f32; 2] {
+    /// The first number is above 1 beside the disc.
+    fn coordinates(&self, direction: Vec3) -> [f32; 2] {
         sampling::cone_inverse(self.direction, self.height, direction)
     }
 }
 
-impl Emitter for SunLight {
-    fn kind(&self) -> EmitterKind {
-        EmitterKind::Environment
-    }
-
-    fn power(&self, bounds: &BoundingSphere) -> f32 {
-        disc_area(bounds) * TAU * self.height * self.radiance.mean()
-    }
-
-    fn sample_emission(
-        &self,
-        bounds: &BoundingSphere,
-        u: [f32; 2],
-        u_direction: [f32; 2],
-    ) -> Option<Emission> {
-        Some(self.sample(u_direction)?.emission(bounds, u, [0.5; 2]))
-    }
-
-    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
-        Some(self.sample(u)?.incident(bounds, receiver))
-    }
-
-    fn hit(
-        &self,
-        bounds: &BoundingSphere,
-        _: &EmitterPoint,
-        direction: Vec3,
-        _: Vec3,
-    ) -> Option<HitDensities> {
-        Some(self.along(direction)?.hit(bounds))
-    }
-
-    fn emission_coordinates(
-        &self,
-        bounds: &BoundingSphere,
-        _: &EmitterPoint,
-        direction: Vec3,
-        on_ray: Vec3,
-    ) -> Option<EmissionCoordinates> {
-        let position = self.along(direction)?.place(bounds, on_ray)?;
-        Some(EmissionCoordinates { position: Some(position), direction: Some(self.place_on_disc(direction)) })
-    }
-}
+environment!(SunLight);
