@@ -240,7 +240,7 @@ proptest! {
 
             // A connection gets through if nothing bends it.
             let start = line.at(0.0);
-            let target = Target { direction, distance: f32::INFINITY, surface: None };
+            let target = Target::Infinity(direction);
             let clear = clear_edge::<_, f64>(&scene, &stretches[0].stack, start, &target, &mut Vec::new());
             prop_assert_eq!(clear.is_some(), surfaces == 0);
         }

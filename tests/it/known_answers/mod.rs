@@ -15,7 +15,8 @@
 //! | `canonical_variance` | all | [`canonical_variance`] |
 //!
 //! Bodies in layers, in a white furnace of their own: [`layers`]. Layers for denoisers: [`features`].
-//! Facets of smoothly shaded meshes: [`shading_normals`]. A disc of the sky: [`sun`].
+//! Facets of smoothly shaded meshes: [`shading_normals`]. A disc of the sky: [`sun`]. Lamps and cameras in
+//! planes: [`lamps_in_planes`].
 //!
 //! Not covered: the furnace with a density grid (no such medium); half-spaces of albedo 1, whose finite slabs
 //! converge as 1/τ only (`slab_RT` has slabs of albedo 1).
@@ -28,6 +29,7 @@ mod features;
 mod furnace;
 mod glowing_ball;
 mod halfspace;
+mod lamps_in_planes;
 mod layers;
 mod point_source;
 mod references;

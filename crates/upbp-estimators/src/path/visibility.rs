@@ -11,13 +11,15 @@ use crate::scene::{Crossing, MAX_CROSSINGS, Scene};
 
 /// The far end of a connection.
 #[derive(Clone, Copy, Debug)]
-pub struct Target {
-    /// Direction to it from the near vertex, a unit vector.
-    pub direction: Vec3,
-    /// Distance in scene units; infinite for an infinite emitter.
-    pub distance: f32,
-    /// Point and normal of the surface that it lies on, if any.
-    pub surface: Option<(Vec3, Vec3)>,
+pub enum Target {
+    /// Infinitely far in this direction, a unit vector.
+    Infinity(Vec3),
+    /// A point in a medium.
+    Medium(Vec3),
+    /// A point on a surface, with the unit normal there.
+    Surface(Vec3, Vec3),
+    /// A light or a lens that has no surface, but may lie in one: a lamp in the plane of its ceiling.
+    Pinpoint(Vec3),
 }
 
 /// The start of a ray from a vertex: off the surface, by no more than rounding requires.
@@ -43,18 +45,25 @@ pub fn clear_edge<S: Scene, L: Lanes>(
     const OFF: f32 = 4.0 * f32::EPSILON;
     /// Surfaces that are met at smaller cosines count as met at this one.
     const LEAST_COSINE: f32 = 0.04;
+    /// The same where the surface is not known, and may be met at any.
+    const LEAST_COSINE_OF_ANY: f32 = 0.004;
     crossings.clear();
-    let ray = match target.surface {
-        Some((position, normal)) => {
-            // Both ends stand off their surfaces, so that neither blocks the view; the ray ends before it
-            // could, by rounding, meet the surface that it leads to.
-            let between = offset_origin(position, normal, -target.direction) - origin;
-            let length = between.length();
-            let direction = between / length;
-            let short = OFF / direction.dot(normal).abs().max(LEAST_COSINE);
-            Ray { origin, direction, t_min: 0.0, t_max: length * (1.0 - short) }
+    // The ray ends before it could, by rounding, meet the surface that it leads to; media do not.
+    let to_point = |point: Vec3, short: f32| {
+        let between = point - origin;
+        let length = between.length();
+        (Ray { origin, direction: between / length, t_min: 0.0, t_max: length * (1.0 - short) }, length)
+    };
+    let (ray, length) = match *target {
+        Target::Infinity(direction) => (Ray::new(origin, direction), f32::INFINITY),
+        Target::Medium(point) => to_point(point, 0.0),
+        Target::Surface(position, normal) => {
+            // Both ends stand off their surfaces, so that neither blocks the view.
+            let away = origin - position;
+            let cosine = away.dot(normal).abs() / away.length();
+            to_point(offset_origin(position, normal, away), OFF / cosine.max(LEAST_COSINE))
         }
-        None => Ray { origin, direction: target.direction, t_min: 0.0, t_max: target.distance },
+        Target::Pinpoint(point) => to_point(point, OFF / LEAST_COSINE_OF_ANY),
     };
     if !(ray.t_max > 0.0) || !ray.direction.is_finite() || !scene.is_clear(&ray, crossings) {
         return None;
@@ -62,17 +71,17 @@ pub fn clear_edge<S: Scene, L: Lanes>(
     if crossings.len() >= MAX_CROSSINGS {
         return None;
     }
-    let escapes = target.distance == f32::INFINITY;
+    let escapes = length == f32::INFINITY;
     if crossings.is_empty() && (!escapes || stack.is_empty()) {
         // Most edges: no list is copied.
         let mut density = EdgeDensity::EMPTY;
-        push(scene, &mut density, &ray, medium_of(scene, stack), 0.0, ray.t_max);
+        push(scene, &mut density, &ray, medium_of(scene, stack), 0.0, length);
         return Some(density);
     }
     // As along a walk, what the ray meets counts more than what was known where it starts.
     let mut corrections = 0;
     while may_correct(corrections) {
-        match accumulate(scene, stack.clone(), &ray, crossings, corrections, escapes) {
+        match accumulate(scene, stack.clone(), &ray, length, crossings, corrections) {
             Edge::Clear(density) => return Some(density),
             Edge::Blocked => return None,
             Edge::Corrected(correction) => crossings.insert(corrections, correction),
@@ -113,9 +122,9 @@ fn accumulate<S: Scene, L: Lanes>(
     scene: &S,
     mut stack: MediumStack,
     ray: &Ray,
+    length: f32,
     crossings: &[Crossing],
     corrections: usize,
-    escapes: bool,
 ) -> Edge<L> {
     let mut density = EdgeDensity::<L>::EMPTY;
     let mut start = 0.0;
@@ -143,11 +152,13 @@ fn accumulate<S: Scene, L: Lanes>(
             start = t;
         }
     }
-    if escapes && let Some(correction) = correction_of_escape(&stack, crossings) {
+    if length == f32::INFINITY
+        && let Some(correction) = correction_of_escape(&stack, crossings)
+    {
         return Edge::Corrected(correction);
     }
-    if ray.t_max > start || !started {
-        push(scene, &mut density, ray, medium_of(scene, &stack), start, ray.t_max);
+    if length > start || !started {
+        push(scene, &mut density, ray, medium_of(scene, &stack), start, length);
     }
     Edge::Clear(density)
 }

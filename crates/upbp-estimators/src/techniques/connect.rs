@@ -72,11 +72,10 @@ fn connect<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let crosses = vertex.interaction.crosses(vertex.towards_camera, direction);
     let stack = sides.towards(crosses);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
-    let surface = match &light.interaction {
-        Interaction::Surface(surface) => Some((light.position, surface.geometric_normal)),
-        Interaction::Medium(_) => None,
+    let target = match &light.interaction {
+        Interaction::Surface(surface) => Target::Surface(light.position, surface.geometric_normal),
+        Interaction::Medium(_) => Target::Medium(light.position),
     };
-    let target = Target { direction, distance, surface };
     let Some(density) = clear_edge::<_, L>(scene, stack, origin, &target, crossings) else { return };
 
     let (near, far) = (vertex.interaction.in_medium(), light.interaction.in_medium());

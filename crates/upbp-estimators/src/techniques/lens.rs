@@ -50,7 +50,7 @@ fn next_event_at_lens<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let light = &scene.emitters()[emitter.0 as usize];
     let Some(seen) = light.hit(prepared.emission_bounds(), &point, -direction, lens) else { return };
     out.counters.shadow_rays += 1;
-    let target = Target { direction, distance, surface: Some((point.position, point.normal)) };
+    let target = Target::Surface(point.position, point.normal);
     let stack = prepared.stack_at_camera(lens);
     let Some(density) = clear_edge::<_, L>(scene, &stack, lens, &target, crossings) else { return };
 

@@ -42,7 +42,7 @@ pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     out.counters.shadow_rays += 1;
     let crosses = vertex.interaction.crosses(vertex.towards_light, direction);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
-    let target = Target { direction, distance, surface: None };
+    let target = Target::Pinpoint(view.lens);
     let Some(density) = clear_edge::<_, L>(scene, sides.towards(crosses), origin, &target, crossings) else {
         return;
     };

@@ -52,8 +52,12 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     out.counters.shadow_rays += 1;
     let crosses = vertex.interaction.crosses(vertex.towards_camera, direction);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
-    let surface = (kind == EmitterKind::Area).then_some((incident.point.position, incident.point.normal));
-    let target = Target { direction, distance: incident.distance, surface };
+    let target = match kind {
+        EmitterKind::Area => Target::Surface(incident.point.position, incident.point.normal),
+        EmitterKind::Point => Target::Pinpoint(incident.point.position),
+        EmitterKind::Volume(_) => Target::Medium(incident.point.position),
+        EmitterKind::Directional | EmitterKind::Environment => Target::Infinity(direction),
+    };
     let stack = sides.towards(crosses);
     let Some(density) = clear_edge::<_, L>(scene, stack, origin, &target, crossings) else { return };
     if let EmitterKind::Volume(body) = kind
