@@ -3,14 +3,14 @@
 use glam::{DVec3, dvec3};
 use upbp_accel::TriangleMesh;
 use upbp_scene::description::{Geometry, Material};
-use upbp_scene::obj::ObjMesh;
+use upbp_scene::obj::{ObjFile, ObjMesh};
 use upbp_scene::{ReadyScene, SceneDescription};
 
 use crate::mesh::Mesh;
 use crate::{beds, write};
 
 fn read(text: &str) -> TriangleMesh {
-    let ObjMesh { positions, indices, normals } = ObjMesh::parse(text).unwrap();
+    let ObjMesh { positions, indices, normals } = ObjFile::parse(text).unwrap().mesh();
     TriangleMesh::new(positions, indices, normals).unwrap()
 }
 

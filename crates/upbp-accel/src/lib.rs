@@ -11,8 +11,8 @@ pub use glam;
 
 #[cfg(feature = "geometry")]
 pub use geometry::{
-    AxisBox, BoxTree, Candidate, GeometryError, Quad, SceneGeometry, Shape, ShapeId, ShapeVolume, Sphere,
-    SurfacePoint, TriangleMesh, Visit,
+    AxisBox, Border, BoxTree, Candidate, Edges, GeometryError, Quad, SceneGeometry, Shape, ShapeId,
+    ShapeVolume, Sphere, SurfacePoint, TriangleMesh, Visit,
 };
 pub use lookup::{
     ClosestApproach, GrowingRadius, PARALLEL_SIN2, PointTree, SearchRadius, Segment, SegmentTree,

@@ -137,6 +137,13 @@ const BLACK: &str = "warning: the picture is black. Does a lamp face away (a qua
                      normal), a spot, or the camera? Is there an opaque shape around or before the lights or \
                      the camera? Is the medium too thick?";
 
+/// Prints what a report warns of, for those who do not see the rest of it.
+pub(crate) fn warn(report: &Report) {
+    for warning in report.warnings() {
+        complain(&format!("warning: {warning}"));
+    }
+}
+
 /// Options for the look of a PNG.
 #[derive(Debug, Args)]
 pub(crate) struct Look {

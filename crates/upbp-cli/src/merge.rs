@@ -74,7 +74,9 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     }
     Failure::all(&failures)?;
     // Last, since nobody may be reading.
-    if !options.quiet {
+    if options.quiet {
+        files::warn(&report);
+    } else {
         say(&format!("{parts}{}", report.to_string().trim_end()))?;
         if let Some(hint) = hint {
             say(&hint)?;

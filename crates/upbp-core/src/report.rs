@@ -98,6 +98,42 @@ impl Report {
             series: record.series.clone(),
         }
     }
+
+    /// What makes the picture wrong, in a sentence each; part of the text of the report.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let c = &self.counters;
+        let edges = c.camera_edges as f64 + c.light_edges as f64;
+        let mut warnings = Vec::new();
+        if c.cut_walks > 0 {
+            warnings.push(format!(
+                "light is missing: {} camera sub-paths were ended by the limit of the path length; raise max_length",
+                c.cut_walks
+            ));
+        }
+        if c.dropped > 0 {
+            warnings.push(format!(
+                "{} contributions or pixels were negative or not finite and are left out",
+                c.dropped
+            ));
+        }
+        if c.lost_walks > 0 {
+            warnings.push(format!(
+                "{} walks were lost: they left the scene inside of a body (is a mesh not closed?)",
+                c.lost_walks
+            ));
+        }
+        // Scenes in order have up to a few in 10⁶: rays that only just touch, or meet edges where surfaces
+        // cut each other.
+        if c.boundary_conflicts as f64 > 1e-5 * edges {
+            warnings.push(format!(
+                "{} boundaries on {edges:.1e} edges contradict the bodies around them and were ignored: do bodies \
+                 almost touch, or does a mesh overlap itself?",
+                c.boundary_conflicts
+            ));
+        }
+        warnings
+    }
 }
 
 impl fmt::Display for Report {
@@ -150,37 +186,8 @@ impl fmt::Display for Report {
             }
             None => writeln!(f, "estimated relMSE: unknown before there is an even and an odd iteration")?,
         }
-        if c.cut_walks > 0 {
-            writeln!(
-                f,
-                "light is missing: {} camera sub-paths were ended by the limit of the path length; raise max_length",
-                c.cut_walks
-            )?;
-        }
-        if c.dropped > 0 {
-            writeln!(
-                f,
-                "{} contributions or pixels were negative or not finite and are left out",
-                c.dropped
-            )?;
-        }
-        if c.lost_walks > 0 {
-            let count = c.lost_walks;
-            writeln!(
-                f,
-                "{count} walks were lost: they left the scene inside of a body (is a mesh not closed?)"
-            )?;
-        }
-        let edges = c.camera_edges as f64 + c.light_edges as f64;
-        // Scenes in order have up to a few in 10⁶: rays that only just touch, or meet edges where surfaces
-        // cut each other.
-        if c.boundary_conflicts as f64 > 1e-5 * edges {
-            writeln!(
-                f,
-                "{} boundaries on {edges:.1e} edges contradict the bodies around them and were ignored: do bodies \
-                 almost touch, or does a mesh overlap itself?",
-                c.boundary_conflicts
-            )?;
+        for warning in self.warnings() {
+            writeln!(f, "{warning}")?;
         }
         if let Some(last) = self.series.points().last() {
             let ErrorPoint { relative_mse, over_scales, rmse, .. } = last;

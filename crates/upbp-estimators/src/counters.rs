@@ -20,8 +20,8 @@ pub struct Counters {
     pub photon_beams: u64,
     /// Contributions of each technique, in the order of [`Technique::ALL`].
     pub contributions: [u64; 9],
-    /// Contributions, and values of an iteration's pixels, that were not finite or negative, and were
-    /// dropped.
+    /// Contributions, throughputs of light sub-paths, and values of an iteration's pixels, that were not
+    /// finite or negative, and were dropped.
     pub dropped: u64,
     /// Camera sub-paths that were ended by the limit of the path length at a vertex that scatters.
     pub cut_walks: u64,
@@ -74,6 +74,15 @@ impl Counters {
             self.dropped += 1;
             None
         }
+    }
+
+    /// Whether the throughput of a light sub-path is out of range, which is counted as dropped: what it would
+    /// have contributed is missing.
+    #[inline]
+    pub(crate) fn overflows(&mut self, throughput: Spectrum) -> bool {
+        let overflows = !throughput.is_finite();
+        self.dropped += u64::from(overflows);
+        overflows
     }
 }
 

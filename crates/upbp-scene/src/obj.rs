@@ -1,11 +1,12 @@
 //! Triangle meshes from Wavefront OBJ files.
 //!
-//! Read are vertices (`v`), normals (`vn`) and faces (`f`); polygons become triangles. Texture
-//! coordinates, groups, materials, lines and points are skipped; anything else, such as a free-form surface,
-//! is an error.
+//! Read are vertices (`v`), normals (`vn`) and faces (`f`), with the names of objects (`o`), groups (`g`) and
+//! materials (`usemtl`) that they belong to; polygons become triangles. Texture coordinates, lines and points
+//! are skipped; anything else, such as a free-form surface, is an error.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, Read as _};
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -20,6 +21,33 @@ pub struct ObjMesh {
     pub indices: Vec<[u32; 3]>,
     /// One per corner, if any has one: the others have that of the plane of their triangle.
     pub normals: Option<Vec<Vec3>>,
+}
+
+/// An OBJ file: one mesh, or several by the names of their objects, groups or materials.
+#[derive(Clone, Debug, Default)]
+pub struct ObjFile {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    triangles: Vec<[Corner; 3]>,
+    /// In the order of their triangles; what is before the first has no name.
+    sections: Vec<Section>,
+    /// The number of each name.
+    names: BTreeMap<String, u32>,
+}
+
+/// Triangles one after the other that have the same names.
+#[derive(Clone, Debug, Default)]
+struct Section {
+    first: usize,
+    object: Option<u32>,
+    groups: Arc<[u32]>,
+    material: Option<u32>,
+}
+
+impl Section {
+    fn names(&self) -> impl Iterator<Item = u32> {
+        self.groups.iter().copied().chain(self.object).chain(self.material)
+    }
 }
 
 /// The first error of an OBJ file.
@@ -45,14 +73,11 @@ const MAX_LINE: u64 = 1 << 20;
 const MAX_TRIANGLES: usize = if cfg!(test) { 1 << 12 } else { 1 << 25 };
 
 /// Statements that do not change the surface, which are skipped.
-const SKIPPED: [&str; 20] = [
+const SKIPPED: [&str; 17] = [
     "vt",
     "vp",
-    "g",
-    "o",
     "s",
     "mg",
-    "usemtl",
     "mtllib",
     "usemap",
     "maplib",
@@ -68,7 +93,7 @@ const SKIPPED: [&str; 20] = [
     "stech",
 ];
 
-impl ObjMesh {
+impl ObjFile {
     /// Reads the text of an OBJ file.
     pub fn parse(text: &str) -> Result<Self, ObjError> {
         Self::read(text.as_bytes())
@@ -80,7 +105,7 @@ impl ObjMesh {
     ///
     /// The first line that cannot be read or is no statement, or the last one of a file without faces.
     pub fn read(mut file: impl BufRead) -> Result<Self, ObjError> {
-        let mut parser = Parser::default();
+        let mut parsed = Self::default();
         let mut bytes = Vec::new();
         let mut line = 0;
         loop {
@@ -94,28 +119,56 @@ impl ObjMesh {
             if bytes.len() as u64 > MAX_LINE {
                 return Err(fail(line, format!("is longer than {MAX_LINE} bytes")));
             }
-            // Names and comments in other encodings do not matter.
+            // Comments in other encodings do not matter.
             let text = String::from_utf8_lossy(&bytes);
             let marked = if line == 1 { text.strip_prefix('\u{feff}') } else { None };
-            parser.line(marked.unwrap_or(&text)).map_err(|message| fail(line, message))?;
+            parsed.line(marked.unwrap_or(&text)).map_err(|message| fail(line, message))?;
         }
-        if parser.triangles.is_empty() {
+        if parsed.triangles.is_empty() {
             return Err(ObjError { line: line.max(1), message: "the file ends without a face (`f`)".into() });
         }
-        Ok(parser.finish())
+        Ok(parsed)
     }
-}
 
-#[derive(Default)]
-struct Parser {
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    triangles: Vec<[Corner; 3]>,
-}
+    /// Names of objects, groups and materials that have triangles.
+    pub fn parts(&self) -> impl Iterator<Item = &str> {
+        let used: BTreeSet<u32> = self.named_ranges().flat_map(|(section, _)| section.names()).collect();
+        self.names.iter().filter(move |(_, number)| used.contains(number)).map(|(name, _)| name.as_str())
+    }
 
-impl Parser {
+    /// The number of materials that have triangles.
+    #[must_use]
+    pub fn material_count(&self) -> usize {
+        self.named_ranges().filter_map(|(section, _)| section.material).collect::<BTreeSet<_>>().len()
+    }
+
+    /// The mesh of all triangles.
+    #[must_use]
+    pub fn mesh(&self) -> ObjMesh {
+        self.mesh_of(self.triangles.iter())
+    }
+
+    /// The mesh of the triangles whose object, material or one of whose groups has this name; `None` if there
+    /// are none.
+    #[must_use]
+    pub fn part(&self, name: &str) -> Option<ObjMesh> {
+        let number = *self.names.get(name)?;
+        let named = self.named_ranges().filter(|(section, _)| section.names().any(|name| name == number));
+        let mut triangles = named.flat_map(|(_, range)| &self.triangles[range]).peekable();
+        triangles.peek()?;
+        Some(self.mesh_of(triangles).without_unused())
+    }
+
+    /// Sections with the numbers of their triangles.
+    fn named_ranges(&self) -> impl Iterator<Item = (&Section, std::ops::Range<usize>)> {
+        let ends = self.sections.iter().skip(1).map(|next| next.first).chain([self.triangles.len()]);
+        let ranges = self.sections.iter().zip(ends).map(|(section, end)| (section, section.first..end));
+        ranges.filter(|(_, range)| !range.is_empty())
+    }
+
     fn line(&mut self, line: &str) -> Result<(), String> {
-        let mut words = line.split('#').next().unwrap_or("").split_whitespace();
+        let statement = line.split('#').next().unwrap_or("").trim();
+        let mut words = statement.split_whitespace();
         match words.next() {
             Some("v") => self.positions.push(vector(words)?),
             Some("vn") => self.normals.push(vector(words)?),
@@ -136,6 +189,10 @@ impl Parser {
                 let triangles = polygon::triangles(&places)?;
                 self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|place| corners[place])));
             }
+            // The name of an object or of a material may hold spaces; that of a group may not.
+            Some("o") => self.section().object = self.number(statement[1..].trim()),
+            Some("usemtl") => self.section().material = self.number(statement["usemtl".len()..].trim()),
+            Some("g") => self.section().groups = words.filter_map(|name| self.number(name)).collect(),
             Some(word) if !SKIPPED.contains(&word) => {
                 return Err(format!(
                     "expected a statement about polygons, such as `v` or `f`, found `{}`",
@@ -145,6 +202,27 @@ impl Parser {
             _ => {}
         }
         Ok(())
+    }
+
+    /// The section of the next triangles.
+    fn section(&mut self) -> &mut Section {
+        let first = self.triangles.len();
+        let last = self.sections.last().cloned().unwrap_or_default();
+        // Names without a triangle are forgotten.
+        if self.sections.last().is_none_or(|section| section.first < first) {
+            self.sections.push(Section { first, ..last });
+        }
+        self.sections.last_mut().expect("there is one")
+    }
+
+    /// The number of a name; `None` of none.
+    fn number(&mut self, name: &str) -> Option<u32> {
+        if let Some(number) = self.names.get(name) {
+            return Some(*number);
+        }
+        let number = u32::try_from(self.names.len()).ok().filter(|_| !name.is_empty())?;
+        self.names.insert(name.to_owned(), number);
+        Some(number)
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, from 1, negative from the end.
@@ -159,17 +237,18 @@ impl Parser {
         Ok((position, normal))
     }
 
-    fn finish(self) -> ObjMesh {
-        let Self { positions, normals, triangles } = self;
-        if triangles.iter().flatten().all(|corner| corner.1 == NONE) {
+    fn mesh_of<'a>(&self, triangles: impl Iterator<Item = &'a [Corner; 3]>) -> ObjMesh {
+        let Self { positions, normals, .. } = self;
+        let triangles: Vec<_> = triangles.collect();
+        if triangles.iter().copied().flatten().all(|corner| corner.1 == NONE) {
             let indices = triangles.iter().map(|triangle| triangle.map(|corner| corner.0)).collect();
-            return ObjMesh { positions, indices, normals: None };
+            return ObjMesh { positions: positions.clone(), indices, normals: None };
         }
         // A mesh has one normal per corner: corners that share a position but not a normal are told apart.
         let mut numbers = BTreeMap::new();
         let mut mesh = ObjMesh::default();
         let mut smooth = Vec::new();
-        for triangle in &triangles {
+        for triangle in triangles {
             let [a, b, c] = triangle.map(|(position, _)| positions[position as usize].as_dvec3());
             let flat = (b - a).cross(c - a).normalize_or_zero().as_vec3();
             mesh.indices.push(triangle.map(|corner @ (position, normal)| {
@@ -185,6 +264,27 @@ impl Parser {
             }));
         }
         ObjMesh { normals: Some(smooth), ..mesh }
+    }
+}
+
+impl ObjMesh {
+    /// The mesh without corners that no triangle has.
+    fn without_unused(mut self) -> Self {
+        if self.normals.is_some() {
+            // Made for its triangles alone.
+            return self;
+        }
+        let mut numbers = vec![NONE; self.positions.len()];
+        let mut positions = Vec::new();
+        for corner in self.indices.iter_mut().flatten() {
+            let number = &mut numbers[*corner as usize];
+            if *number == NONE {
+                *number = positions.len() as u32;
+                positions.push(self.positions[*corner as usize]);
+            }
+            *corner = *number;
+        }
+        Self { positions, ..self }
     }
 }
 
@@ -221,10 +321,13 @@ fn index(word: &str, count: usize, what: &str) -> Result<u32, String> {
 mod tests {
     use super::*;
 
+    fn whole(text: &str) -> ObjMesh {
+        ObjFile::parse(text).unwrap().mesh()
+    }
+
     #[test]
     fn polygons_become_fans() {
-        let mesh =
-            ObjMesh::parse("# a square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0 # last\nf 1 2 3 4\n").unwrap();
+        let mesh = whole("# a square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0 # last\nf 1 2 3 4\n");
         assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.normals, None);
     }
@@ -232,14 +335,14 @@ mod tests {
     #[test]
     fn polygons_with_reflex_corners_do_not_fold() {
         let text = "v 2 0 0\nv 2 0 -1\nv 1 0 -1\nv 1 0 -2\nv 0 0 -2\nv 0 0 0\nf 1 2 3 4 5 6\n";
-        let ObjMesh { positions, indices, normals } = ObjMesh::parse(text).unwrap();
+        let ObjMesh { positions, indices, normals } = whole(text);
         let mesh = upbp_accel::TriangleMesh::new(positions, indices, normals).unwrap();
         assert_eq!((mesh.triangle_count(), mesh.area()), (4, 3.0));
     }
 
     #[test]
     fn negative_numbers_count_from_the_end() {
-        let mesh = ObjMesh::parse("v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3/1 -2/1 -1/1").unwrap();
+        let mesh = whole("v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3/1 -2/1 -1/1");
         assert_eq!(mesh.indices, [[0, 1, 2]]);
     }
 
@@ -247,7 +350,7 @@ mod tests {
     fn corners_with_several_normals_are_told_apart() {
         let text =
             "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 3//1 4//1";
-        let mesh = ObjMesh::parse(text).unwrap();
+        let mesh = whole(text);
         assert_eq!(mesh.indices, [[0, 1, 2], [3, 2, 4]]);
         assert_eq!(mesh.positions[3], mesh.positions[0]);
         assert_eq!(mesh.normals.unwrap()[3], Vec3::Y);
@@ -257,7 +360,7 @@ mod tests {
     fn corners_without_a_normal_have_that_of_their_triangle() {
         // A smooth triangle, a flat one beside it, and one with a single normal.
         let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 2\nvn 0 1 1\nf 1//1 2//1 3//1\nf 1 4 2\nf 3//1 2 1";
-        let ObjMesh { positions, indices, normals } = ObjMesh::parse(text).unwrap();
+        let ObjMesh { positions, indices, normals } = whole(text);
         let normals = normals.unwrap();
         let given = Vec3::new(0.0, 1.0, 1.0);
         let normals = indices.iter().map(|triangle| triangle.map(|corner| normals[corner as usize]));
@@ -270,9 +373,37 @@ mod tests {
     }
 
     #[test]
+    fn parts_are_chosen_by_the_names_of_objects_groups_and_materials() {
+        let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 9\nf 1 2 3\no wine glass\nusemtl clear\nf 2 3 4\n\
+                    g stem base # two\nf 3 4 5\no wine\nusemtl\nf 4 5 1\ng\nusemtl red\no empty\n";
+        let file = ObjFile::parse(text).unwrap();
+        assert_eq!(file.parts().collect::<Vec<_>>(), ["base", "clear", "stem", "wine", "wine glass"]);
+        assert_eq!((file.material_count(), file.mesh().indices.len()), (1, 4));
+        let corners = |part: &str| {
+            let ObjMesh { positions, indices, .. } = file.part(part)?;
+            let places = indices.iter().flatten().map(|corner| positions[*corner as usize]);
+            let places = places.map(|place| file.positions.iter().position(|p| *p == place).unwrap() + 1);
+            Some((positions.len(), places.collect::<Vec<_>>()))
+        };
+        assert_eq!(corners("wine glass"), Some((4, vec![2, 3, 4, 3, 4, 5])));
+        assert_eq!(corners("clear"), corners("wine glass"));
+        assert_eq!(corners("base"), Some((4, vec![3, 4, 5, 4, 5, 1])));
+        assert_eq!(corners("wine"), Some((3, vec![4, 5, 1])));
+        for none in ["red", "empty", "glass", ""] {
+            assert_eq!(corners(none), None, "{none}");
+        }
+    }
+
+    #[test]
+    fn names_without_triangles_take_no_memory() {
+        let text = "v 0 0 0\n".to_owned() + &"o a\ng b\nusemtl c\n".repeat(1000) + "f 1 1 1";
+        assert_eq!(ObjFile::parse(&text).unwrap().sections.len(), 1);
+    }
+
+    #[test]
     fn a_byte_order_mark_and_other_encodings_do_no_harm() {
         let mesh = b"\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\n# caf\xe9\r\ng caf\xe9\r\nv 1 1 0\r\nf 1 2 3";
-        let mesh = ObjMesh::read(&mesh[..]).unwrap();
+        let mesh = ObjFile::read(&mesh[..]).unwrap().mesh();
         assert_eq!(mesh.positions.len(), 3);
         assert_eq!(mesh.indices, [[0, 1, 2]]);
     }
@@ -281,7 +412,7 @@ mod tests {
     #[test]
     fn endless_files_end_at_their_first_line() {
         for byte in [0, b' ', b'#', b'f', 0xff] {
-            let error = ObjMesh::read(std::io::BufReader::new(std::io::repeat(byte))).unwrap_err();
+            let error = ObjFile::read(std::io::BufReader::new(std::io::repeat(byte))).unwrap_err();
             assert_eq!(error.to_string(), "line 1: is longer than 1048576 bytes");
         }
     }
@@ -289,13 +420,13 @@ mod tests {
     #[test]
     fn corners_that_are_repeated_do_not_take_all_memory() {
         let polygon = "v 0 0 0\nf".to_owned() + &" 1".repeat(MAX_TRIANGLES / 2);
-        assert!(ObjMesh::parse(&polygon).is_ok());
-        let error = ObjMesh::parse(&(polygon.clone() + &polygon[7..] + &polygon[7..])).unwrap_err();
+        assert!(ObjFile::parse(&polygon).is_ok());
+        let error = ObjFile::parse(&(polygon.clone() + &polygon[7..] + &polygon[7..])).unwrap_err();
         assert_eq!(error.to_string(), format!("line 4: the mesh has more than {MAX_TRIANGLES} triangles"));
         // The most that is allowed, and one more.
         let all = "v 0 0 0\nf".to_owned() + &" 1".repeat(MAX_TRIANGLES + 2);
-        assert_eq!(ObjMesh::parse(&all).unwrap().indices.len(), MAX_TRIANGLES);
-        assert!(ObjMesh::parse(&(all + " 1")).is_err());
+        assert_eq!(whole(&all).indices.len(), MAX_TRIANGLES);
+        assert!(ObjFile::parse(&(all + " 1")).is_err());
     }
 
     #[test]
@@ -338,7 +469,7 @@ mod tests {
             ),
         ];
         for (text, message) in cases {
-            assert_eq!(ObjMesh::parse(text).unwrap_err().to_string(), message);
+            assert_eq!(ObjFile::parse(text).unwrap_err().to_string(), message);
         }
     }
 }

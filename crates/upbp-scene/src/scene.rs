@@ -13,6 +13,7 @@ use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
 
 use self::place::largest_width_of_plane;
 use crate::camera::PerspectiveCamera;
+use crate::error::Problem;
 use crate::light::Light;
 use crate::material::Material;
 
@@ -53,6 +54,7 @@ pub struct ReadyScene {
     pub(crate) origin: Vec3,
     pub(crate) hash: u64,
     pub(crate) files: Vec<PathBuf>,
+    pub(crate) notes: Vec<Problem>,
 }
 
 impl ReadyScene {
@@ -82,6 +84,12 @@ impl ReadyScene {
     #[must_use]
     pub fn files(&self) -> &[PathBuf] {
         &self.files
+    }
+
+    /// What can be rendered, but may not be meant: a medium that is nowhere, a mesh whose parts overlap.
+    #[must_use]
+    pub fn notes(&self) -> &[Problem] {
+        &self.notes
     }
 
     fn record(&self, candidate: &Candidate) -> &Surface {

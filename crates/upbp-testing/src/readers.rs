@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use upbp_core::{LightPaths, Settings, State, StateError};
-use upbp_scene::obj::ObjMesh;
+use upbp_scene::obj::ObjFile;
 use upbp_scene::{ReadyScene, SceneDescription};
 
 /// Settings for a little of a render.
@@ -44,7 +44,10 @@ pub fn read_settings(text: &str) {
 
 /// Reads a mesh; one that is accepted becomes a shape.
 pub fn read_mesh(text: &str) {
-    if let Ok(mesh) = ObjMesh::parse(text) {
+    if let Ok(file) = ObjFile::parse(text) {
+        let parts: Vec<_> = file.parts().collect();
+        assert!(parts.iter().all(|part| file.part(part).is_some()), "{parts:?}");
+        let mesh = file.mesh();
         let _ = upbp_accel::TriangleMesh::new(mesh.positions, mesh.indices, mesh.normals);
     }
 }

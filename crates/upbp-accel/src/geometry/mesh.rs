@@ -8,7 +8,8 @@ use super::error::GeometryError;
 use super::hierarchy::MAX_INDEX;
 use super::model::Model;
 use super::placement::{Placement, unit};
-use super::surface::{Areas, Border, Surface, cross, normal_cone};
+use super::surface::{Areas, Surface, cross, normal_cone};
+use super::topology::{Border, Topology};
 use super::triangle::RayShear;
 use crate::ray::Ray;
 
@@ -59,8 +60,7 @@ impl TriangleMesh {
             }
         }
 
-        // Before anything is dropped: a triangle without area may still join its neighbours.
-        let border = Border::of(&positions, &indices);
+        let topology = Topology::of(&positions, &indices);
         let count = indices.len();
         let mut triangles = indices;
         let has_area =
@@ -71,7 +71,7 @@ impl TriangleMesh {
         }
         let dropped = count - triangles.len();
         let normals = normals.map(|normals| normals.into_iter().map(unit).collect());
-        Ok(Self::with_surface(Surface::new(positions, triangles, normals, border, dropped)))
+        Ok(Self::with_surface(Surface::new(positions, triangles, normals, topology, dropped)))
     }
 
     fn with_surface(surface: Surface) -> Self {
@@ -100,13 +100,13 @@ impl TriangleMesh {
     /// [placed](Self::placed).
     pub fn transformed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
         let placement = self.placement_by(to_scene)?;
-        let Surface { positions, triangles, normals, border, dropped, .. } = &*self.surface;
+        let Surface { positions, triangles, normals, topology, dropped, .. } = &*self.surface;
         let positions = positions.iter().map(|position| placement.point(*position)).collect();
         let triangles = triangles.iter().map(|triangle| placement.winding(*triangle)).collect();
         let normals = normals.as_ref();
         let normals = normals.map(|normals| normals.iter().map(|normal| placement.normal(*normal)).collect());
-        let surface = Surface::new(positions, triangles, normals, *border, *dropped);
-        if *border == Border::Nowhere {
+        let surface = Surface::new(positions, triangles, normals, topology.placed(&placement), *dropped);
+        if topology.border == Border::Nowhere {
             surface.set_signed_volume(self.surface.signed_volume() * placement.volume_ratio());
         }
         Self::with_surface(surface).checked()
@@ -270,13 +270,23 @@ impl TriangleMesh {
     /// Vertices at the same position count as one, so that seams of normals or textures do not matter.
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        self.surface.border == Border::Nowhere
+        self.border() == Border::Nowhere
     }
 
-    /// Whether the mesh would be closed if some of its triangles were wound the other way.
+    /// The edges that keep the mesh from being closed.
     #[must_use]
-    pub fn has_mixed_winding(&self) -> bool {
-        self.surface.border == Border::BetweenWindings
+    pub fn border(&self) -> Border {
+        self.surface.topology.border
+    }
+
+    /// A point of each part of the mesh, and the unit normal there: within the largest triangle of the part,
+    /// which shares no corner with the others.
+    pub fn parts(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        let in_scene = move |(point, normal): &(Vec3, Vec3)| match &self.placement {
+            Some(placement) => (placement.point(*point), placement.normal(*normal)),
+            None => (*point, *normal),
+        };
+        self.surface.topology.parts.iter().map(in_scene)
     }
 
     /// Whether `point` lies inside; `None` for a mesh that is not closed.

@@ -20,6 +20,7 @@ mod scene;
 mod shape;
 mod sphere;
 mod surface;
+mod topology;
 mod triangle;
 mod volume_sampling;
 
@@ -32,4 +33,5 @@ pub use quad::Quad;
 pub use scene::SceneGeometry;
 pub use shape::Shape;
 pub use sphere::Sphere;
+pub use topology::{Border, Edges};
 pub use volume_sampling::ShapeVolume;

@@ -73,7 +73,7 @@ mod tests {
     use glam::{Affine3A, Quat};
 
     use super::*;
-    use crate::geometry::surface::Border;
+    use crate::geometry::topology::Topology;
 
     /// A cube of `12 n²` triangles, blown up to a ball or not.
     fn cube(n: u32, is_ball: bool) -> Surface {
@@ -95,7 +95,8 @@ mod tests {
                 triangles.extend([[a, b, c], [a, c, d]]);
             }
         }
-        Surface::new(positions, triangles, None, Border::Somewhere, 0)
+        let topology = Topology::of(&positions, &triangles);
+        Surface::new(positions, triangles, None, topology, 0)
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec3, Vec3};
 
 use super::model::Model;
+use super::topology::Topology;
 
 /// Triangles in coordinates of their own.
 #[derive(Clone, Debug)]
@@ -12,7 +13,7 @@ pub(super) struct Surface {
     pub(super) positions: Vec<Vec3>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) normals: Option<Vec<Vec3>>,
-    pub(super) border: Border,
+    pub(super) topology: Topology,
     /// Triangles without area that were left out.
     pub(super) dropped: usize,
     bounds: (Vec3, Vec3),
@@ -70,14 +71,14 @@ impl Surface {
         positions: Vec<Vec3>,
         triangles: Vec<[u32; 3]>,
         normals: Option<Vec<Vec3>>,
-        border: Border,
+        topology: Topology,
         dropped: usize,
     ) -> Self {
         let mut bounds = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for corner in triangles.iter().flatten().map(|&vertex| positions[vertex as usize]) {
             bounds = (bounds.0.min(corner), bounds.1.max(corner));
         }
-        Self { positions, triangles, normals, border, dropped, bounds, measures: Measures::default() }
+        Self { positions, triangles, normals, topology, dropped, bounds, measures: Measures::default() }
     }
 
     /// The least and the greatest coordinates.
@@ -143,6 +144,7 @@ impl Surface {
     pub(super) fn translate(&mut self, by: Vec3) {
         self.positions.iter_mut().for_each(|position| *position += by);
         self.bounds = (self.bounds.0 + by, self.bounds.1 + by);
+        self.topology.translate(by);
         // The volume does not depend on how corners are rounded in their place.
         let signed_volume = std::mem::take(&mut self.measures.signed_volume);
         self.measures = Measures { signed_volume, ..Measures::default() };
@@ -162,53 +164,4 @@ pub(super) fn normal_cone<I: Iterator<Item = [Vec3; 3]>>(triangles: impl Fn() ->
 pub(super) fn cross(corners: [Vec3; 3]) -> DVec3 {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     (b - a).cross(c - a)
-}
-
-/// The edges at which a mesh ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Border {
-    /// Every edge joins exactly two triangles that are wound alike.
-    Nowhere,
-    /// Every edge joins exactly two triangles, but not all are wound alike.
-    BetweenWindings,
-    /// There are edges of one triangle, or of more than two.
-    Somewhere,
-}
-
-impl Border {
-    /// The border of these triangles; equal positions count as one.
-    pub(super) fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        // Adding zero turns −0 into +0, which is the same place.
-        let key = |vertex: u32| positions[vertex as usize].to_array().map(|x| (x + 0.0).to_bits());
-        let mut order: Vec<u32> = (0..positions.len() as u32).collect();
-        order.sort_unstable_by_key(|&vertex| key(vertex));
-        let mut place = vec![0; positions.len()];
-        for pair in order.windows(2) {
-            let step = u32::from(key(pair[0]) != key(pair[1]));
-            place[pair[1] as usize] = place[pair[0] as usize] + step;
-        }
-
-        let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * triangles.len());
-        for triangle in triangles {
-            let [a, b, c] = triangle.map(|vertex| place[vertex as usize]);
-            if a == b || b == c || c == a {
-                continue;
-            }
-            edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to)));
-        }
-        edges.sort_unstable();
-        let (pairs, rest) = edges.as_chunks::<2>();
-        // The same edge in two pairs would join four triangles.
-        let joins_two = !pairs.is_empty()
-            && rest.is_empty()
-            && pairs.iter().all(|[first, second]| (first.0, first.1) == (second.0, second.1))
-            && pairs.windows(2).all(|two| (two[0][0].0, two[0][0].1) != (two[1][0].0, two[1][0].1));
-        if !joins_two {
-            Self::Somewhere
-        } else if pairs.iter().all(|[first, second]| first.2 != second.2) {
-            Self::Nowhere
-        } else {
-            Self::BetweenWindings
-        }
-    }
 }

@@ -3,7 +3,8 @@
 use crate::support::{Random, visit_hits};
 use glam::{Affine3A, Quat, Vec3};
 use upbp_accel::{
-    AxisBox, GeometryError, Quad, Ray, SceneGeometry, Shape, Sphere, TriangleMesh, Visit, offset_origin,
+    AxisBox, Border, GeometryError, Quad, Ray, SceneGeometry, Shape, Sphere, TriangleMesh, Visit,
+    offset_origin,
 };
 
 /// Corners and triangles of a cube.
@@ -193,25 +194,59 @@ fn inside_and_outside_are_told_apart() {
 #[test]
 fn only_meshes_without_a_border_are_closed() {
     let (positions, triangles) = cube(Vec3::ZERO, Vec3::ONE);
-    let closed = |triangles: &[[u32; 3]]| {
-        TriangleMesh::new(positions.clone(), triangles.to_vec(), None).unwrap().is_closed()
+    let border = |triangles: &[[u32; 3]]| {
+        TriangleMesh::new(positions.clone(), triangles.to_vec(), None).unwrap().border()
     };
-    assert!(closed(&triangles));
-    assert!(!closed(&triangles[1..]), "a hole");
-    assert!(!closed(&[&triangles[..], &triangles[..1]].concat()), "a doubled triangle");
-    assert!(!closed(&[&triangles[..], &triangles[..]].concat()), "a doubled cube");
+    assert_eq!(border(&triangles), Border::Nowhere);
+    let Border::Open(edges) = border(&triangles[1..]) else { panic!("a hole") };
+    let corners = triangles[0].map(|vertex| positions[vertex as usize]);
+    assert!(edges.count == 3 && edges.one.iter().all(|end| corners.contains(end)), "{edges:?}");
+    let doubled = border(&[&triangles[..], &triangles[..1]].concat());
+    assert!(matches!(doubled, Border::Crowded(edges) if edges.count == 3), "a doubled triangle: {doubled:?}");
+    let doubled = border(&[&triangles[..], &triangles[..]].concat());
+    assert!(matches!(doubled, Border::Crowded(edges) if edges.count == 18), "a doubled cube: {doubled:?}");
     let mut flipped = triangles.clone();
     flipped[3].swap(0, 1);
-    assert!(!closed(&flipped), "a triangle wound the other way");
-    let mixed = |triangles: &[[u32; 3]]| {
-        TriangleMesh::new(positions.clone(), triangles.to_vec(), None).unwrap().has_mixed_winding()
-    };
-    assert!(mixed(&flipped) && !mixed(&triangles) && !mixed(&flipped[1..]));
+    let mixed = border(&flipped);
+    assert!(matches!(mixed, Border::BetweenWindings(edges) if edges.count == 3), "{mixed:?}");
+    // What is missing comes first.
+    assert!(matches!(border(&flipped[1..]), Border::Open(_)));
 
     // Own vertices for every triangle, as files with flat normals have.
     let separate = triangles.iter().flatten().map(|&vertex| positions[vertex as usize]).collect();
     let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     assert!(TriangleMesh::new(separate, indices, None).unwrap().is_closed());
+}
+
+#[test]
+fn parts_share_no_corner() {
+    let cubes =
+        [(Vec3::ZERO, Vec3::ONE), (Vec3::splat(2.0), Vec3::splat(4.0)), (Vec3::splat(9.0), Vec3::splat(9.5))];
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for (min, max) in cubes {
+        let (corners, faces) = cube(min, max);
+        let first = positions.len() as u32;
+        positions.extend(corners);
+        triangles.extend(faces.into_iter().map(|face| face.map(|vertex| first + vertex)));
+    }
+    let mesh = TriangleMesh::new(positions, triangles, None).unwrap();
+    let moved = Affine3A::from_translation(Vec3::X);
+    for (mesh, by) in [
+        (mesh.clone(), Vec3::ZERO),
+        (mesh.placed(&moved).unwrap(), Vec3::X),
+        (mesh.transformed(&moved).unwrap(), Vec3::X),
+    ] {
+        let parts: Vec<_> = mesh.parts().collect();
+        assert_eq!(parts.len(), cubes.len());
+        for (min, max) in cubes {
+            let inside = |(point, normal): &&(Vec3, Vec3)| {
+                let (behind, front) = (point - normal * 0.01, point + normal * 0.01);
+                let holds = |p: Vec3| (min + by).cmple(p).all() && p.cmple(max + by).all();
+                holds(behind) && !holds(front)
+            };
+            assert_eq!(parts.iter().filter(inside).count(), 1, "{parts:?}");
+        }
+    }
 }
 
 #[test]

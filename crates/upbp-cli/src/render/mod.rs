@@ -117,7 +117,7 @@ impl Job {
 }
 
 fn load(options: &Options) -> Result<ReadyScene, SceneError> {
-    ReadyScene::load_with(&options.scene, |description| {
+    let scene = ReadyScene::load_with(&options.scene, |description| {
         if let Some([width, height]) = options.image.size {
             description.film.width = width;
             description.film.height = height;
@@ -126,19 +126,13 @@ fn load(options: &Options) -> Result<ReadyScene, SceneError> {
         if let Some(crop) = options.image.crop {
             description.film.crop = Some(crop);
         }
-        if !options.messages.quiet {
-            for name in description.unused_media() {
-                complain(&format!(
-                    "note: medium `{name}` is nowhere: no shape has it as `interior`, nor is it `outside`"
-                ));
-            }
-            if let Some(name) = description.outside_without_absorption() {
-                complain(&format!(
-                    "note: the medium `{name}` around everything scatters without absorbing: iterations are long, and with a little `sigma_a` in each channel much shorter"
-                ));
-            }
+    })?;
+    if !options.messages.quiet {
+        for note in scene.notes() {
+            complain(&format!("note: {note}"));
         }
-    })
+    }
+    Ok(scene)
 }
 
 fn read_plan(path: &Path) -> Result<FrozenPlan, String> {
@@ -188,7 +182,9 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
         complain("warning: no picture: the light sub-paths of the first iteration were not done");
     }
     let mut said = Ok(());
-    if !options.messages.quiet {
+    if options.messages.quiet {
+        files::warn(&report);
+    } else {
         let wrote = if rendered { format!("wrote {}", images.names()) } else { String::new() };
         said =
             say(format!("{report}{wrote}").trim_end()).and_then(|()| hint.map_or(Ok(()), |hint| say(&hint)));

@@ -71,7 +71,8 @@ pub(crate) struct Limits {
     /// Stop when the estimated relMSE is below this with its whole interval, without the bias of kernels
     ///
     /// Errors are relative to the brightness of a pixel, but what is darker than about 0.1 counts less:
-    /// render a dark scene with brighter lights, or stop by time.
+    /// render a dark scene with brighter lights, or stop by time. While the estimate is in doubt, as that
+    /// of a black picture is, this does not stop the render: give `--time` too.
     #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     target_error: Option<f64>,
 }
@@ -276,7 +277,10 @@ pub(crate) fn names() -> String {
     ];
     let layers = [
         ("R, G, B", "the picture; of a --crop with its place in the whole (data and display window)"),
-        ("bpt, surf, ...", "what each technique adds to it, weighted; of all that ran"),
+        (
+            "bpt, surf, ...",
+            "what each technique that merges adds to it, weighted, and in bpt all others together; of all that ran",
+        ),
         (
             "variance",
             "variance of the mean, by the spread of the iterations; from two iterations on, the next two from an even \

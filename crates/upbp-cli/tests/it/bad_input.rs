@@ -78,6 +78,23 @@ fn a_good_scene_renders_and_writes_its_files() {
 
 /// A likely mistake is told, and rendered all the same.
 #[test]
+fn what_makes_a_picture_wrong_is_told_even_if_it_is_to_be_quiet() {
+    let folder = folder("quiet_warnings");
+    fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
+    let limited = ["scene.ron", "--iterations", "1", "--max-length", "2", "--quiet", "--state", "a.state"];
+    let merging = ["a.state", "--quiet", "--state", "b.state"];
+    for (name, arguments) in [("render", &limited[..]), ("merge", &merging)] {
+        let output = program::command(name, &folder, arguments).output().expect("the program runs");
+        let told = String::from_utf8(output.stderr).expect("UTF-8");
+        assert!(output.status.success() && output.stdout.is_empty(), "{name}: {told}");
+        assert!(
+            told.starts_with("warning: light is missing: ") && told.lines().count() == 1,
+            "{name}: {told}"
+        );
+    }
+}
+
+#[test]
 fn media_that_are_nowhere_or_never_end_are_told() {
     let folder = folder("notes_on_media");
     let check = |scene: &str, more: &[&str]| {
@@ -88,11 +105,11 @@ fn media_that_are_nowhere_or_never_end_are_told() {
         String::from_utf8(output.stderr).expect("UTF-8")
     };
     let empty = SMALL.replace("interior: \"m\",", "");
-    let note = "note: medium `m` is nowhere: no shape has it as `interior`, nor is it `outside`\n";
+    let note = "note: medium `m`: is nowhere: no shape has it as `interior`, nor is it `outside`\n";
     assert_eq!(check(&empty, &[]), note);
     assert_eq!(check(&empty, &["--quiet"]), "");
     let everywhere = empty.replace("version: 1,", "version: 1, outside: \"m\",");
-    let note = "note: the medium `m` around everything scatters without absorbing: iterations are long, and with a little `sigma_a` in each channel much shorter\n";
+    let note = "note: medium `m`: scatters around everything without absorbing: iterations are long, and with a little `sigma_a` in each channel much shorter\n";
     let endless = everywhere.replace("sigma_a: 0.1, ", "");
     assert_eq!(check(&endless, &[]), note);
     assert_eq!(check(&endless, &["--quiet"]), "");

@@ -82,7 +82,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         let in_medium = interaction.in_medium();
         let t = density.forward(in_medium).mean(&flight.mis.shares);
         let throughput = flight.throughput * density.transmittance / t as f32;
-        if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
+        if !(t > 0.0) || throughput.is_black() || out.counters.overflows(throughput) {
             return;
         }
         let from = -flight.direction;
@@ -189,7 +189,7 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let pdf_position = emission.pdf_position * probability;
     let density = pdf_position * emission.pdf_direction;
     let throughput = emission.radiance * (cos / density);
-    if !(cos >= MIN_COSINE && density > 0.0) || throughput.is_black() || !throughput.is_finite() {
+    if !(cos >= MIN_COSINE && density > 0.0) || throughput.is_black() || counters.overflows(throughput) {
         return None;
     }
     let origin = match kind {

@@ -17,6 +17,7 @@ pub(super) struct Builder<'a> {
     pub(super) description: &'a SceneDescription,
     pub(super) base_dir: &'a Path,
     pub(super) problems: Vec<Problem>,
+    pub(super) notes: Vec<Problem>,
     /// Fingerprint of the description and of the files that were read.
     pub(super) hash: Fnv1a,
     /// The files that were read.

@@ -10,6 +10,7 @@ mod camera;
 mod extent;
 mod lights;
 mod media;
+mod notes;
 mod rooms;
 mod surfaces;
 
@@ -81,6 +82,7 @@ impl ReadyScene {
             description,
             base_dir: base_dir.as_ref(),
             problems: Vec::new(),
+            notes: Vec::new(),
             hash: Fnv1a(description.hash()),
             files: Vec::new(),
             meshes: MeshFiles::of(description),
@@ -124,6 +126,8 @@ impl Builder<'_> {
         self.check_lights_are_free(&rooms, places, &lights);
         self.check_bodies_count(&rooms, places);
         self.check_lamps_are_free(&rooms, places);
+        self.note_media();
+        self.note_parts(places);
         let bodies = bodies::rank(&drafts, &geometry).map_err(|error| self.problem("shapes", error)).ok()?;
         let largest_corner = extent::largest_corner(geometry.shapes(), &drafts);
         let surfaces = self.records(places, &bodies, &mut lights);
@@ -134,6 +138,7 @@ impl Builder<'_> {
         let body_boxes = BoxTree::new(bodies.iter().map(|body| geometry.shape(body.shape).aabb()));
         let body_boxes = body_boxes.map_err(|error| self.problem("shapes", error)).ok()?;
         let (hash, files) = (self.hash.0, std::mem::take(&mut self.files));
+        let notes = std::mem::take(&mut self.notes);
         Some(ReadyScene {
             geometry,
             surfaces,
@@ -149,6 +154,7 @@ impl Builder<'_> {
             origin,
             hash,
             files,
+            notes,
         })
     }
 

@@ -1,9 +1,10 @@
 //! Shapes with their materials.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use glam::{Affine3A, DMat3, DVec3, Mat3, Vec3};
-use upbp_accel::{AxisBox, GeometryError, Quad, Shape, Sphere, TriangleMesh};
+use upbp_accel::{AxisBox, Border, GeometryError, Quad, Shape, Sphere, TriangleMesh};
 use upbp_media::{MediumId, Spectrum};
 
 use super::builder::{Builder, unknown};
@@ -11,7 +12,7 @@ use crate::description::{self, Geometry, Vector};
 use crate::material::{
     Conductor, Dielectric, Lambert, Material, MetalFresnel, Mirror, Phong, RoughDielectric, TrowbridgeReitz,
 };
-use crate::obj::ObjMesh;
+use crate::obj::{ObjFile, ObjMesh};
 
 /// The largest mesh file that is read, in bytes.
 const MAX_FILE: u64 = 1 << 30;
@@ -125,10 +126,8 @@ impl Builder<'_> {
         let geometry = geometry.ok()?;
         if !geometry.is_closed() {
             let wrong = match &geometry {
-                Shape::Mesh(mesh) if mesh.has_mixed_winding() => {
-                    "some triangles are wound the other way round than those next to them"
-                }
-                _ => "the shape is not closed",
+                Shape::Mesh(mesh) => mesh.border().to_string(),
+                _ => "the shape is not closed".into(),
             };
             self.problem(&item, format!("the material `{name}` bounds a body, but {wrong}"));
             return None;
@@ -154,11 +153,8 @@ impl Builder<'_> {
     fn check_winding_of_lamp(&mut self, item: &str, lamp: &Shape) {
         let Shape::Mesh(mesh) = lamp else { return };
         let description::Camera::Perspective { origin, .. } = &self.description.camera;
-        if mesh.has_mixed_winding() {
-            self.problem(
-                item,
-                "has an emission, but some triangles are wound the other way round than those next to them",
-            );
+        if let border @ Border::BetweenWindings(_) = mesh.border() {
+            self.problem(item, format!("has an emission, but {border}"));
         } else if mesh.is_closed() && mesh.signed_volume() < 0.0 && mesh.contains(origin.get()) != Some(true)
         {
             self.problem(
@@ -187,13 +183,14 @@ impl Builder<'_> {
                     None => AxisBox::new(min.get(), max.get()).map(Shape::from),
                 }
             }
-            Geometry::Mesh { file, positions, indices, normals, scale, rotate, translate } => {
+            Geometry::Mesh { file, part, positions, indices, normals, scale, rotate, translate } => {
                 let given_here = !(positions.is_empty() && indices.is_empty() && normals.is_empty());
                 let mesh = match file {
                     Some(_) if given_here => {
                         return Err("has a `file` as well as triangles of its own".into());
                     }
-                    Some(file) => self.obj_mesh(file)?,
+                    Some(file) => self.obj_mesh(file, part.as_deref())?,
+                    None if part.is_some() => return Err("has a `part`, but no `file`".into()),
                     None if positions.is_empty() || indices.is_empty() => {
                         return Err("needs a `file`, or `positions` and `indices`".into());
                     }
@@ -212,7 +209,7 @@ impl Builder<'_> {
                 let translate = translate.map_or(Vec3::ZERO, Vector::get);
                 let linear = rotation.unwrap_or(Mat3::IDENTITY) * scale;
                 let to_scene = Affine3A::from_mat3_translation(linear, translate);
-                let copies = file.as_deref().map_or(1, |file| self.meshes.copies(file));
+                let copies = file.as_deref().map_or(1, |file| self.meshes.copies(file, part.as_deref()));
                 let is_copy = copies > 1 && mesh.triangle_count() >= COPIED_FROM;
                 let mesh = match (is_copy, in_place) {
                     (true, _) => mesh.placed(&to_scene),
@@ -234,47 +231,79 @@ impl Builder<'_> {
         shape.map_err(|error| error.to_string())
     }
 
-    /// The mesh in a file, which is read once.
-    fn obj_mesh(&mut self, file: &str) -> Result<TriangleMesh, String> {
-        if let Some(known) = self.meshes.known.get(file) {
+    /// The mesh in a file, or a part of it; the file is read once.
+    fn obj_mesh(&mut self, file: &str, part: Option<&str>) -> Result<TriangleMesh, String> {
+        let key = (file.to_owned(), part.map(str::to_owned));
+        if let Some(known) = self.meshes.known.get(&key) {
             return known.clone();
+        }
+        let mesh = self.obj_file(file).and_then(|read| {
+            let materials = read.material_count();
+            if part.is_none() && materials > 1 {
+                let message = format!("has {materials} materials, and all of it is one shape: with `part` a shape takes the triangles of one of them");
+                self.note(format!("mesh `{file}`"), message);
+            }
+            let mesh = match part {
+                Some(part) => read.part(part).ok_or_else(|| unknown("part", part, read.parts())),
+                None => Ok(read.mesh()),
+            };
+            let describe = |error: &dyn std::fmt::Display| format!("mesh `{file}`: {error}");
+            let ObjMesh { positions, indices, normals } = mesh.map_err(|error| describe(&error))?;
+            TriangleMesh::new(positions, indices, normals).map_err(|error| describe(&error))
+        });
+        self.meshes.known.insert(key, mesh.clone());
+        mesh
+    }
+
+    /// A file, which is kept if another part of it will be asked for.
+    fn obj_file(&mut self, file: &str) -> Result<Rc<ObjFile>, String> {
+        if let Some(read) = self.meshes.files.get(file) {
+            return read.clone();
         }
         let path = self.path(file);
         let describe = |error: &dyn std::fmt::Display| format!("mesh `{}`: {error}", path.display());
-        let read = |builder: &mut Self| {
-            let bytes = builder.open(&path, MAX_FILE).map_err(|error| describe(&error))?;
-            let ObjMesh { positions, indices, normals } =
-                ObjMesh::read(bytes).map_err(|error| describe(&error))?;
-            TriangleMesh::new(positions, indices, normals).map_err(|error| describe(&error))
+        let read = match self.open(&path, MAX_FILE) {
+            Ok(bytes) => ObjFile::read(bytes).map(Rc::new).map_err(|error| describe(&error)),
+            Err(error) => Err(describe(&error)),
         };
-        let mesh = read(self);
-        self.meshes.known.insert(file.to_owned(), mesh.clone());
-        mesh
+        if self.meshes.parts_of(file) > 1 {
+            self.meshes.files.insert(file.to_owned(), read.clone());
+        }
+        read
     }
 }
 
 /// The mesh files of a scene.
 #[derive(Default)]
 pub(super) struct MeshFiles {
-    /// Meshes that were read, or why they could not be, by file.
-    known: BTreeMap<String, Result<TriangleMesh, String>>,
-    /// Shapes that refer to each.
-    uses: BTreeMap<String, usize>,
+    /// Files of which there are several parts in the scene, or why they could not be read.
+    files: BTreeMap<String, Result<Rc<ObjFile>, String>>,
+    /// Meshes, or why there are none, by file and part.
+    known: BTreeMap<FilePart, Result<TriangleMesh, String>>,
+    /// Number of shapes that refer to each.
+    uses: BTreeMap<FilePart, usize>,
 }
+
+/// A file, and the part of it if not all.
+type FilePart = (String, Option<String>);
 
 impl MeshFiles {
     pub(super) fn of(description: &description::SceneDescription) -> Self {
         let mut files = Self::default();
         for shape in &description.shapes {
-            if let Geometry::Mesh { file: Some(file), .. } = &shape.geometry {
-                *files.uses.entry(file.clone()).or_default() += 1;
+            if let Geometry::Mesh { file: Some(file), part, .. } = &shape.geometry {
+                *files.uses.entry((file.clone(), part.clone())).or_default() += 1;
             }
         }
         files
     }
 
-    fn copies(&self, file: &str) -> usize {
-        self.uses.get(file).copied().unwrap_or(1)
+    fn copies(&self, file: &str, part: Option<&str>) -> usize {
+        self.uses.get(&(file.to_owned(), part.map(str::to_owned))).copied().unwrap_or(1)
+    }
+
+    fn parts_of(&self, file: &str) -> usize {
+        self.uses.keys().filter(|(other, _)| other == file).count()
     }
 }
 

@@ -46,20 +46,4 @@ impl SceneDescription {
         let interiors = self.shapes.iter().filter_map(|shape| shape.interior.as_deref());
         interiors.chain(self.outside.as_deref()).collect()
     }
-
-    /// Names of the media that are neither inside of any shape nor around everything.
-    pub fn unused_media(&self) -> impl Iterator<Item = &str> {
-        let used = self.used_media();
-        self.media.names().filter(move |name| !used.contains(name))
-    }
-
-    /// Name of the medium around everything, if it scatters in a channel without absorbing there: light in it
-    /// never ends, so that sub-paths are long.
-    #[must_use]
-    pub fn outside_without_absorption(&self) -> Option<&str> {
-        let name = self.outside.as_deref()?;
-        let Medium::Homogeneous { sigma_a, sigma_s, .. } = self.media.get(name)?;
-        let (sigma_a, sigma_s) = (sigma_a.get(), sigma_s.get());
-        (0..3).any(|channel| sigma_s[channel] > 0.0 && sigma_a[channel] == 0.0).then_some(name)
-    }
 }

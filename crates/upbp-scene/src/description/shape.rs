@@ -63,6 +63,9 @@ pub enum Geometry {
         /// Path of a Wavefront OBJ file, relative to the scene file.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
+        /// Of the file those triangles only that belong to an object, a group or a material of this name.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        part: Option<String>,
         /// Corners.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         positions: Vec<Vector>,

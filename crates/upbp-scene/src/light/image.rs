@@ -132,7 +132,7 @@ impl EnvironmentImage {
         Ok(Self { width, height, pixels, rows, columns, total_luminance, total_mean })
     }
 
-    /// Reads an `OpenEXR` file: the first layer with channels R, G and B.
+    /// Reads an `OpenEXR` file: the first layer with channels R, G and B. Values below zero count as zero.
     pub fn load(path: &Path) -> Result<Self, EnvironmentImageError> {
         use exr::prelude::{ReadChannels, ReadLayers, read};
         struct Pixels {
@@ -154,7 +154,9 @@ impl EnvironmentImage {
                 },
                 |pixels: &mut Pixels, at, (r, g, b): (f32, f32, f32)| {
                     if let Some(value) = pixels.values.get_mut(at.y() * pixels.width + at.x()) {
-                        *value = Spectrum::new(r, g, b);
+                        // What resampling and conversions of colours leave below zero is none.
+                        let light = |v: f32| if v < 0.0 && v.is_finite() { 0.0 } else { v };
+                        *value = Spectrum::new(light(r), light(g), light(b));
                     }
                 },
             )

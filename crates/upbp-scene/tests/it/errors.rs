@@ -277,7 +277,7 @@ fn a_lamp_wound_inside_out_is_refused_unless_the_camera_is_inside() {
     );
     assert_eq!(
         lamp("(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 3, 2)", 0.1),
-        "shape `lamp`: has an emission, but some triangles are wound the other way round than those next to them"
+        "shape `lamp`: has an emission, but some triangles are wound the other way round than those next to them, at 3 edges, one of them from [3, -1, -1] to [-1, 3, -1]"
     );
     let text = format!(
         r#"(version: 1, {CAMERA} {MATERIALS} shapes: [(material: "white", emission: 1, geometry: Mesh(
@@ -371,7 +371,12 @@ fn problems_of_meshes_name_the_triangle() {
         (
             "CORNERS, indices: [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 3, 2)]",
             "glass",
-            "the material `glass` bounds a body, but some triangles are wound the other way round than those next to them",
+            "the material `glass` bounds a body, but some triangles are wound the other way round than those next to them, at 3 edges, one of them from [1, 0, 0] to [0, 1, 0]",
+        ),
+        (
+            "CORNERS, indices: [(0, 2, 1), (0, 1, 3), (0, 3, 2)]",
+            "glass",
+            "the material `glass` bounds a body, but the mesh is not closed: only one triangle is at 3 edges, one of them from [1, 0, 0] to [0, 1, 0]",
         ),
     ];
     for (mesh, material, expected) in cases {

@@ -2,6 +2,7 @@
 
 mod checkers;
 mod errors;
+mod mesh_files;
 mod placement;
 mod rooms;
 mod shipped_scenes;

@@ -1,0 +1,74 @@
+//! Notes: what is no problem, but may not be meant.
+
+use std::collections::BTreeSet;
+
+use glam::Vec3;
+use upbp_accel::{Shape, ShapeId, offset_origin};
+
+use super::builder::Builder;
+use super::rooms::Places;
+use crate::description::{Geometry, Medium};
+use crate::error::Problem;
+
+impl Builder<'_> {
+    /// Notes something about a part of the scene.
+    pub(super) fn note(&mut self, item: impl Into<String>, message: impl Into<String>) {
+        self.notes.push(Problem { item: item.into(), message: message.into() });
+    }
+
+    /// Notes media that nothing is filled with, and one around everything in which light never ends.
+    pub(super) fn note_media(&mut self) {
+        let (media, used) = (&self.description.media, self.description.used_media());
+        for name in media.names().filter(|name| !used.contains(name)) {
+            self.note(
+                format!("medium `{name}`"),
+                "is nowhere: no shape has it as `interior`, nor is it `outside`",
+            );
+        }
+        let outside = self.description.outside.as_deref();
+        if let Some((name, Medium::Homogeneous { sigma_a, sigma_s, .. })) =
+            outside.and_then(|name| Some((name, media.get(name)?)))
+            && (0..3).any(|channel| sigma_s.get()[channel] > 0.0 && sigma_a.get()[channel] == 0.0)
+        {
+            self.note(
+                format!("medium `{name}`"),
+                "scatters around everything without absorbing: iterations are long, and with a little `sigma_a` \
+                 in each channel much shorter",
+            );
+        }
+    }
+
+    /// Notes bodies of several parts of which one has its inside in front of it: nothing that is met there
+    /// agrees with what is inside of what.
+    pub(super) fn note_parts(&mut self, places: Places<'_>) {
+        let mut known = BTreeSet::new();
+        for (index, draft) in places.drafts.iter().enumerate() {
+            let Shape::Mesh(mesh) = places.shape(index) else { continue };
+            // Of copies one is enough.
+            let is_copy = match &self.description.shapes[index].geometry {
+                Geometry::Mesh { file: Some(file), part, .. } => !known.insert((file, part)),
+                _ => false,
+            };
+            if is_copy || draft.boundary.inside().is_none() || mesh.parts().count() < 2 {
+                continue;
+            }
+            let is_in = |point| places.geometry.contains(ShapeId(index as u32), point) == Some(true);
+            let is_wrong = |&(point, normal): &(Vec3, Vec3)| {
+                let [front, behind] = [normal, -normal].map(|side| offset_origin(point, normal, side));
+                is_in(front) || !is_in(behind)
+            };
+            let mut wrong = mesh.parts().filter(is_wrong);
+            if let Some((point, _)) = wrong.next() {
+                let (count, all) = (1 + wrong.count(), mesh.parts().count());
+                self.note(
+                    self.shape_item(index),
+                    format!(
+                        "of its {all} parts {count} are wound the wrong way round or overlap another part, one of \
+                         them at {point}: give each body a shape of its own, and let normals point out of it, \
+                         into the hollows of it too"
+                    ),
+                );
+            }
+        }
+    }
+}
