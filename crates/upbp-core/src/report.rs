@@ -113,7 +113,7 @@ impl Report {
         }
         if c.dropped > 0 {
             warnings.push(format!(
-                "{} contributions or pixels were negative or not finite and are left out",
+                "{} contributions, light sub-paths or pixels were negative or not finite and are left out",
                 c.dropped
             ));
         }

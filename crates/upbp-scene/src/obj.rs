@@ -72,6 +72,9 @@ const MAX_LINE: u64 = 1 << 20;
 /// The most triangles of a mesh: a corner of a polygon takes two bytes of a file and twenty-four of memory.
 const MAX_TRIANGLES: usize = if cfg!(test) { 1 << 12 } else { 1 << 25 };
 
+/// The most names of objects, groups and materials.
+const MAX_NAMES: usize = if cfg!(test) { 1 << 8 } else { 1 << 20 };
+
 /// Statements that do not change the surface, which are skipped.
 const SKIPPED: [&str; 17] = [
     "vt",
@@ -154,21 +157,21 @@ impl ObjFile {
     pub fn part(&self, name: &str) -> Option<ObjMesh> {
         let number = *self.names.get(name)?;
         let named = self.named_ranges().filter(|(section, _)| section.names().any(|name| name == number));
-        let mut triangles = named.flat_map(|(_, range)| &self.triangles[range]).peekable();
-        triangles.peek()?;
-        Some(self.mesh_of(triangles).without_unused())
+        let triangles = named.flat_map(|(_, range)| &self.triangles[range]);
+        triangles.clone().next()?;
+        Some(self.mesh_of(triangles))
     }
 
     /// Sections with the numbers of their triangles.
-    fn named_ranges(&self) -> impl Iterator<Item = (&Section, std::ops::Range<usize>)> {
+    fn named_ranges(&self) -> impl Iterator<Item = (&Section, std::ops::Range<usize>)> + Clone {
         let ends = self.sections.iter().skip(1).map(|next| next.first).chain([self.triangles.len()]);
         let ranges = self.sections.iter().zip(ends).map(|(section, end)| (section, section.first..end));
         ranges.filter(|(_, range)| !range.is_empty())
     }
 
     fn line(&mut self, line: &str) -> Result<(), String> {
-        let statement = line.split('#').next().unwrap_or("").trim();
-        let mut words = statement.split_whitespace();
+        let line = line.trim();
+        let mut words = line.split('#').next().unwrap_or("").split_whitespace();
         match words.next() {
             Some("v") => self.positions.push(vector(words)?),
             Some("vn") => self.normals.push(vector(words)?),
@@ -189,10 +192,7 @@ impl ObjFile {
                 let triangles = polygon::triangles(&places)?;
                 self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|place| corners[place])));
             }
-            // The name of an object or of a material may hold spaces; that of a group may not.
-            Some("o") => self.section().object = self.number(statement[1..].trim()),
-            Some("usemtl") => self.section().material = self.number(statement["usemtl".len()..].trim()),
-            Some("g") => self.section().groups = words.filter_map(|name| self.number(name)).collect(),
+            Some(kind @ ("o" | "g" | "usemtl")) => self.begin(kind, &line[kind.len()..])?,
             Some(word) if !SKIPPED.contains(&word) => {
                 return Err(format!(
                     "expected a statement about polygons, such as `v` or `f`, found `{}`",
@@ -201,6 +201,21 @@ impl ObjFile {
             }
             _ => {}
         }
+        Ok(())
+    }
+
+    /// Begins triangles under another name.
+    fn begin(&mut self, kind: &str, name: &str) -> Result<(), String> {
+        // Within a name no comment begins.
+        let name = name.split(" #").next().unwrap_or("").trim();
+        if kind == "g" {
+            self.section().groups =
+                name.split_whitespace().map(|name| self.number(name)).collect::<Result<_, _>>()?;
+            return Ok(());
+        }
+        let number = if name.is_empty() { None } else { Some(self.number(name)?) };
+        let section = self.section();
+        *(if kind == "o" { &mut section.object } else { &mut section.material }) = number;
         Ok(())
     }
 
@@ -215,14 +230,16 @@ impl ObjFile {
         self.sections.last_mut().expect("there is one")
     }
 
-    /// The number of a name; `None` of none.
-    fn number(&mut self, name: &str) -> Option<u32> {
+    fn number(&mut self, name: &str) -> Result<u32, String> {
         if let Some(number) = self.names.get(name) {
-            return Some(*number);
+            return Ok(*number);
         }
-        let number = u32::try_from(self.names.len()).ok().filter(|_| !name.is_empty())?;
-        self.names.insert(name.to_owned(), number);
-        Some(number)
+        let number = self.names.len();
+        if number == MAX_NAMES {
+            return Err(format!("the mesh has more than {MAX_NAMES} names of objects, groups and materials"));
+        }
+        self.names.insert(name.to_owned(), number as u32);
+        Ok(number as u32)
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, from 1, negative from the end.
@@ -237,16 +254,28 @@ impl ObjFile {
         Ok((position, normal))
     }
 
-    fn mesh_of<'a>(&self, triangles: impl Iterator<Item = &'a [Corner; 3]>) -> ObjMesh {
+    fn mesh_of<'a>(&self, triangles: impl Iterator<Item = &'a [Corner; 3]> + Clone) -> ObjMesh {
         let Self { positions, normals, .. } = self;
-        let triangles: Vec<_> = triangles.collect();
-        if triangles.iter().copied().flatten().all(|corner| corner.1 == NONE) {
-            let indices = triangles.iter().map(|triangle| triangle.map(|corner| corner.0)).collect();
-            return ObjMesh { positions: positions.clone(), indices, normals: None };
+        let corners = || triangles.clone().flatten();
+        let mut mesh = ObjMesh::default();
+        if corners().all(|corner| corner.1 == NONE) {
+            // In their order, without those that are not used.
+            let first = corners().map(|corner| corner.0).min().unwrap_or(0);
+            let last = corners().map(|corner| corner.0).max().unwrap_or(0);
+            let mut numbers = vec![NONE; (last - first) as usize + 1];
+            corners().for_each(|corner| numbers[(corner.0 - first) as usize] = 0);
+            for (number, position) in numbers.iter_mut().zip(&positions[first as usize..]) {
+                if *number != NONE {
+                    *number = mesh.positions.len() as u32;
+                    mesh.positions.push(*position);
+                }
+            }
+            let number = |corner: Corner| numbers[(corner.0 - first) as usize];
+            mesh.indices = triangles.map(|triangle| triangle.map(number)).collect();
+            return mesh;
         }
         // A mesh has one normal per corner: corners that share a position but not a normal are told apart.
         let mut numbers = BTreeMap::new();
-        let mut mesh = ObjMesh::default();
         let mut smooth = Vec::new();
         for triangle in triangles {
             let [a, b, c] = triangle.map(|(position, _)| positions[position as usize].as_dvec3());
@@ -264,27 +293,6 @@ impl ObjFile {
             }));
         }
         ObjMesh { normals: Some(smooth), ..mesh }
-    }
-}
-
-impl ObjMesh {
-    /// The mesh without corners that no triangle has.
-    fn without_unused(mut self) -> Self {
-        if self.normals.is_some() {
-            // Made for its triangles alone.
-            return self;
-        }
-        let mut numbers = vec![NONE; self.positions.len()];
-        let mut positions = Vec::new();
-        for corner in self.indices.iter_mut().flatten() {
-            let number = &mut numbers[*corner as usize];
-            if *number == NONE {
-                *number = positions.len() as u32;
-                positions.push(self.positions[*corner as usize]);
-            }
-            *corner = *number;
-        }
-        Self { positions, ..self }
     }
 }
 
@@ -392,12 +400,22 @@ mod tests {
         for none in ["red", "empty", "glass", ""] {
             assert_eq!(corners(none), None, "{none}");
         }
+        let text = "v 0 0 0\nusemtl Mat#1 # one\nf 1 1 1\nusemtl Mat#2\t\nf 1 1 1\ng #\nf 1 1 1";
+        assert_eq!(ObjFile::parse(text).unwrap().parts().collect::<Vec<_>>(), ["Mat#1", "Mat#2"]);
     }
 
     #[test]
-    fn names_without_triangles_take_no_memory() {
+    fn names_do_not_take_all_memory() {
         let text = "v 0 0 0\n".to_owned() + &"o a\ng b\nusemtl c\n".repeat(1000) + "f 1 1 1";
         assert_eq!(ObjFile::parse(&text).unwrap().sections.len(), 1);
+        let names = |count: usize| "g".to_owned() + &(0..count).map(|i| format!(" {i}")).collect::<String>();
+        let with = |count| ObjFile::parse(&("v 0 0 0\nf 1 1 1\n".to_owned() + &names(count)));
+        assert!(with(MAX_NAMES).is_ok());
+        let error = with(MAX_NAMES + 1).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            format!("line 3: the mesh has more than {MAX_NAMES} names of objects, groups and materials")
+        );
     }
 
     #[test]

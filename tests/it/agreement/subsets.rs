@@ -22,7 +22,7 @@ use upbp_testing::closed_form::scene::ClosedForm;
 
 pub(crate) const SIZE: u32 = 48;
 
-const ITERATIONS: u64 = 42;
+const ITERATIONS: u64 = 30;
 
 fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoices {
     let radius = 0.02;
@@ -92,14 +92,14 @@ fn iteration_in<S: Scene, L: Lanes>(scene: &S, choices: &IterationChoices) -> f6
 
 /// Mean and standard error over the iterations.
 fn mean<S: Scene>(scene: &S, choices: &IterationChoices) -> (f64, f64) {
-    mean_of_blocks(scene, choices, 1)
+    mean_of_blocks(scene, choices, ITERATIONS, 1)
 }
 
-/// Mean and standard error over blocks of `block` iterations.
-fn mean_of_blocks<S: Scene>(scene: &S, choices: &IterationChoices, block: u64) -> (f64, f64) {
+/// Mean and standard error over so many blocks of `block` iterations.
+fn mean_of_blocks<S: Scene>(scene: &S, choices: &IterationChoices, count: u64, block: u64) -> (f64, f64) {
     let one = |i| iteration(scene, &IterationChoices { iteration: i, ..choices.clone() });
     let mean_of = |first: u64| (first..first + block).map(one).sum::<f64>() / block as f64;
-    let values: Vec<f64> = (0..ITERATIONS / block).map(|i| mean_of(block * i)).collect();
+    let values: Vec<f64> = (0..count).map(|i| mean_of(block * i)).collect();
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -247,7 +247,7 @@ fn periods_and_other_counts() {
     };
     let (expected, expected_error) = mean(&scene, &usual);
     // Of periods of one, two and three, each of which has one turn.
-    let (found, error) = mean_of_blocks(&scene, &other, 6);
+    let (found, error) = mean_of_blocks(&scene, &other, 7, 6);
     let sigma = error.hypot(expected_error);
     println!("{found:.5} ± {error:.5}, expected {expected:.5} ± {expected_error:.5}");
     assert!((found - expected).abs() < 4.0 * sigma, "{found}, expected {expected} ± {sigma}");

@@ -21,7 +21,10 @@ fn render(fault: Fault, techniques: &str) -> Result<Counters, String> {
         ..Settings::default()
     };
     let settings = settings.validate().expect("valid settings");
-    let mut renderer = Renderer::new(&scene, settings).map_err(|error| error.to_string())?;
+    // Long enough for `auto` to look at some candidates.
+    let stop = Stop { iterations: Some(200), ..Stop::default() };
+    let start = Start { stop, ..Start::default() };
+    let mut renderer = Renderer::start(&scene, settings, start).map_err(|error| error.to_string())?;
     for _ in 0..2 {
         renderer.iterate();
     }

@@ -71,7 +71,7 @@ fn white_furnace() {
         for techniques in ["hit", "pt", "bpt", "bpt+surf+pp3d+pb2d+bb1d", "hit+surf+pb2d"] {
             let settings = settings(techniques, None);
             let merges = techniques.contains("surf");
-            let (result, _) = render(&scene, &settings, 40);
+            let (result, _) = render(&scene, &settings, 24);
             let slack = if merges { BOUNDARY_LOSS } else { 0.0 };
             table.check(&format!("{} {techniques}", case.id), result, 1.0, slack);
         }
@@ -139,7 +139,7 @@ fn chromatic_white_furnace() {
             let scene = scene(&chromatic(ratio, body));
             for techniques in ["pt", "bpt"] {
                 let settings = settings(techniques, None);
-                for (channel, found) in render_channels(&scene, &settings, 160).iter().enumerate() {
+                for (channel, found) in render_channels(&scene, &settings, 100).iter().enumerate() {
                     let sigmas = (found.mean - 1.0) / found.error;
                     let case = format!("{body}, ratio {ratio}, {techniques}, channel {channel}");
                     println!("{case}: {:.5} ± {:.5}, {sigmas:+.2}", found.mean, found.error);

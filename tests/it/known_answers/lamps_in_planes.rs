@@ -43,12 +43,16 @@ fn what_a_lamp_or_a_camera_lies_in_does_not_hide_it() {
         "Mesh(positions: [(0.6, 2.9, -0.3), (0.6, 2.9, 0.1), (0.9, 2.9, 0.1), (0.9, 2.9, -0.3)], \
          indices: [(0, 1, 2), (0, 2, 3)])",
     );
+    let sloped = black("Quad(origin: (0.5, 2.9, -2), edge_u: (3, 0.7, 0), edge_v: (0, 0, 4))");
+    let [before, behind] = ["2.9466665", "2.946667"].map(|height| point.replace("2.9", height));
     let on_the_floor = format!("{floor}, {ceiling}");
     let mut table = Table::default();
     for (name, view, shapes, light, height) in [
         ("a lamp in a quad", above, &quad, &point, 2.9),
         ("a spot under its housing", above, &housing, &spot, 2.9),
         ("a lamp in a mesh", above, &mesh, &point, 2.9),
+        ("a lamp in a sloped quad, a rounding before it", above, &sloped, &before, 2.9466667),
+        ("a lamp in a sloped quad, a rounding behind it", above, &sloped, &behind, 2.9466667),
         ("a camera on the floor", below, &on_the_floor, &point.replace("2.9", "1"), 2.0),
     ] {
         let scene = scene(&format!(

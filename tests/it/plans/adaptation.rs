@@ -102,7 +102,7 @@ fn surface_photons_blur_what_a_pixel_blurs() {
 /// of the scenes, whoever chose them, and this is about what choosing does.
 fn unbiased(name: &str, folder: &str) {
     const SEEDS: u64 = 20;
-    const ITERATIONS: u64 = 16;
+    const ITERATIONS: u64 = 8;
     let scene = shipped(&format!("{folder}/{name}"));
     let data = if folder == "suite" { "suite" } else { "references" };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/data/{data}/{name}.exr"));

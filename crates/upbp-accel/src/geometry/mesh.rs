@@ -9,7 +9,7 @@ use super::hierarchy::MAX_INDEX;
 use super::model::Model;
 use super::placement::{Placement, unit};
 use super::surface::{Areas, Surface, cross, normal_cone};
-use super::topology::{Border, Topology};
+use super::topology::Border;
 use super::triangle::RayShear;
 use crate::ray::Ray;
 
@@ -60,7 +60,8 @@ impl TriangleMesh {
             }
         }
 
-        let topology = Topology::of(&positions, &indices);
+        // Before anything is dropped: a triangle without area may still join its neighbours.
+        let border = Border::of(&positions, &indices);
         let count = indices.len();
         let mut triangles = indices;
         let has_area =
@@ -71,7 +72,7 @@ impl TriangleMesh {
         }
         let dropped = count - triangles.len();
         let normals = normals.map(|normals| normals.into_iter().map(unit).collect());
-        Ok(Self::with_surface(Surface::new(positions, triangles, normals, topology, dropped)))
+        Ok(Self::with_surface(Surface::new(positions, triangles, normals, border, dropped)))
     }
 
     fn with_surface(surface: Surface) -> Self {
@@ -100,13 +101,13 @@ impl TriangleMesh {
     /// [placed](Self::placed).
     pub fn transformed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
         let placement = self.placement_by(to_scene)?;
-        let Surface { positions, triangles, normals, topology, dropped, .. } = &*self.surface;
+        let Surface { positions, triangles, normals, border, dropped, .. } = &*self.surface;
         let positions = positions.iter().map(|position| placement.point(*position)).collect();
         let triangles = triangles.iter().map(|triangle| placement.winding(*triangle)).collect();
         let normals = normals.as_ref();
         let normals = normals.map(|normals| normals.iter().map(|normal| placement.normal(*normal)).collect());
-        let surface = Surface::new(positions, triangles, normals, topology.placed(&placement), *dropped);
-        if topology.border == Border::Nowhere {
+        let surface = Surface::new(positions, triangles, normals, *border, *dropped);
+        if *border == Border::Nowhere {
             surface.set_signed_volume(self.surface.signed_volume() * placement.volume_ratio());
         }
         Self::with_surface(surface).checked()
@@ -276,17 +277,18 @@ impl TriangleMesh {
     /// The edges that keep the mesh from being closed.
     #[must_use]
     pub fn border(&self) -> Border {
-        self.surface.topology.border
+        self.surface.border
     }
 
-    /// A point of each part of the mesh, and the unit normal there: within the largest triangle of the part,
-    /// which shares no corner with the others.
-    pub fn parts(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
-        let in_scene = move |(point, normal): &(Vec3, Vec3)| match &self.placement {
-            Some(placement) => (placement.point(*point), placement.normal(*normal)),
-            None => (*point, *normal),
+    /// A point of each part of the mesh, amid its largest triangle, and the unit normal there. Parts have no
+    /// corner in common.
+    ///
+    /// Found when they are first asked for, once for all copies.
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = (Vec3, Vec3)> {
+        let centre = |&triangle: &u32| {
+            (self.point(triangle, 1.0 / 3.0, 1.0 / 3.0).as_vec3(), self.geometric_normal(triangle))
         };
-        self.surface.topology.parts.iter().map(in_scene)
+        self.surface.parts().iter().map(centre)
     }
 
     /// Whether `point` lies inside; `None` for a mesh that is not closed.

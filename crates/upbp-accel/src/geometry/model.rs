@@ -73,7 +73,7 @@ mod tests {
     use glam::{Affine3A, Quat};
 
     use super::*;
-    use crate::geometry::topology::Topology;
+    use crate::geometry::topology::Border;
 
     /// A cube of `12 n²` triangles, blown up to a ball or not.
     fn cube(n: u32, is_ball: bool) -> Surface {
@@ -95,8 +95,8 @@ mod tests {
                 triangles.extend([[a, b, c], [a, c, d]]);
             }
         }
-        let topology = Topology::of(&positions, &triangles);
-        Surface::new(positions, triangles, None, topology, 0)
+        let border = Border::of(&positions, &triangles);
+        Surface::new(positions, triangles, None, border, 0)
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec3, Vec3};
 
 use super::model::Model;
-use super::topology::Topology;
+use super::topology::{Border, parts};
 
 /// Triangles in coordinates of their own.
 #[derive(Clone, Debug)]
@@ -13,7 +13,7 @@ pub(super) struct Surface {
     pub(super) positions: Vec<Vec3>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) normals: Option<Vec<Vec3>>,
-    pub(super) topology: Topology,
+    pub(super) border: Border,
     /// Triangles without area that were left out.
     pub(super) dropped: usize,
     bounds: (Vec3, Vec3),
@@ -27,6 +27,7 @@ struct Measures {
     areas: OnceLock<Areas>,
     signed_volume: OnceLock<f64>,
     normal_cone: OnceLock<Option<(Vec3, f32)>>,
+    parts: OnceLock<Vec<u32>>,
     model: OnceLock<Arc<Model>>,
 }
 
@@ -71,14 +72,14 @@ impl Surface {
         positions: Vec<Vec3>,
         triangles: Vec<[u32; 3]>,
         normals: Option<Vec<Vec3>>,
-        topology: Topology,
+        border: Border,
         dropped: usize,
     ) -> Self {
         let mut bounds = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for corner in triangles.iter().flatten().map(|&vertex| positions[vertex as usize]) {
             bounds = (bounds.0.min(corner), bounds.1.max(corner));
         }
-        Self { positions, triangles, normals, topology, dropped, bounds, measures: Measures::default() }
+        Self { positions, triangles, normals, border, dropped, bounds, measures: Measures::default() }
     }
 
     /// The least and the greatest coordinates.
@@ -128,6 +129,11 @@ impl Surface {
         *self.measures.normal_cone.get_or_init(|| normal_cone(|| self.each()))
     }
 
+    /// The largest triangle of each [part](super::TriangleMesh::parts).
+    pub(super) fn parts(&self) -> &[u32] {
+        self.measures.parts.get_or_init(|| parts(&self.positions, &self.triangles))
+    }
+
     /// The hierarchy over the triangles.
     pub(super) fn model(&self) -> &Arc<Model> {
         let model = &self.measures.model;
@@ -144,7 +150,6 @@ impl Surface {
     pub(super) fn translate(&mut self, by: Vec3) {
         self.positions.iter_mut().for_each(|position| *position += by);
         self.bounds = (self.bounds.0 + by, self.bounds.1 + by);
-        self.topology.translate(by);
         // The volume does not depend on how corners are rounded in their place.
         let signed_volume = std::mem::take(&mut self.measures.signed_volume);
         self.measures = Measures { signed_volume, ..Measures::default() };

@@ -76,7 +76,6 @@ fn a_good_scene_renders_and_writes_its_files() {
     assert!(message.contains("out.exr: expected a reference of 5 x 7 pixels, found "), "{message}");
 }
 
-/// A likely mistake is told, and rendered all the same.
 #[test]
 fn what_makes_a_picture_wrong_is_told_even_if_it_is_to_be_quiet() {
     let folder = folder("quiet_warnings");
@@ -94,6 +93,7 @@ fn what_makes_a_picture_wrong_is_told_even_if_it_is_to_be_quiet() {
     }
 }
 
+/// A likely mistake is told, and rendered all the same.
 #[test]
 fn media_that_are_nowhere_or_never_end_are_told() {
     let folder = folder("notes_on_media");

@@ -45,8 +45,6 @@ pub fn clear_edge<S: Scene, L: Lanes>(
     const OFF: f32 = 4.0 * f32::EPSILON;
     /// Surfaces that are met at smaller cosines count as met at this one.
     const LEAST_COSINE: f32 = 0.04;
-    /// The same where the surface is not known, and may be met at any.
-    const LEAST_COSINE_OF_ANY: f32 = 0.004;
     crossings.clear();
     // The ray ends before it could, by rounding, meet the surface that it leads to; media do not.
     let to_point = |point: Vec3, short: f32| {
@@ -63,7 +61,10 @@ pub fn clear_edge<S: Scene, L: Lanes>(
             let cosine = away.dot(normal).abs() / away.length();
             to_point(offset_origin(position, normal, away), OFF / cosine.max(LEAST_COSINE))
         }
-        Target::Pinpoint(point) => to_point(point, OFF / LEAST_COSINE_OF_ANY),
+        Target::Pinpoint(point) => {
+            let away = (origin - point).normalize();
+            to_point(offset_origin(point, away, away), OFF / LEAST_COSINE)
+        }
     };
     if !(ray.t_max > 0.0) || !ray.direction.is_finite() || !scene.is_clear(&ray, crossings) {
         return None;

@@ -196,16 +196,14 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         EmitterKind::Area => {
             offset_origin(emission.point.position, emission.point.normal, emission.direction)
         }
+        // Ahead of a point, which may stand on a boundary.
+        EmitterKind::Point => offset_origin(emission.point.position, emission.direction, emission.direction),
         _ => emission.point.position,
     };
     let stack = if kind.is_infinite() {
         MediumStack::new(prepared.scene.outside())
     } else {
-        // Ahead of a point, which may stand on a boundary.
-        prepared.scene.stack_at(match kind {
-            EmitterKind::Point => offset_origin(origin, emission.direction, emission.direction),
-            _ => origin,
-        })
+        prepared.scene.stack_at(origin)
     };
     let hit = match kind {
         EmitterKind::Volume(body) => {

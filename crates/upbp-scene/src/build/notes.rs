@@ -39,33 +39,35 @@ impl Builder<'_> {
     }
 
     /// Notes bodies of several parts of which one has its inside in front of it: nothing that is met there
-    /// agrees with what is inside of what.
-    pub(super) fn note_parts(&mut self, places: Places<'_>) {
+    /// agrees with what is inside of what. `origin` is the point that has become the origin.
+    pub(super) fn note_parts(&mut self, places: Places<'_>, origin: Vec3) {
+        /// Parts of a mesh that are looked at, evenly spaced: each takes a ray through it.
+        const MOST: usize = 1000;
         let mut known = BTreeSet::new();
         for (index, draft) in places.drafts.iter().enumerate() {
-            let Shape::Mesh(mesh) = places.shape(index) else { continue };
+            let (Shape::Mesh(mesh), Some(_)) = (places.shape(index), draft.boundary.inside()) else {
+                continue;
+            };
             // Of copies one is enough.
             let is_copy = match &self.description.shapes[index].geometry {
                 Geometry::Mesh { file: Some(file), part, .. } => !known.insert((file, part)),
                 _ => false,
             };
-            if is_copy || draft.boundary.inside().is_none() || mesh.parts().count() < 2 {
+            if is_copy || mesh.parts().len() < 2 {
                 continue;
             }
-            let is_in = |point| places.geometry.contains(ShapeId(index as u32), point) == Some(true);
-            let is_wrong = |&(point, normal): &(Vec3, Vec3)| {
-                let [front, behind] = [normal, -normal].map(|side| offset_origin(point, normal, side));
-                is_in(front) || !is_in(behind)
+            let has_inside_in_front = |&(point, normal): &(Vec3, Vec3)| {
+                let front = offset_origin(point, normal, normal);
+                places.geometry.contains(ShapeId(index as u32), front) == Some(true)
             };
-            let mut wrong = mesh.parts().filter(is_wrong);
-            if let Some((point, _)) = wrong.next() {
-                let (count, all) = (1 + wrong.count(), mesh.parts().count());
+            let step = mesh.parts().len().div_ceil(MOST);
+            if let Some((point, _)) = mesh.parts().step_by(step).find(has_inside_in_front) {
                 self.note(
                     self.shape_item(index),
                     format!(
-                        "of its {all} parts {count} are wound the wrong way round or overlap another part, one of \
-                         them at {point}: give each body a shape of its own, and let normals point out of it, \
-                         into the hollows of it too"
+                        "the part of the mesh at {} is wound the wrong way round or overlaps another part: give each \
+                         body a shape of its own, and let normals point out of it, into the hollows of it too",
+                        point + origin
                     ),
                 );
             }

@@ -82,7 +82,9 @@ impl Builder<'_> {
             }
         }
         let shapes = self.description.shapes.iter().enumerate();
-        shapes.map(|(index, shape)| self.surface(index, shape, &materials, media)).collect()
+        let surfaces = shapes.map(|(index, shape)| self.surface(index, shape, &materials, media)).collect();
+        self.meshes.files.clear();
+        surfaces
     }
 
     fn surface(
@@ -247,6 +249,7 @@ impl Builder<'_> {
                 Some(part) => read.part(part).ok_or_else(|| unknown("part", part, read.parts())),
                 None => Ok(read.mesh()),
             };
+            drop(read);
             let describe = |error: &dyn std::fmt::Display| format!("mesh `{file}`: {error}");
             let ObjMesh { positions, indices, normals } = mesh.map_err(|error| describe(&error))?;
             TriangleMesh::new(positions, indices, normals).map_err(|error| describe(&error))
@@ -303,7 +306,8 @@ impl MeshFiles {
     }
 
     fn parts_of(&self, file: &str) -> usize {
-        self.uses.keys().filter(|(other, _)| other == file).count()
+        let from = self.uses.range((file.to_owned(), None)..);
+        from.take_while(|((other, _), _)| other == file).count()
     }
 }
 

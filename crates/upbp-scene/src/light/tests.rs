@@ -347,6 +347,21 @@ fn images_are_read_from_openexr() {
 }
 
 #[test]
+fn what_is_below_zero_in_an_image_is_no_light() {
+    let path = std::env::temp_dir().join(format!("upbp-scene-below-zero-{}.exr", std::process::id()));
+    let load = |below: f32| {
+        exr::prelude::write_rgb_file(&path, 2, 1, |_, _| (below, 1.0_f32, 0.5_f32)).unwrap();
+        let image = EnvironmentImage::load(&path);
+        std::fs::remove_file(&path).unwrap();
+        image.map(|image| image.lookup(Vec3::NEG_Z).0).map_err(|error| error.to_string())
+    };
+    assert_eq!(load(-0.25), Ok(Spectrum::new(0.0, 1.0, 0.5)));
+    for bad in [f32::NEG_INFINITY, f32::NAN] {
+        assert!(load(bad).unwrap_err().contains("expected finite values of at least zero"), "{bad}");
+    }
+}
+
+#[test]
 fn a_part_of_a_picture_is_no_sky() {
     use exr::prelude::*;
     let path = std::env::temp_dir().join(format!("upbp-scene-part-{}.exr", std::process::id()));
