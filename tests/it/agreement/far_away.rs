@@ -130,7 +130,8 @@ fn sunlight_scatters_at_any_height_of_a_thin_layer() {
 
 /// A lamp over a floor, with what is a millimetre before it, all else `distance` away.
 fn under_a_lamp(distance: f32, is_point: bool, cover: &str) -> ReadyScene {
-    let (emission, light) = if is_point { (0, "Point(position: (0, 0, 0), intensity: 1)") } else { (100, "") };
+    let (emission, light) =
+        if is_point { (0, "Point(position: (0, 0, 0), intensity: 1)") } else { (100, "") };
     let (floor, side) = (-distance, 2.0 * distance);
     let text = format!(
         "(version: 1, camera: Perspective(origin: (0, {:?}, {:?}), target: (0, {floor:?}, 0), fov_degrees: 10),

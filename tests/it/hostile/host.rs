@@ -14,17 +14,16 @@ use super::faulty_host::{Fault, Fault as F, GEOMETRY, Hostile, faults};
 /// Renders a little; what was dropped, or the reason not to start.
 fn render(fault: Fault, techniques: &str) -> Result<Counters, String> {
     let scene = Hostile::new(fault);
+    // Each ray meets as many boundaries as are followed at all.
+    let is_endless = matches!(fault, F::Endless | F::EndlessBodies);
     let settings = Settings {
         techniques: techniques.parse().expect("technique names"),
-        light_paths: upbp_core::LightPaths::Count(256),
+        light_paths: upbp_core::LightPaths::Count(if is_endless { 16 } else { 256 }),
         max_length: 20,
         ..Settings::default()
     };
     let settings = settings.validate().expect("valid settings");
-    // Long enough for `auto` to look at some candidates.
-    let stop = Stop { iterations: Some(200), ..Stop::default() };
-    let start = Start { stop, ..Start::default() };
-    let mut renderer = Renderer::start(&scene, settings, start).map_err(|error| error.to_string())?;
+    let mut renderer = Renderer::new(&scene, settings).map_err(|error| error.to_string())?;
     for _ in 0..2 {
         renderer.iterate();
     }

@@ -31,7 +31,7 @@ fn slab(case: &Case, material: &str, camera: &str, more: &str) -> upbp_scene::Re
 }
 
 fn check(table: &mut Table, name: &str, scene: &upbp_scene::ReadyScene, expected: [f64; 2], accuracy: f64) {
-    let [reflected, transmitted, _] = render_channels(scene, &settings("hit", None), 8);
+    let [reflected, transmitted, _] = render_channels(scene, &settings("hit", None), 16);
     table.check(&format!("{name} R"), reflected, expected[0], accuracy);
     // Nobody gets through thick slabs, nor is anybody expected to.
     if expected[1] > 1e-3 {
