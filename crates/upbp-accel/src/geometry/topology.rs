@@ -100,7 +100,7 @@ impl Border {
 
 /// The largest triangle of each part: parts have no corner in common, equal positions counting as one.
 pub(super) fn parts(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
-    // Trees of vertices: each has one above it that is at the same place or in the same part, the root itself.
+    // Trees of vertices: above each is one at the same place or in the same part, above a root itself.
     let mut above = places(positions);
     for &[a, b, c] in triangles {
         for other in [b, c] {
