@@ -408,7 +408,7 @@ mod tests {
     fn names_do_not_take_all_memory() {
         let text = "v 0 0 0\n".to_owned() + &"o a\ng b\nusemtl c\n".repeat(1000) + "f 1 1 1";
         assert_eq!(ObjFile::parse(&text).unwrap().sections.len(), 1);
-        let names = |count: usize| "g".to_owned() + &(0..count).map(|i| format!(" {i}")).collect::<String>();
+        let names = |count: usize| (0..count).fold("g".to_owned(), |line, i| line + " " + &i.to_string());
         let with = |count| ObjFile::parse(&("v 0 0 0\nf 1 1 1\n".to_owned() + &names(count)));
         assert!(with(MAX_NAMES).is_ok());
         let error = with(MAX_NAMES + 1).unwrap_err().to_string();

@@ -51,8 +51,8 @@ fn what_a_lamp_or_a_camera_lies_in_does_not_hide_it() {
         ("a lamp in a quad", above, &quad, &point, 2.9),
         ("a spot under its housing", above, &housing, &spot, 2.9),
         ("a lamp in a mesh", above, &mesh, &point, 2.9),
-        ("a lamp in a sloped quad, a rounding before it", above, &sloped, &before, 2.9466667),
-        ("a lamp in a sloped quad, a rounding behind it", above, &sloped, &behind, 2.9466667),
+        ("a lamp in a sloped quad, a rounding before it", above, &sloped, &before, 2.946_666_7),
+        ("a lamp in a sloped quad, a rounding behind it", above, &sloped, &behind, 2.946_666_7),
         ("a camera on the floor", below, &on_the_floor, &point.replace("2.9", "1"), 2.0),
     ] {
         let scene = scene(&format!(
