@@ -14,11 +14,9 @@ use super::faulty_host::{Fault, Fault as F, GEOMETRY, Hostile, faults};
 /// Renders a little; what was dropped, or the reason not to start.
 fn render(fault: Fault, techniques: &str) -> Result<Counters, String> {
     let scene = Hostile::new(fault);
-    // Each ray meets as many boundaries as are followed at all.
-    let is_endless = matches!(fault, F::Endless | F::EndlessBodies);
     let settings = Settings {
         techniques: techniques.parse().expect("technique names"),
-        light_paths: upbp_core::LightPaths::Count(if is_endless { 16 } else { 256 }),
+        light_paths: upbp_core::LightPaths::Count(256),
         max_length: 20,
         ..Settings::default()
     };
@@ -40,7 +38,12 @@ fn nothing_bad_reaches_the_film_and_nothing_panics() {
     for techniques in ["all", "auto", "bpt"] {
         let good = render(F::None, techniques).expect("a good scene");
         assert_eq!((good.dropped, good.lost_walks), (0, 0));
-        for fault in if techniques == "all" { faults() } else { GEOMETRY.to_vec() } {
+        let mut faults = if techniques == "all" { faults() } else { GEOMETRY.to_vec() };
+        if techniques == "bpt" {
+            // Seconds each: every ray meets as many boundaries as are followed at all.
+            faults.retain(|fault| !matches!(fault, F::Endless | F::EndlessBodies));
+        }
+        for fault in faults {
             let outcome = std::panic::catch_unwind(|| render(fault, techniques));
             let counters = outcome.unwrap_or_else(|_| panic!("{fault:?} panics"));
             println!("{fault:?}, {techniques}: {counters:?}");
