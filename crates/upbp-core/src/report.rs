@@ -99,7 +99,7 @@ impl Report {
         }
     }
 
-    /// What makes the picture wrong, in a sentence each; part of the text of the report.
+    /// Sentences about whatever makes the picture wrong; they are part of the text of the report.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let c = &self.counters;

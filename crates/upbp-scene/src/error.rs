@@ -50,12 +50,12 @@ impl SceneError {
     }
 }
 
-/// One error of a description.
+/// An error of a description, or a [note](crate::ReadyScene::notes) about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// The part of the scene: ``shape `floor` ``, `light 2 (Spot)`.
     pub item: String,
-    /// The error, the expected and the found value.
+    /// The error, the expected and the found value; or the note.
     pub message: String,
 }
 

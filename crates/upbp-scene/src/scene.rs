@@ -86,7 +86,8 @@ impl ReadyScene {
         &self.files
     }
 
-    /// What can be rendered, but may not be meant: a medium that is nowhere, a mesh whose parts overlap.
+    /// Notes about parts of the scene that can be rendered, but may not be meant: a medium that is nowhere, a
+    /// mesh whose parts overlap.
     #[must_use]
     pub fn notes(&self) -> &[Problem] {
         &self.notes

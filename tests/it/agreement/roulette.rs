@@ -61,7 +61,7 @@ fn reflections_without_end_keep_their_mean() {
             };
             iterate(&scene, &settings, 2).1.mean()
         };
-        channels(&(first..first + 20).map(image_mean).collect::<Vec<_>>())
+        channels(&(first..first + 32).map(image_mean).collect::<Vec<_>>())
     };
     let expected = of(Roulette::Off, 0);
     assert!(expected.iter().all(|found| found.error < 0.05 * found.mean), "{expected:?}");

@@ -1,4 +1,4 @@
-//! How the triangles of a mesh hang together: where it ends, and its parts.
+//! Edges at which a mesh is not closed, and parts of it that do not hang together.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -25,7 +25,7 @@ pub enum Border {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Edges {
-    /// How many they are.
+    /// Number of these edges.
     pub count: usize,
     /// Ends of one of them, in the mesh's own coordinates: before it is placed or transformed.
     pub one: [Vec3; 2],

@@ -1,4 +1,4 @@
-//! Notes: what is no problem, but may not be meant.
+//! Notes about parts of a scene that can be rendered, but may not be meant.
 
 use std::collections::BTreeSet;
 
