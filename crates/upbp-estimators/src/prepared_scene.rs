@@ -401,12 +401,6 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         self.dense_media.get(medium.0 as usize).is_some_and(|dense| *dense)
     }
 
-    /// Whether any medium is [dense](Self::is_dense).
-    #[must_use]
-    pub fn has_dense_media(&self) -> bool {
-        self.dense_media.contains(&true)
-    }
-
     /// The emitters that may be seen out of focus at a place of the film, with the probabilities of
     /// [`choose_through_lens`](Self::choose_through_lens).
     #[must_use]

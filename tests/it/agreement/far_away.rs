@@ -209,3 +209,35 @@ fn light_is_as_right_beside_things_that_are_far_away() {
         }
     }
 }
+
+/// Both faces of a pane would be at one distance from a start as far away as the ground is wide.
+#[test]
+fn the_sun_shines_through_a_pane_above_a_ground_of_any_width() {
+    let scene = |floor: f32| {
+        let side = 2.0 * floor;
+        let text = format!(
+            "(version: 1, camera: Perspective(origin: (0, 0.4, 1), target: (0, 0, 0), fov_degrees: 30),
+            film: (width: 16, height: 16),
+            materials: {{\"grey\": Lambert(0.5), \"glass\": Dielectric(1.5)}},
+            shapes: [
+                (geometry: Quad(origin: (-{floor:?}, 0, -{floor:?}), edge_u: (0, 0, {side:?}), edge_v: ({side:?}, 0, 0)),
+                 material: \"grey\"),
+                (geometry: Box(min: (-0.6, 0.5, -0.6), max: (0.6, 0.503, 0.6)), material: \"glass\"),
+            ],
+            lights: [Directional(direction: (0.1, -1, 0.05), irradiance: 3)])"
+        );
+        ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}\n{text}"))
+    };
+    let estimate = |scene: &ReadyScene| {
+        let techniques = "bpt+surf".parse().expect("technique names");
+        let settings = Settings { techniques, light_paths: LightPaths::Count(1024), ..Settings::default() };
+        render(scene, &settings, 100).0
+    };
+    let expected = estimate(&scene(4.0));
+    for floor in [1e3, 1e4, 1e5] {
+        let found = estimate(&scene(floor));
+        let (sigmas, percent) = (found.sigmas(&expected), found.percent(&expected));
+        println!("{floor}: {found:?}, {expected:?}, {sigmas:.2} sigma, {percent:+.2} %");
+        assert!(sigmas.abs() < 4.5, "{floor}: {found:?}, expected {expected:?}");
+    }
+}

@@ -216,8 +216,7 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         _ => f64::from(u8::from(kind.is_hittable())),
     };
     observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
-    let needs_digits = context.plan.stores_medium_photons() || context.plan.stores_beams();
-    let origin = if kind.is_infinite() && (needs_digits || prepared.has_dense_media()) {
+    let origin = if kind.is_infinite() {
         start_near_scene(prepared.scene, &Ray::new(origin, emission.direction), crossings)?
     } else {
         origin
@@ -241,9 +240,9 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     })
 }
 
-/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Places in
-/// media that are reached from there have the digits of their own coordinates, not those of a start as far
-/// away as the scene is wide.
+/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Distances from
+/// there have the digits of what is near, not those of a start as far away as the scene is wide: both faces of
+/// a pane of glass would be at one, and places in media beside their bodies.
 fn start_near_scene<S: Scene>(scene: &S, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Vec3> {
     crossings.clear();
     let hit = scene.trace(ray, crossings).map(|hit| hit.t);
