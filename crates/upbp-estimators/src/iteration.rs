@@ -34,11 +34,15 @@ impl Kernels {
         Self { surf: held(surf), pp3d: held(pp3d), pb2d: held(pb2d), bp2d: held(bp2d), bb1d: held(bb1d) }
     }
 
-    /// The least radius of those that merge, scene units; infinite if none does.
-    fn least_radius(&self) -> f32 {
-        let Self { surf, pp3d, pb2d, bp2d, bb1d } = self;
-        let radii = [surf, pp3d, pb2d, bp2d, bb1d].map(Kernel::radius);
-        radii.into_iter().filter(|radius| *radius > 0.0).fold(f32::INFINITY, f32::min)
+    /// The least radius of those that merge on surfaces and of those that do in media, scene units; infinite
+    /// if none does.
+    fn least_radii(&self) -> [f32; 2] {
+        let least = |kernels: &[Kernel]| {
+            let radii = kernels.iter().map(Kernel::radius);
+            radii.filter(|radius| *radius > 0.0).fold(f32::INFINITY, f32::min)
+        };
+        let Self { surf, pp3d, pb2d, bp2d, bb1d } = *self;
+        [least(&[surf]), least(&[pp3d, pb2d, bp2d, bb1d])]
     }
 }
 
@@ -89,9 +93,9 @@ pub struct IterationPlan {
     pub periods: MergePeriods,
     /// Ranks of the pixels whose turn it is to make them, each below its period.
     pub turns: PerMerge<u32>,
-    /// Largest coordinate at which the least of the kernels is wide enough, where the scale of radii is one;
-    /// infinite without merges.
-    pub resolved: f32,
+    /// Largest coordinates at which the least of the kernels on surfaces, and of those in media, is wide
+    /// enough, where the scale of radii is one; infinite without merges.
+    pub resolved: [f32; 2],
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
     /// Whether any of the techniques merges.
@@ -232,7 +236,7 @@ impl IterationPlan {
             kernels,
             // Weights without merges know no radius.
             radius_field: if merges { radius_field } else { RadiusField::Uniform },
-            resolved: kernels.least_radius() / LEAST_RADIUS,
+            resolved: kernels.least_radii().map(|radius| radius / LEAST_RADIUS),
             periods,
             turns: periods.turns(choices.seed, choices.iteration),
             mis,
@@ -316,12 +320,13 @@ impl IterationPlan {
         self.techniques.iter().filter(has_turn).collect()
     }
 
-    /// The scale of kernel radii at a place; 0, which is no merges, where a kernel would be narrower than
-    /// [`LEAST_RADIUS`].
+    /// The scale of kernel radii at a place, of those in media or of those on surfaces; 0, which is no merges,
+    /// where such a kernel would be narrower than [`LEAST_RADIUS`].
     #[inline]
-    pub(crate) fn radius_scale(&self, position: Vec3) -> f32 {
+    pub(crate) fn radius_scale(&self, position: Vec3, in_medium: bool) -> f32 {
         let scale = self.radius_field.at(position);
-        if position.abs().max_element() <= scale * self.resolved { scale } else { 0.0 }
+        let resolved = self.resolved[usize::from(in_medium)];
+        if position.abs().max_element() <= scale * resolved { scale } else { 0.0 }
     }
 
     /// The merges that a path with this sine between its lines takes part in at a vertex, where kernel radii

@@ -140,7 +140,7 @@ impl<D: Densities, L: Lanes> PhotonBeam<D, L> {
             towards_light: -direction,
             throughput: self.throughput * transmitted(&density, plan.mis.photon_beams, &self.mis.shares),
             mis: self.mis.arrive(&plan.mis, Walk::Light, &edge, connections),
-            scale: plan.radius_scale(position),
+            scale: plan.radius_scale(position, true),
             depth: self.depth,
             path: self.path,
             interaction: Interaction::Medium(self.medium),

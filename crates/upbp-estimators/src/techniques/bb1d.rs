@@ -24,7 +24,7 @@ pub(crate) fn bb1d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         let radius = plan.radius_field.search_radius(kernel.radius());
         let tests = map.beam_tree.around_ray(&beam, radius, |index, approach| {
             let t = approach.t_ray;
-            let scale = plan.radius_scale(beam.at(t));
+            let scale = plan.radius_scale(beam.at(t), true);
             let kernel = kernel.scaled(scale).value(approach.distance * approach.distance);
             let photons = &map.beams[index as usize];
             if kernel > 0.0

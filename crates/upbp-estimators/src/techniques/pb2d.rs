@@ -24,7 +24,7 @@ pub(crate) fn pb2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         let radius = plan.radius_field.search_radius(kernel.radius());
         let ahead = |index| map.read_ahead(index);
         let tests = map.medium.around_ray_ahead(&beam, radius, ahead, |index, t, distance2| {
-            let scale = plan.radius_scale(beam.at(t));
+            let scale = plan.radius_scale(beam.at(t), true);
             let kernel = kernel.scaled(scale).value(distance2);
             let photon = &map.vertices[index as usize];
             if kernel > 0.0

@@ -138,7 +138,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             towards_camera: from,
             throughput,
             mis,
-            scale: plan.radius_scale(arrived.position),
+            scale: plan.radius_scale(arrived.position, in_medium),
             depth,
             interaction: arrived.interaction,
         };

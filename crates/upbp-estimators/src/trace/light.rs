@@ -100,7 +100,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             O::Densities::ZERO
         };
         let mis = flight.mis.arrive(&plan.mis, Walk::Light, &edge, connections);
-        let scale = plan.radius_scale(position);
+        let scale = plan.radius_scale(position, in_medium);
         let vertex = LightVertex {
             position,
             towards_light: from,
