@@ -145,7 +145,7 @@ impl Hemisphere {
     /// `1 − |cos θ|` below which directions have the probability `below`.
     fn sample(&self, below: f64) -> f64 {
         // Never in a cell without probability, not even at the ends.
-        let below = below.max(f64::MIN_POSITIVE);
+        let below = below.max(f64::MIN_POSITIVE).min(self.probability());
         let end = self.nodes.partition_point(|node| node.below < below).clamp(1, self.nodes.len() - 1);
         let (a, b) = (&self.nodes[end - 1], &self.nodes[end]);
         let share = ((below - a.below) / (b.below - a.below)).clamp(0.0, 1.0);

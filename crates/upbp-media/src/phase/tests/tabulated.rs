@@ -187,6 +187,18 @@ fn tables_survive_the_ends_of_the_random_numbers() {
 }
 
 #[test]
+fn angles_without_light_are_never_drawn() {
+    for i in 0..1000 {
+        let phase =
+            tabulated(&[(0.0, 1.0), (25.0 + 0.005 * i as f32, 0.0), (60.0, 0.0), (180.0, 0.0)]).unwrap();
+        for u in [0.0, f32::EPSILON / 2.0, LARGEST_BELOW_ONE] {
+            let sample = phase.sample::<f64>(Vec3::Z, (), &(), [u, 0.5]);
+            assert!(sample.after.z > 0.86, "{i}: {sample:?}");
+        }
+    }
+}
+
+#[test]
 fn coloured_tables_have_one_function_per_channel() {
     let rows = [(0.0, Spectrum::new(1.0, 2.0, 4.0)), (180.0, Spectrum::new(1.0, 1.0, 0.0))];
     let phase = PhaseFunction::tabulated(&rows).unwrap();
