@@ -76,6 +76,25 @@ fn light_that_only_merges_find_is_not_lost() {
     }
 }
 
+/// A preparation that met no light does not know which techniques find it.
+#[test]
+fn everything_looks_for_light_that_the_preparation_did_not_meet() {
+    const SHINES_AWAY: &str = r#"(
+        version: 1,
+        camera: Perspective(origin: (0, 1, 3.4), target: (0, 0.6, 0), fov_degrees: 40),
+        film: (width: 16, height: 16),
+        materials: { "white": Lambert(0.7) },
+        shapes: [
+            (material: "white", geometry: Quad(origin: (-2, 0, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0))),
+            (material: "white", emission: 1, geometry: Quad(origin: (0, 5, 0), edge_u: (0, 0, 1), edge_v: (1, 0, 0))),
+        ],
+    )"#;
+    let scene = ReadyScene::from_ron_str(SHINES_AWAY, ".").expect("a valid scene");
+    let plan = renderer(&scene, settings()).report().plan;
+    assert_eq!(plan.techniques, TechniqueSet::BPT.with(upbp_core::Technique::Surf), "{plan}");
+    assert!(plan.light_paths > 0, "{plan}");
+}
+
 /// Kernels of surface photons may be as wide as a pixel, where that is more than usual and nobody asked for a
 /// radius.
 #[test]

@@ -40,9 +40,14 @@ impl Found {
 
 /// Searches from several starts, and compares the ends directly. Ties go to the plan without light sub-paths,
 /// then to the one with more of them: the variance that is lost by tracing fewer sits in rare samples, which
-/// a pilot render underestimates.
+/// a pilot render underestimates. One that met no light tells nothing, and everything may be needed to find
+/// some.
 pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let cost = Cost::of(variance.pilot());
+    if !variance.sees_light() {
+        let plan = finished(candidates.usual());
+        return Found { plan, is_clear: false, variance: f64::INFINITY, cost: cost.iteration(&plan) };
+    }
     let mut judge = Judge { variance, cost, known: Vec::new() };
     let usual = candidates.full.light_paths;
     let [camera, paths, everything] = candidates.starts().map(|start| {

@@ -8,16 +8,19 @@ pub(super) const LARGEST_PART: f64 = 0.03;
 /// to: for a picture of mean 0.5 the 0.01 of relMSE.
 pub(super) const DARKNESS: f64 = 0.04;
 
-/// Means over squares of five by five cells, without the one in the middle.
+/// Means over squares of five by five cells, without the one in the middle, unless there is no other.
 pub(super) fn surroundings(cells: &[DVec3], columns: usize) -> Vec<DVec3> {
     let rows = cells.len() / columns;
     let around = |i: usize, count: usize| i.saturating_sub(2)..(i + 3).min(count);
     let mean = |(cell, own): (usize, &DVec3)| {
         let (near_rows, near_columns) = (around(cell / columns, rows), around(cell % columns, columns));
         let others = near_rows.len() * near_columns.len() - 1;
+        if others == 0 {
+            return *own;
+        }
         let row =
             |row: usize| near_columns.clone().map(|column| cells[row * columns + column]).sum::<DVec3>();
-        (near_rows.map(row).sum::<DVec3>() - own).max(DVec3::ZERO) / others.max(1) as f64
+        (near_rows.map(row).sum::<DVec3>() - own).max(DVec3::ZERO) / others as f64
     };
     cells.iter().enumerate().map(mean).collect()
 }

@@ -122,6 +122,11 @@ impl Variance {
         Self { pilot, looks }
     }
 
+    /// Whether the pilot render met any light.
+    pub(super) fn sees_light(&self) -> bool {
+        !self.looks.is_empty() || !self.pilot.splats.is_empty()
+    }
+
     /// The pilot render, without its samples.
     pub(super) const fn pilot(&self) -> &PilotRender {
         &self.pilot

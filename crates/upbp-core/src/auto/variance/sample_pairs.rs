@@ -66,6 +66,11 @@ impl Looks {
         looks
     }
 
+    /// Whether there are no samples at all.
+    pub(super) const fn is_empty(&self) -> bool {
+        self.seen.is_empty()
+    }
+
     /// The samples of a look, and its number of light sub-paths.
     fn of(&self, look: usize) -> (&[Seen], u32) {
         let start = if look == 0 { 0 } else { self.ends[look - 1].0 };

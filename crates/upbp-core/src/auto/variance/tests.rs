@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use upbp_estimators::scene::PixelRect;
 use upbp_estimators::{MergePeriods, RadiusField, Technique};
 
-use super::limits::{DARKNESS, LARGEST_PART, largest};
+use super::limits::{DARKNESS, LARGEST_PART, largest, relative_to, surroundings};
 use super::*;
 use crate::auto::pilot_render::grid::Grid;
 use crate::auto::pilot_render::recorder::shares;
@@ -105,6 +105,14 @@ fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts
 
 pub(in crate::auto) fn pilot() -> PilotRender {
     pilot_of(Technique::Connect)
+}
+
+#[test]
+fn the_only_cell_is_relative_to_itself() {
+    let [own, others] = [DVec3::new(0.3, 0.2, 0.1), DVec3::splat(0.7)];
+    assert_eq!(surroundings(&[own], 1), [own]);
+    assert!(relative_to(&surroundings(&[own], 1))[0].max_element() < 10.0);
+    assert_eq!(surroundings(&[own, others], 2), [others, own]);
 }
 
 fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
