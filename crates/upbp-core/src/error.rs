@@ -1,5 +1,6 @@
 //! Errors, with messages for people.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use upbp_estimators::PrepareError;
@@ -53,12 +54,12 @@ impl From<ron::error::SpannedError> for TextError {
 #[non_exhaustive]
 pub enum RenderError {
     /// A plan whose light sub-paths leave more than there is room for.
-    #[error("plan: needs {needed} MiB, {budget} MiB are free or allowed by the setting `memory`")]
+    #[error("plan: needs {needed} MiB, {limit}")]
     PlanMemory {
         /// MiB that an iteration needs.
         needed: u64,
         /// MiB that are allowed.
-        budget: u64,
+        limit: MemoryLimit,
     },
     /// A value of a plan is out of its range.
     #[error("plan: {0}")]
@@ -100,8 +101,7 @@ pub enum RenderError {
     Scene(#[from] PrepareError),
     /// The film, with what writing it takes, does not fit.
     #[error(
-        "film of {width} x {height} pixels: needs {needed} MiB, {budget} MiB are free or allowed by the setting `memory`; \
-         a smaller film or fewer techniques take less"
+        "film of {width} x {height} pixels: needs {needed} MiB, {limit}; a smaller film or fewer techniques take less"
     )]
     Memory {
         /// Width in pixels.
@@ -111,8 +111,36 @@ pub enum RenderError {
         /// MiB that the film takes.
         needed: u64,
         /// MiB that are allowed.
-        budget: u64,
+        limit: MemoryLimit,
     },
+}
+
+/// MiB that a render may take, by what they come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MemoryLimit {
+    /// The setting `memory`.
+    Setting(u64),
+    /// Half of what is free.
+    HalfOfFree(u64),
+    /// All that is free, for a plan that is given.
+    Free(u64),
+    /// A number for all systems that do not tell what is free.
+    Unknown(u64),
+}
+
+impl fmt::Display for MemoryLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (mebibytes, reason) = match self {
+            Self::Setting(mebibytes) => (mebibytes, "are allowed by the setting"),
+            Self::HalfOfFree(mebibytes) => (mebibytes, "are taken, half of what is free"),
+            Self::Free(mebibytes) => (mebibytes, "are free"),
+            Self::Unknown(mebibytes) => {
+                (mebibytes, "are taken, since this system does not tell what is free")
+            }
+        };
+        let more = "`memory` in the settings or `--memory MIB` at the command line allows more";
+        write!(f, "{mebibytes} MiB {reason}; {more}")
+    }
 }
 
 fn expected_light(possible: TechniqueSet) -> String {

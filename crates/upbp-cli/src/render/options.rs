@@ -139,7 +139,8 @@ pub(crate) struct Resources {
     /// Threads, at most 16 per core; the image does not depend on it [default: one per core]
     #[arg(long, value_name = "T", value_parser = threads)]
     threads: Option<NonZeroUsize>,
-    /// Memory for film, light vertices, photon beams and their trees, MiB [default: half of what is free]
+    /// Memory for film, light vertices, photon beams and their trees, MiB [default: half of what is free, or
+    /// 2048 where the system does not tell]
     #[arg(long, value_name = "MIB", value_parser = whole::<u32>, allow_negative_numbers = true)]
     memory: Option<u32>,
 }

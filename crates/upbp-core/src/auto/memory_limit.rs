@@ -13,7 +13,7 @@ use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{PreparedScene, TechniqueSet};
 
 use super::statistics::Statistics;
-use crate::error::RenderError;
+use crate::error::{MemoryLimit, RenderError};
 use crate::film::Film;
 use crate::plan::Plan;
 use crate::settings::Settings;
@@ -31,6 +31,8 @@ pub(crate) struct Room {
     output: u64,
     /// All that may be taken.
     total: u64,
+    /// The same, for messages.
+    limit: MemoryLimit,
     /// Light vertices, beams, and their trees.
     pub(crate) light_bytes: u64,
 }
@@ -48,7 +50,7 @@ impl Room {
         is_given: bool,
     ) -> Result<Self, RenderError> {
         let rect = scene.scene.camera().crop();
-        let total = budget(settings.memory, is_given);
+        let (total, limit) = budget(settings.memory, is_given, free_bytes());
         let film = Film::memory_bytes(rect, techniques, settings.features);
         let estimate = Film::estimate_bytes(rect);
         let output = Film::output_bytes(rect, techniques, settings.features);
@@ -58,7 +60,7 @@ impl Room {
                 width: rect.width,
                 height: rect.height,
                 needed: needed.div_ceil(1 << 20),
-                budget: total >> 20,
+                limit,
             });
         }
         let light_bytes = match settings.memory {
@@ -66,7 +68,7 @@ impl Room {
             None if settings.deterministic => LIGHT_BYTES,
             _ => total - film - estimate,
         };
-        Ok(Self { film, estimate, output, total, light_bytes })
+        Ok(Self { film, estimate, output, total, limit, light_bytes })
     }
 
     /// Checks that the iterations of a plan fit, and returns it.
@@ -76,10 +78,8 @@ impl Room {
     pub(crate) fn fits<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Result<Plan, RenderError> {
         let needed = self.iteration_bytes::<S>(plan, statistics);
         if needed > self.total {
-            return Err(RenderError::PlanMemory {
-                needed: needed.div_ceil(1 << 20),
-                budget: self.total >> 20,
-            });
+            let needed = needed.div_ceil(1 << 20);
+            return Err(RenderError::PlanMemory { needed, limit: self.limit });
         }
         Ok(*plan)
     }
@@ -108,11 +108,16 @@ impl Room {
     }
 }
 
-/// Bytes that a render may take: the given number of MiB, or half of what the machine has free, or `all` of
-/// it.
-fn budget(mebibytes: Option<u32>, all: bool) -> u64 {
-    let of_free = |free: u64| if all { free } else { free / 2 };
-    mebibytes.map_or_else(|| free_bytes().map_or(LIGHT_BYTES, of_free), |mib| u64::from(mib) << 20)
+/// Bytes that a render may take, with what they come from: the given number of MiB, or half of what is
+/// `free`, or `all` of it.
+fn budget(mebibytes: Option<u32>, all: bool, free: Option<u64>) -> (u64, MemoryLimit) {
+    let (bytes, limit): (u64, fn(u64) -> MemoryLimit) = match (mebibytes, free) {
+        (Some(mebibytes), _) => (u64::from(mebibytes) << 20, MemoryLimit::Setting),
+        (None, None) => (LIGHT_BYTES, MemoryLimit::Unknown),
+        (None, Some(free)) if all => (free, MemoryLimit::Free),
+        (None, Some(free)) => (free / 2, MemoryLimit::HalfOfFree),
+    };
+    (bytes, limit(bytes >> 20))
 }
 
 /// Bytes that a process can still have, by what Linux says of the machine and of the control groups that it
@@ -242,8 +247,24 @@ mod tests {
         let text = "MemTotal:       24576000 kB\nMemFree:          512000 kB\nMemAvailable:   16384000 kB\n";
         assert_eq!(available(text), Some(16_384_000 * 1024));
         assert_eq!(available("MemAvailable: lots"), None);
-        assert_eq!([false, true].map(|all| budget(Some(3), all)), [3 << 20; 2]);
-        assert!(budget(None, false) > 1 << 20);
+        assert!(budget(None, false, free_bytes()).0 > 1 << 20);
+        // The limit that a message names is the one that holds.
+        let free = Some(5 << 30);
+        for (budget, mebibytes, reason) in [
+            (budget(Some(3), false, free), 3, "3 MiB are allowed by the setting; "),
+            (budget(Some(3), true, None), 3, "3 MiB are allowed by the setting; "),
+            (budget(None, false, free), 2560, "2560 MiB are taken, half of what is free; "),
+            (budget(None, true, free), 5120, "5120 MiB are free; "),
+            (
+                budget(None, true, None),
+                2048,
+                "2048 MiB are taken, since this system does not tell what is free; ",
+            ),
+        ] {
+            let text = budget.1.to_string();
+            assert_eq!(budget.0, mebibytes << 20);
+            assert!(text.starts_with(reason) && text.contains("`--memory MIB`"), "{text}");
+        }
     }
 
     #[test]
