@@ -8,8 +8,9 @@ mod progress;
 use std::path::Path;
 
 use upbp_core::{
-    Canceller, CheckedSettings, FrozenPlan, Image, OutputError, Preparing, RenderError, Renderer, Start,
-    State, StateError, Stop, StopReason, check_outputs, read_exr, read_text, remove_leftovers, write_text,
+    Canceller, CheckedSettings, Film, FrozenPlan, Image, OutputError, Preparing, RenderError, Renderer,
+    Start, State, StateError, Stop, StopReason, check_outputs, read_exr, read_text, remove_leftovers,
+    write_text,
 };
 use upbp_scene::{ReadyScene, SceneError};
 
@@ -34,9 +35,29 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
         }
         let beside =
             Beside { state: options.saving.state.as_deref().map(|path| (path, options.save_every())), bar };
+        let done = |film: &Film| (film.iterations(), film.begun());
+        let before = done(renderer.film());
         let reason = render(&mut renderer, &options.stop(), beside);
+        if done(renderer.film()) == before && !renderer.film().is_empty() && !options.messages.quiet {
+            explain_nothing(reason, renderer.state());
+        }
         write(renderer.state(), reason, options)
     })
+}
+
+/// Says why nothing was rendered, if it is since the state has all that was asked for.
+fn explain_nothing(reason: StopReason, state: &State) {
+    let (has, advice) = match reason {
+        StopReason::Iterations => {
+            (format!("has the iterations {}", state.film().iteration_set()), "give others by `--iterations`")
+        }
+        StopReason::Time => {
+            (format!("has {:.1} s of rendering", state.seconds().total()), "give a longer `--time`")
+        }
+        StopReason::Error => ("is below `--target-error`".to_owned(), "give a smaller one"),
+        _ => return,
+    };
+    complain(&format!("note: nothing was rendered, since the state {has} already: {advice}"));
 }
 
 /// Does everything that comes before the first iteration: `upbp check`.

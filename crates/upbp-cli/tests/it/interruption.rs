@@ -379,6 +379,37 @@ fn what_is_begun_is_told_and_what_is_empty_is_filled() {
 }
 
 #[test]
+fn a_state_with_all_that_is_asked_for_is_told() {
+    let folder = prepared("nothing_to_do");
+    // Enough pixels for an estimate of the error.
+    let common = ["scene.ron", "--deterministic", "--size", "32x32", "--state", "a.state", "-o", "a.exr"];
+    let said = |arguments: &[&str]| {
+        let output = command("render", &folder, &[&common, arguments].concat()).output();
+        let (code, text) = end(&output.expect("the program runs"));
+        assert_eq!(code, Some(0), "{text}");
+        text
+    };
+    assert!(!said(&["--iterations", "8"]).contains("note: "));
+    let kept = film(&folder.join("a.state"));
+    let iterations = "the state has the iterations 0..8 already: give others by `--iterations`";
+    for (arguments, words) in [
+        (&["--iterations", "8"][..], iterations),
+        (&["--iterations", "2..5"], iterations),
+        (&["--time", "0.001"], " s of rendering already: give a longer `--time`"),
+        (
+            &["--target-error", "1e6", "--iterations", "9"],
+            "below `--target-error` already: give a smaller one",
+        ),
+    ] {
+        let text = said(arguments);
+        assert!(text.starts_with("note: nothing was rendered, ") && text.contains(words), "{text}");
+        assert_eq!(film(&folder.join("a.state")), kept);
+    }
+    assert_eq!(said(&["--iterations", "8", "--quiet"]), "");
+    assert!(!said(&["--iterations", "9"]).contains("note: "));
+}
+
+#[test]
 fn states_without_a_picture_do_not_become_one() {
     let folder = prepared("empty");
     let scene = upbp_scene::ReadyScene::load(folder.join("scene.ron")).expect("a scene");
