@@ -72,12 +72,13 @@ pub enum RenderError {
         /// The techniques that are not ruled out.
         techniques: TechniqueSet,
     },
-    /// A reference image of another size than what is rendered, or without all of its pixels.
+    /// A reference image of another size than what is rendered, without all of its pixels, or with one that
+    /// is not finite.
     #[error("expected a reference of {} x {} pixels, found {found}", expected[0], expected[1])]
     Reference {
         /// Width and height of what is rendered.
         expected: [u32; 2],
-        /// The size of the reference, or the number of its pixels.
+        /// The size of the reference, the number of its pixels, or the place of one that is not finite.
         found: String,
     },
     /// The render was cancelled before there was anything to show.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use crate::program::{self, SMALL, folder};
+use upbp_core::{Image, write_image};
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     program::command("render", folder, arguments).output().expect("the program runs")
@@ -167,6 +168,9 @@ fn settings_and_options_that_make_no_sense_are_refused() {
     write("typo.ron", "(\n  sed: 1,\n)");
     write("image.exr", "this is no image");
     write("image.state", "this is no state");
+    let mut reference = Image { width: 8, height: 8, pixels: vec![[1.0; 3]; 64] };
+    reference.pixels[5 * 8 + 3][1] = f32::NAN;
+    write_image(&folder.join("nan.exr"), &reference).expect("a writable folder");
     for (arguments, words) in [
         (&["--settings", "zero.ron"][..], &["radii.pb2d", "positive"][..]),
         (&["--settings", "infinite.ron"], &["radii.bb1d"]),
@@ -191,6 +195,7 @@ fn settings_and_options_that_make_no_sense_are_refused() {
         (&["--threads", "0"], &["--threads", "from 1 to", "16 per core"]),
         (&["--threads", "1000000"], &["--threads", "from 1 to", "16 per core"]),
         (&["--reference", "image.exr"], &["image.exr"]),
+        (&["--reference", "nan.exr"], &["nan.exr: ", "not finite, in column 3 of row 5 from 0"]),
         (&["--frobnicate"], &["--frobnicate"]),
         (&["-o", "no/such/folder/out.exr"], &["no/such/folder/out.exr"]),
         (&["--report", "no/such/folder/report.json"], &["no/such/folder/report.json"]),

@@ -61,6 +61,10 @@ fn check_reference(image: &Image, rect: PixelRect) -> Result<(), RenderError> {
         format!("{} x {}", image.width, image.height)
     } else if !image.is_whole() {
         format!("{} in all", image.pixels.len())
+    } else if let Some(index) = image.pixels.iter().position(|pixel| !pixel.iter().all(|v| v.is_finite())) {
+        // All errors would be no number.
+        let (index, width) = (index as u64, u64::from(image.width));
+        format!("one that is not finite, in column {} of row {} from 0", index % width, index / width)
     } else {
         return Ok(());
     };

@@ -82,7 +82,7 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// Those of [`new`](Self::new); or the plan has techniques that the settings or the scene rule out, or
     /// exceeds the memory budget, or it or the stop rules have a value out of its range; or the reference is
-    /// of another size; or it was cancelled.
+    /// of another size, or not finite; or it was cancelled.
     pub fn start<S: Scene>(
         scene: &'a S,
         settings: CheckedSettings,

@@ -56,7 +56,8 @@ impl State {
         self.record.times.seconds()
     }
 
-    /// The error of what is on the film against a reference; not a number if it has another size.
+    /// The error of what is on the film against a reference; not a number if it has another size, or pixels
+    /// that are not finite.
     #[must_use]
     pub fn error_against(&self, reference: &Image) -> ErrorPoint {
         let image = self.film.image();
