@@ -25,7 +25,7 @@ pub(crate) struct Options {
     #[arg(short, long, value_name = "OUT.exr", value_parser = files::path(Images::named), value_hint = ValueHint::FilePath)]
     output: Option<Images>,
     /// Exposure of the PNG in stops, -20 to 20: without it, a relative error of 1 has the full colour
-    #[arg(long, value_name = "STOPS", value_parser = files::stops, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", value_parser = files::stops, default_value_t = 0.0, requires = "output", allow_negative_numbers = true)]
     exposure: f32,
 }
 

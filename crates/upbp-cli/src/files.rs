@@ -37,6 +37,11 @@ impl Images {
         Self { exr: Some(name.with_extension("exr")), png: name.with_extension("png") }
     }
 
+    /// Whether one of the files holds layers besides the picture.
+    pub(crate) const fn have_layers(&self) -> bool {
+        self.exr.is_some()
+    }
+
     /// The files, for checks.
     pub(crate) fn outputs(&self) -> impl Iterator<Item = Output<'_>> {
         let exr = self.exr.as_deref().map(|path| Output { role: "the image", path, content: Content::Exr });

@@ -34,7 +34,8 @@ enum Command {
     /// Check the scene and all options of a render, and render nothing
     ///
     /// Takes the options of `upbp render`, reads and checks all that they name, and says how the scene would
-    /// be rendered: a command line is checked by replacing one word.
+    /// be rendered: a command line is checked by replacing one word. Of the outputs it writes the plan and
+    /// the report.
     #[command(after_long_help = render::names())]
     Check(Box<render::Options>),
     /// Put slices of a render together

@@ -30,7 +30,11 @@ pub(crate) struct Options {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Image")]
+#[command(
+    next_help_heading = "Image",
+    mut_arg("exposure", |exposure| exposure.requires("output")),
+    mut_arg("tone", |tone| tone.requires("output"))
+)]
 struct ImageOptions {
     /// Image to write: OpenEXR, and a PNG of the same name beside it; or OUT.png, a PNG alone
     #[arg(short, long, value_name = "OUT.exr", value_parser = files::path(Images::named), value_hint = ValueHint::FilePath)]

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use upbp_core::{
     Canceller, CheckedSettings, Film, FrozenPlan, Image, OutputError, Preparing, RenderError, Renderer,
-    Start, State, StateError, Stop, StopReason, check_outputs, read_exr, read_text, remove_leftovers,
+    Report, Start, State, StateError, Stop, StopReason, check_outputs, read_exr, read_text, remove_leftovers,
     write_text,
 };
 use upbp_scene::{ReadyScene, SceneError};
@@ -60,16 +60,19 @@ fn explain_nothing(reason: StopReason, state: &State) {
     complain(&format!("note: nothing was rendered, since the state {has} already: {advice}"));
 }
 
-/// Does everything that comes before the first iteration: `upbp check`.
+/// Does everything that comes before the first iteration, and writes what is known then: `upbp check`.
 pub(crate) fn check(options: &Options) -> Result<(), Failure> {
     in_pool(options, || {
         let canceller = interrupt::install().map_err(Failure::input)?;
         let job = Job::read(options)?;
         let renderer = job.start(options, canceller, &Bar::on_stderr(true))?;
+        let (report, mut failures) = (renderer.report(), Vec::new());
+        write_texts(renderer.state(), &report, options, |written| failures.extend(written.err()));
+        Failure::all(&failures)?;
         if options.messages.quiet {
             return Ok(());
         }
-        let (support, plan) = (renderer.support(), renderer.report().plan);
+        let Report { support, plan, .. } = report;
         say(&format!("{}: no problems; {support}\nplan: {plan}", options.scene.display()))
     })
 }
@@ -99,6 +102,9 @@ impl Job {
         let inputs: Vec<_> = options.inputs().chain(files).collect();
         let outputs = options.outputs(&images);
         check_outputs(&outputs, &inputs).map_err(Failure::input)?;
+        if !options.messages.quiet {
+            options.explain_idle(&settings);
+        }
         let reference =
             options.messages.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
         let plan = options.method.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
@@ -176,6 +182,21 @@ fn read_state(path: &Path) -> Result<Option<State>, OutputError> {
     }
 }
 
+/// Writes the plan and the report, if they were asked for.
+fn write_texts(
+    state: &State,
+    report: &Report,
+    options: &Options,
+    mut attempt: impl FnMut(Result<(), OutputError>),
+) {
+    if let Some(path) = &options.method.save_plan {
+        attempt(write_text(path, &state.identity().frozen_plan().to_ron()));
+    }
+    if let Some(path) = &options.messages.report {
+        attempt(files::write_report(report, path));
+    }
+}
+
 /// Writes everything that was asked for, the state first. What fails does not keep the rest from being
 /// written.
 fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Failure> {
@@ -184,18 +205,13 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
     if let Some(path) = &options.saving.state {
         attempt(state.save(path));
     }
-    if let Some(path) = &options.method.save_plan {
-        attempt(write_text(path, &state.identity().frozen_plan().to_ron()));
-    }
     let (report, images) = (state.report(), options.images());
+    write_texts(state, &report, options, &mut attempt);
     // Before the first pixels there is no picture.
     let rendered = !state.film().is_empty();
     let mut hint = None;
     if rendered {
         hint = images.write_render(state, options.image.look.tones(), &mut attempt);
-    }
-    if let Some(path) = &options.messages.report {
-        attempt(files::write_report(&report, path));
     }
     Failure::all(&failures)?;
     // Whoever asked for a picture is not to take an older one for it.

@@ -8,7 +8,10 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use clap::{Args, ValueHint};
-use upbp_core::{Content, LightPaths, MAX_ITERATIONS, Output, Settings, Stop, Techniques, read_text};
+use upbp_core::{
+    Content, LightPaths, MAX_ITERATIONS, Output, Settings, Stop, Technique, TechniqueSet, Techniques,
+    read_text,
+};
 use upbp_scene::description::{Count, Crop};
 
 use crate::exit;
@@ -223,6 +226,30 @@ impl Options {
         ]
         .into_iter()
         .filter_map(|(role, path)| Some((role, path?)))
+    }
+
+    /// Says which options change nothing beside the others: no error, since scripts try sets of techniques.
+    pub(crate) fn explain_idle(&self, settings: &Settings) {
+        let techniques = settings.techniques.candidates();
+        let is_without = |what| format!("techniques `{techniques}` are without {what}");
+        let Method { light_paths, beams, fixed_radius, .. } = self.method;
+        let any = |has: fn(Technique) -> bool| techniques.iter().any(has);
+        let (has_light_paths, has_layers) =
+            (!techniques.without(TechniqueSet::PT).is_empty(), self.images().have_layers());
+        for (is_idle, option, reason) in [
+            (light_paths.is_some() && !has_light_paths, "--light-paths", is_without("light sub-paths")),
+            (beams.is_some() && !any(Technique::uses_beams), "--beams", is_without("photon beams")),
+            (fixed_radius && !any(Technique::merges), "--fixed-radius", is_without("kernels")),
+            (
+                settings.features && !has_layers && self.saving.state.is_none(),
+                "--features",
+                "no output holds them, but `-o OUT.exr` or `--state` would".to_owned(),
+            ),
+        ] {
+            if is_idle {
+                exit::complain(&format!("note: {option} has no effect: {reason}"));
+            }
+        }
     }
 
     /// The settings: those of the file, if any, overridden by the command line.

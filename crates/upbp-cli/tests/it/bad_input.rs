@@ -119,6 +119,37 @@ fn media_that_are_nowhere_or_never_end_are_told() {
 }
 
 #[test]
+fn options_without_effect_are_told() {
+    let folder = folder("notes_on_options");
+    fs::write(folder.join("scene.ron"), SMALL).expect("a writable folder");
+    let notes = |arguments: &[&str]| {
+        let all = [&["scene.ron", "--iterations", "1"], arguments].concat();
+        let output = program::command("check", &folder, &all).output().expect("the program runs");
+        let text = String::from_utf8(output.stderr).expect("UTF-8");
+        assert!(output.status.success(), "{text}");
+        text
+    };
+    for (option, value, idle, useful) in [
+        ("--light-paths", Some("64"), ["--techniques", "pt"], ["--techniques", "pt+lt"]),
+        ("--beams", Some("8"), ["--techniques", "bpt+surf+pb2d"], ["--techniques", "bb1d"]),
+        ("--fixed-radius", None, ["--techniques", "bpt"], ["--techniques", "bpt+surf"]),
+        ("--features", None, ["-o", "o.png"], ["-o", "o.exr"]),
+    ] {
+        let with = |others: &[&str]| notes(&[&[option], value.as_slice(), others].concat());
+        let text = with(&idle);
+        assert!(
+            text.starts_with(&format!("note: {option} has no effect: ")) && text.lines().count() == 1,
+            "{text}"
+        );
+        assert_eq!(with(&[&idle[..], &["--quiet"]].concat()), "", "{option}");
+        assert_eq!(with(&useful), "", "{option}");
+        assert_eq!(with(&[]), "", "{option}");
+        assert_eq!(notes(&idle), "", "{idle:?}");
+    }
+    assert_eq!(notes(&["--features", "-o", "o.png", "--state", "a.state"]), "");
+}
+
+#[test]
 fn scenes_that_cannot_be_rendered_are_refused_by_place() {
     let folder = folder("scenes");
     let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("a writable folder");

@@ -180,6 +180,8 @@ fn an_output_that_would_destroy_a_file_is_refused() {
         (&["--state", "scene.ron"], &["--state", ".state"]),
         (&["--state", "new", "--report", "new"], &["the state", "the report", "new"]),
         (&["-o", "o.tif"], &["o.tif", ".exr", ".png"]),
+        (&["--exposure", "1"], &["--output"]),
+        (&["--tone", "filmic", "--state", "new"], &["--output"]),
     ];
     for (arguments, words) in cases {
         refused("merge", &folder, &[&["a.state", "b.state"], *arguments].concat(), words, &before);
@@ -190,6 +192,7 @@ fn an_output_that_would_destroy_a_file_is_refused() {
         (&["-o", "kept.exr"], &["kept.exr", "read-only"]),
         (&["-o", "o.tif"], &["o.tif", ".exr", ".png"]),
         (&["-o", "none/o.exr"], &["none/o.exr"]),
+        (&["--exposure", "1"], &["--output"]),
     ];
     for (arguments, words) in cases {
         refused("compare", &folder, &[&["ref.exr", "sky.png"], *arguments].concat(), words, &before);
@@ -208,6 +211,27 @@ fn a_name_that_ends_in_png_makes_a_png_alone() {
         fs::remove_file(image).expect("a file");
         assert!(snapshot(&folder) == before, "{program}: nothing else is written");
     }
+}
+
+/// What is known before the first iteration.
+#[test]
+fn a_check_writes_the_plan_and_the_report() {
+    let folder = prepared("check");
+    let before = snapshot(&folder);
+    let outputs = ["--save-plan", "new.ron", "--report", "new.json", "--state", "new.state", "-o", "new.exr"];
+    let run = |program, more: &[&str]| {
+        let (code, text) = run(program, &folder, &[&["scene.ron", "--iterations", "0..1"], more].concat());
+        assert_eq!(code, Some(0), "{text}");
+    };
+    run("check", &outputs);
+    let mut after = snapshot(&folder);
+    let mut written = |name: &str| after.remove(&folder.join(name)).unwrap_or_else(|| panic!("no {name}"));
+    let plan = written("new.ron");
+    let report: serde_json::Value = serde_json::from_slice(&written("new.json")).expect("JSON");
+    assert_eq!(report["iterations"], 0);
+    assert!(after == before, "nothing else is written");
+    run("render", &outputs);
+    assert!(fs::read(folder.join("new.ron")).expect("the plan") == plan, "a render chooses the same");
 }
 
 #[test]
@@ -350,13 +374,11 @@ fn read<'a>(program: &str, words: &'a [Words]) -> Vec<&'a str> {
 /// The files that a command which has ended well has written, with their kinds.
 fn written(command: &str, words: &[Words]) -> Vec<(PathBuf, &'static str)> {
     let mut files = Vec::new();
-    if command == "check" {
-        return files;
-    }
     for option in words {
         let &[name, file] = &option[..] else { continue };
         let file = PathBuf::from(file);
         match name {
+            "-o" | "--state" if command == "check" => {}
             "-o" => {
                 files.push((file.with_extension("png"), "png"));
                 if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) {
