@@ -16,7 +16,7 @@ fn page() -> String {
         "# The program `upbp`\n\n\
          <!-- Written from the options: `UPDATE=1 cargo test -p upbp-cli help_page`. -->\n\n\
          {}.\n\n\
-         ```sh\ncargo install --path crates/upbp-cli\n```\n\n\
+         ```sh\ncargo install --locked --path crates/upbp-cli\n```\n\n\
          | command | |\n|---|---|\n",
         text(program.get_about())
     );
