@@ -48,6 +48,30 @@ impl Section {
     fn names(&self) -> impl Iterator<Item = u32> {
         self.groups.iter().copied().chain(self.object).chain(self.material)
     }
+
+    /// Whether a statement of this kind gives the triangles this name.
+    fn has(&self, statement: &str, name: u32) -> bool {
+        match statement {
+            "o" => self.object == Some(name),
+            "g" => self.groups.contains(&name),
+            _ => self.material == Some(name),
+        }
+    }
+}
+
+/// The statements that give triangles a name, and what they name.
+const STATEMENTS: [(&str, &str); 3] = [("o", "an object"), ("g", "a group"), ("usemtl", "a material")];
+
+/// The reason for which a name does not tell triangles of an OBJ file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PartError {
+    /// No triangles have it.
+    #[error("no triangles have this name")]
+    Unknown,
+    /// It is that of things of several kinds, with different triangles.
+    #[error("{0}")]
+    SeveralKinds(String),
 }
 
 /// The first error of an OBJ file.
@@ -151,15 +175,42 @@ impl ObjFile {
         self.mesh_of(self.triangles.iter())
     }
 
-    /// The mesh of the triangles whose object, material or one of whose groups has this name; `None` if there
-    /// are none.
-    #[must_use]
-    pub fn part(&self, name: &str) -> Option<ObjMesh> {
-        let number = *self.names.get(name)?;
-        let named = self.named_ranges().filter(|(section, _)| section.names().any(|name| name == number));
-        let triangles = named.flat_map(|(_, range)| &self.triangles[range]);
-        triangles.clone().next()?;
-        Some(self.mesh_of(triangles))
+    /// The mesh of the triangles whose object, material or one of whose groups has this name. A statement as
+    /// in the file, such as `usemtl glass`, tells a material from an object of the same name.
+    ///
+    /// # Errors
+    ///
+    /// If no triangles have this name; or if an object, a group or a material have it, and not the same
+    /// triangles.
+    pub fn part(&self, name: &str) -> Result<ObjMesh, PartError> {
+        let of = |statement: &str, name: &str| -> Vec<_> {
+            let number = self.names.get(name);
+            let named = |section: &Section| number.is_some_and(|number| section.has(statement, *number));
+            self.named_ranges().filter(|(section, _)| named(section)).map(|(_, range)| range).collect()
+        };
+        let mut found = STATEMENTS.map(|(statement, what)| (statement, what, of(statement, name))).to_vec();
+        found.retain(|(_, _, ranges)| !ranges.is_empty());
+        if let [(_, _, first), others @ ..] = &found[..]
+            && others.iter().any(|(_, _, ranges)| ranges != first)
+        {
+            let whats: Vec<&str> = found.iter().map(|(_, what, _)| *what).collect();
+            let lines: Vec<String> =
+                found.iter().map(|(statement, ..)| format!("`part: \"{statement} {name}\"`")).collect();
+            return Err(PartError::SeveralKinds(format!(
+                "`{name}` is the name of {} with different triangles: {}, the line as in the file, tells which",
+                whats.join(" and "),
+                lines.join(" or ")
+            )));
+        }
+        let statement = || {
+            let (statement, name) = name.split_once(char::is_whitespace)?;
+            STATEMENTS.iter().find(|(known, _)| *known == statement).map(|_| of(statement, name.trim()))
+        };
+        let ranges = found.pop().map(|(_, _, ranges)| ranges).or_else(statement).unwrap_or_default();
+        if ranges.is_empty() {
+            return Err(PartError::Unknown);
+        }
+        Ok(self.mesh_of(ranges.iter().flat_map(|range| &self.triangles[range.clone()])))
     }
 
     /// Sections with the numbers of their triangles.
@@ -388,7 +439,7 @@ mod tests {
         assert_eq!(file.parts().collect::<Vec<_>>(), ["base", "clear", "stem", "wine", "wine glass"]);
         assert_eq!((file.material_count(), file.mesh().indices.len()), (1, 4));
         let corners = |part: &str| {
-            let ObjMesh { positions, indices, .. } = file.part(part)?;
+            let ObjMesh { positions, indices, .. } = file.part(part).ok()?;
             let places = indices.iter().flatten().map(|corner| positions[*corner as usize]);
             let places = places.map(|place| file.positions.iter().position(|p| *p == place).unwrap() + 1);
             Some((positions.len(), places.collect::<Vec<_>>()))
@@ -402,6 +453,27 @@ mod tests {
         }
         let text = "v 0 0 0\nusemtl Mat#1 # one\nf 1 1 1\nusemtl Mat#2\t\nf 1 1 1\ng #\nf 1 1 1";
         assert_eq!(ObjFile::parse(text).unwrap().parts().collect::<Vec<_>>(), ["Mat#1", "Mat#2"]);
+    }
+
+    #[test]
+    fn names_of_objects_and_materials_with_different_triangles_are_told_apart() {
+        let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\no Glass\nusemtl Glass\nf 1 2 3\no Carafe\nf 2 3 4\n\
+                    o Mug\nusemtl Mug\ng Mug\nf 3 4 1\n";
+        let file = ObjFile::parse(text).unwrap();
+        let count = |part: &str| file.part(part).map(|mesh| mesh.indices.len());
+        let message = "`Glass` is the name of an object and a material with different triangles: \
+                       `part: \"o Glass\"` or `part: \"usemtl Glass\"`, the line as in the file, tells which";
+        assert_eq!(count("Glass").unwrap_err().to_string(), message);
+        assert_eq!((count("o Glass"), count("usemtl\t Glass ")), (Ok(1), Ok(2)));
+        for same in ["Mug", "o Mug", "g Mug", "usemtl Mug", "o Carafe"] {
+            assert_eq!(count(same), Ok(1), "{same}");
+        }
+        for none in ["g Glass", "usemtl Carafe", "f 1 2 3", "o", "o "] {
+            assert_eq!(count(none), Err(PartError::Unknown), "{none}");
+        }
+        // An object that is really called so.
+        let file = ObjFile::parse(&(text.to_owned() + "o usemtl Glass\nf 1 2 4\nf 1 2 4\nf 1 2 4")).unwrap();
+        assert_eq!(file.part("usemtl Glass").unwrap().indices.len(), 3);
     }
 
     #[test]

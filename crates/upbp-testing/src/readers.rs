@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use upbp_core::{LightPaths, Settings, State, StateError};
-use upbp_scene::obj::ObjFile;
+use upbp_scene::obj::{ObjFile, PartError};
 use upbp_scene::{ReadyScene, SceneDescription};
 
 /// Settings for a little of a render.
@@ -46,7 +46,7 @@ pub fn read_settings(text: &str) {
 pub fn read_mesh(text: &str) {
     if let Ok(file) = ObjFile::parse(text) {
         let parts: Vec<_> = file.parts().collect();
-        assert!(parts.iter().all(|part| file.part(part).is_some()), "{parts:?}");
+        assert!(parts.iter().all(|part| file.part(part) != Err(PartError::Unknown)), "{parts:?}");
         let mesh = file.mesh();
         let _ = upbp_accel::TriangleMesh::new(mesh.positions, mesh.indices, mesh.normals);
     }

@@ -12,7 +12,7 @@ use crate::description::{self, Geometry, Vector};
 use crate::material::{
     Conductor, Dielectric, Lambert, Material, MetalFresnel, Mirror, Phong, RoughDielectric, TrowbridgeReitz,
 };
-use crate::obj::{ObjFile, ObjMesh};
+use crate::obj::{ObjFile, ObjMesh, PartError};
 
 /// The largest mesh file that is read, in bytes.
 const MAX_FILE: u64 = 1 << 30;
@@ -246,7 +246,10 @@ impl Builder<'_> {
                 self.note(format!("mesh `{file}`"), message);
             }
             let mesh = match part {
-                Some(part) => read.part(part).ok_or_else(|| unknown("part", part, read.parts())),
+                Some(part) => read.part(part).map_err(|error| match error {
+                    PartError::Unknown => unknown("part", part, read.parts()),
+                    error @ PartError::SeveralKinds(_) => error.to_string(),
+                }),
                 None => Ok(read.mesh()),
             };
             drop(read);

@@ -63,7 +63,8 @@ pub enum Geometry {
         /// Path of a Wavefront OBJ file, relative to the scene file.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
-        /// Of the file those triangles only that belong to an object, a group or a material of this name.
+        /// Of the file those triangles only that belong to an object, a group or a material of this name, or
+        /// to that of a statement of the file, such as `usemtl glass`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         part: Option<String>,
         /// Corners.
