@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use upbp_core::open_file;
-use upbp_media::MediumId;
+use upbp_media::{MediumId, PhaseFunction};
 
 use super::surfaces::MeshFiles;
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::Problem;
+use crate::light::EnvironmentImage;
 
 /// A description on its way to a scene, with the problems that were found.
 pub(super) struct Builder<'a> {
@@ -23,6 +25,10 @@ pub(super) struct Builder<'a> {
     /// The files that were read.
     pub(super) files: Vec<PathBuf>,
     pub(super) meshes: MeshFiles,
+    /// Images, or why there are none, by file: each is read once.
+    pub(super) images: BTreeMap<String, Result<Arc<EnvironmentImage>, String>>,
+    /// Phase functions of tables, or why there are none, by file.
+    pub(super) tables: BTreeMap<String, Result<PhaseFunction, String>>,
 }
 
 impl Builder<'_> {

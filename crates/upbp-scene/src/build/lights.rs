@@ -102,12 +102,25 @@ impl Builder<'_> {
             Description::Image { file, scale, rotation_degrees } => {
                 let image = self.environment_image(file)?;
                 let rotation = rotation_degrees.get().to_radians();
-                Light::Image(ImageEnvironment::new(Arc::new(image), scale.get(), rotation))
+                Light::Image(ImageEnvironment::new(image, scale.get(), rotation))
             }
         })
     }
 
-    fn environment_image(&mut self, file: &str) -> Result<EnvironmentImage, String> {
+    /// The image in a file; the file is read once.
+    fn environment_image(&mut self, file: &str) -> Result<Arc<EnvironmentImage>, String> {
+        if let Some(known) = self.images.get(file) {
+            return known.clone();
+        }
+        let image = self.read_image(file).map(Arc::new);
+        if let Ok(image) = &image {
+            self.note_image(file, image);
+        }
+        self.images.insert(file.to_owned(), image.clone());
+        image
+    }
+
+    fn read_image(&mut self, file: &str) -> Result<EnvironmentImage, String> {
         let path = self.path(file);
         let describe = |error: crate::light::EnvironmentImageError| {
             // The reason is part of the message: a list of problems has no sources.

@@ -69,8 +69,14 @@ impl Builder<'_> {
     }
 
     fn phase_table(&mut self, file: &str) -> Result<PhaseFunction, String> {
+        if let Some(known) = self.tables.get(file) {
+            return known.clone();
+        }
         let path = self.path(file);
         let bytes = self.open(&path, phase_table::MAX_FILE).map_err(|error| error.to_string());
-        bytes.and_then(phase_table::read).map_err(|error| format!("table `{}`: {error}", path.display()))
+        let table = bytes.and_then(phase_table::read);
+        let table = table.map_err(|error| format!("table `{}`: {error}", path.display()));
+        self.tables.insert(file.to_owned(), table.clone());
+        table
     }
 }

@@ -86,6 +86,8 @@ impl ReadyScene {
             hash: Fnv1a(description.hash()),
             files: Vec::new(),
             meshes: MeshFiles::of(description),
+            images: BTreeMap::new(),
+            tables: BTreeMap::new(),
         };
         let scene = builder.build();
         match scene {

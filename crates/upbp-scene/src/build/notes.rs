@@ -9,6 +9,7 @@ use super::builder::Builder;
 use super::rooms::Places;
 use crate::description::{Geometry, Medium};
 use crate::error::Problem;
+use crate::light::EnvironmentImage;
 
 impl Builder<'_> {
     /// Notes something about a part of the scene.
@@ -34,6 +35,31 @@ impl Builder<'_> {
                 format!("medium `{name}`"),
                 "scatters around everything without absorbing: iterations are long, and with a little `sigma_a` \
                  in each channel much shorter",
+            );
+        }
+    }
+
+    /// Notes an image that may not be meant for all directions, and what in it is not as bright as it was.
+    pub(super) fn note_image(&mut self, file: &str, image: &EnvironmentImage) {
+        let (width, height) = image.size();
+        if width != 2 * height {
+            self.note(
+                format!("image `{file}`"),
+                format!(
+                    "has {width} x {height} pixels and is stretched over all directions: latitude-longitude images \
+                     are twice as wide as high"
+                ),
+            );
+        }
+        if image.infinite_pixels() > 0 {
+            let count = image.infinite_pixels();
+            let (pixels, are) = if count == 1 { ("pixel", "is") } else { ("pixels", "are") };
+            self.note(
+                format!("image `{file}`"),
+                format!(
+                    "{count} {pixels} {are} infinite, as bright ones are in half precision, and count as the largest \
+                     finite value of each channel"
+                ),
             );
         }
     }

@@ -51,6 +51,9 @@ pub enum EnvironmentImageError {
         /// Rows of the whole picture.
         of_height: usize,
     },
+    /// The pixels are the six sides of a cube.
+    #[error("shows the six sides of a cube, expected a latitude-longitude image: convert it")]
+    Cube,
     /// No pixels, or not as many as the size says.
     #[error("has {pixels} pixels for {width} x {height}, expected all of them, at least 1")]
     Size {
@@ -90,6 +93,8 @@ pub struct EnvironmentImage {
     total_luminance: f64,
     /// `∫ mean of the channels dω` over all directions.
     total_mean: f64,
+    /// The number of pixels that were infinite in a channel.
+    infinite_pixels: usize,
 }
 
 impl EnvironmentImage {
@@ -129,11 +134,14 @@ impl EnvironmentImage {
             return Err(EnvironmentImageError::Black);
         }
         let rows = rows.into_iter().map(|sum| (sum / total_luminance) as f32).collect();
-        Ok(Self { width, height, pixels, rows, columns, total_luminance, total_mean })
+        let infinite_pixels = 0;
+        Ok(Self { width, height, pixels, rows, columns, total_luminance, total_mean, infinite_pixels })
     }
 
-    /// Reads an `OpenEXR` file: the first layer with channels R, G and B. Values below zero count as zero.
+    /// Reads an `OpenEXR` file: the first layer with channels R, G and B. Values below zero count as zero,
+    /// and infinite ones as the largest finite value of their channel.
     pub fn load(path: &Path) -> Result<Self, EnvironmentImageError> {
+        use exr::meta::attribute::EnvironmentMap;
         use exr::prelude::{ReadChannels, ReadLayers, read};
         struct Pixels {
             width: usize,
@@ -165,14 +173,25 @@ impl EnvironmentImage {
             .from_buffered(file)
             .map_err(unreadable)?;
         let whole = image.attributes.display_window;
+        if image.layer_data.attributes.environment_map == Some(EnvironmentMap::Cube) {
+            return Err(EnvironmentImageError::Cube);
+        }
         let position = image.layer_data.attributes.layer_position;
-        let pixels = image.layer_data.channel_data.pixels;
+        let mut pixels = image.layer_data.channel_data.pixels;
         let (width, height) = (pixels.width, pixels.height);
         let (of_width, of_height) = (whole.size.width(), whole.size.height());
         if (position, width, height) != (whole.position, of_width, of_height) {
             return Err(EnvironmentImageError::Part { width, height, of_width, of_height });
         }
-        Self::new(pixels.width, pixels.height, pixels.values)
+        let infinite_pixels = limit_infinite(&mut pixels.values);
+        let image = Self::new(pixels.width, pixels.height, pixels.values)?;
+        Ok(Self { infinite_pixels, ..image })
+    }
+
+    /// The number of pixels of a file that were infinite in a channel, as the sun is in half precision.
+    #[must_use]
+    pub const fn infinite_pixels(&self) -> usize {
+        self.infinite_pixels
     }
 
     /// A fingerprint, equal for equal pixels.
@@ -247,6 +266,27 @@ impl EnvironmentImage {
         let row = &self.columns[y * self.width..(y + 1) * self.width];
         [between(&self.rows, y, v), between(row, x, u)]
     }
+}
+
+/// Puts the largest finite value of each channel, if there is any, in place of infinite ones; returns how
+/// many pixels had one.
+fn limit_infinite(pixels: &mut [Spectrum]) -> usize {
+    let is_infinite = |value: &f32| *value == f32::INFINITY;
+    let count = pixels.iter().filter(|pixel| pixel.to_array().iter().any(is_infinite)).count();
+    if count > 0 {
+        let largest = [0, 1, 2].map(|channel| {
+            let finite = pixels.iter().map(|pixel| pixel[channel]).filter(|value| value.is_finite());
+            finite.reduce(f32::max).unwrap_or(f32::INFINITY)
+        });
+        for pixel in pixels {
+            let [r, g, b] = pixel.to_array();
+            let limited = |value: f32, channel: usize| {
+                if is_infinite(&value) { largest[channel] } else { value }
+            };
+            *pixel = Spectrum::new(limited(r, 0), limited(g, 1), limited(b, 2));
+        }
+    }
+    count
 }
 
 /// Polar angle of the upper edge of row `y`.

@@ -356,9 +356,55 @@ fn what_is_below_zero_in_an_image_is_no_light() {
         image.map(|image| image.lookup(Vec3::NEG_Z).0).map_err(|error| error.to_string())
     };
     assert_eq!(load(-0.25), Ok(Spectrum::new(0.0, 1.0, 0.5)));
-    for bad in [f32::NEG_INFINITY, f32::NAN] {
+    // In all pixels there is no finite value to take.
+    for bad in [f32::NEG_INFINITY, f32::NAN, f32::INFINITY] {
         assert!(load(bad).unwrap_err().contains("expected finite values of at least zero"), "{bad}");
     }
+}
+
+#[test]
+fn infinite_pixels_of_an_image_count_as_its_largest_value() {
+    let path = std::env::temp_dir().join(format!("upbp-scene-infinite-{}.exr", std::process::id()));
+    let load = |last: f32| {
+        let red = move |x: usize| if x == 1 { last } else { x as f32 };
+        exr::prelude::write_rgb_file(&path, 4, 1, |x, _| (red(x), 0.5_f32, last)).unwrap();
+        let image = EnvironmentImage::load(&path);
+        std::fs::remove_file(&path).unwrap();
+        image
+    };
+    assert!(load(f32::INFINITY).is_err(), "no finite blue");
+    assert_eq!(load(7.0).unwrap().infinite_pixels(), 0);
+    exr::prelude::write_rgb_file(&path, 4, 1, |x, _| {
+        let sun = if x == 1 { f32::INFINITY } else { x as f32 };
+        (sun, 0.5_f32, sun)
+    })
+    .unwrap();
+    let image = EnvironmentImage::load(&path);
+    std::fs::remove_file(&path).unwrap();
+    let image = image.unwrap();
+    assert_eq!(image.infinite_pixels(), 1);
+    // The second of four pixels ends where the middle is.
+    let sun = image.lookup(Vec3::new(-0.1, 0.0, -1.0).normalize()).0;
+    assert_eq!(sun, Spectrum::new(3.0, 0.5, 3.0));
+}
+
+#[test]
+fn the_sides_of_a_cube_are_no_sky() {
+    use exr::meta::attribute::EnvironmentMap;
+    use exr::prelude::*;
+    let path = std::env::temp_dir().join(format!("upbp-scene-cube-{}.exr", std::process::id()));
+    let message = |kind: EnvironmentMap| {
+        let channels = SpecificChannels::rgb(|_| (1.0_f32, 1.0_f32, 1.0_f32));
+        let attributes = LayerAttributes { environment_map: Some(kind), ..LayerAttributes::default() };
+        let layer = Layer::new((2, 12), attributes, Encoding::FAST_LOSSLESS, channels);
+        exr::image::Image::from_layer(layer).write().to_file(&path).unwrap();
+        let image = EnvironmentImage::load(&path);
+        std::fs::remove_file(&path).unwrap();
+        image.err().map(|error| error.to_string())
+    };
+    let expected = "shows the six sides of a cube, expected a latitude-longitude image: convert it";
+    assert_eq!(message(EnvironmentMap::Cube).as_deref(), Some(expected));
+    assert_eq!(message(EnvironmentMap::LatitudeLongitude), None);
 }
 
 #[test]

@@ -6,4 +6,5 @@ mod mesh_files;
 mod placement;
 mod rooms;
 mod shipped_scenes;
+mod skies;
 mod vessels;
