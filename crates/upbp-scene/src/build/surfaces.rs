@@ -21,6 +21,9 @@ const MAX_FILE: u64 = 1 << 30;
 /// rays find triangles of their own somewhat faster.
 const COPIED_FROM: u32 = 4096;
 
+/// Triangles of all copies of a mesh together beyond which shapes share them however few it has.
+const MOST_OF_COPIES: usize = 1 << 20;
+
 /// Boundary and emission of a shape, checked by themselves, but not yet against other shapes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfaceDraft {
@@ -212,7 +215,9 @@ impl Builder<'_> {
                 let linear = rotation.unwrap_or(Mat3::IDENTITY) * scale;
                 let to_scene = Affine3A::from_mat3_translation(linear, translate);
                 let copies = file.as_deref().map_or(1, |file| self.meshes.copies(file, part.as_deref()));
-                let is_copy = copies > 1 && mesh.triangle_count() >= COPIED_FROM;
+                let count = mesh.triangle_count();
+                let of_copies = copies.saturating_mul(count as usize);
+                let is_copy = copies > 1 && (count >= COPIED_FROM || of_copies > MOST_OF_COPIES);
                 let mesh = match (is_copy, in_place) {
                     (true, _) => mesh.placed(&to_scene),
                     (false, true) => Ok(mesh),

@@ -107,6 +107,26 @@ fn shapes_that_share_a_mesh_file_are_what_they_are_with_files_of_their_own() {
 }
 
 #[test]
+fn small_mesh_files_are_shared_if_there_are_very_many_copies() {
+    let folder = std::env::temp_dir().join(format!("upbp many copies {}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let ball = dented_ball(32);
+    let triangles = ball.lines().filter(|line| line.starts_with('f')).count() * 2;
+    fs::write(folder.join("ball.obj"), ball).unwrap();
+    let is_shared = |copies: usize| {
+        let shape =
+            |i| format!("(geometry: Mesh(file: \"ball.obj\", translate: ({i}, 0, 0)), material: \"white\"),");
+        let scene = scene(&folder, &(0..copies).map(shape).collect::<String>());
+        format!("{:?}", scene.geometry().shapes()[copies - 1]).contains("placement: Some")
+    };
+    assert!(triangles < 4096, "{triangles}");
+    // Both ends of the rings are points: there are fewer triangles with an area.
+    let with_area = triangles - 64;
+    assert!(!is_shared(16) && is_shared((1 << 20) / with_area + 1));
+    fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
 fn rotations_go_counter_clockwise_about_their_axis_in_turn() {
     let triangle = |rest: &str| {
         let shape = format!(
