@@ -1,6 +1,7 @@
 //! Shapes with their materials.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::rc::Rc;
 
 use glam::{Affine3A, DMat3, DVec3, Mat3, Vec3};
@@ -272,7 +273,15 @@ impl Builder<'_> {
             return read.clone();
         }
         let path = self.path(file);
-        let describe = |error: &dyn std::fmt::Display| format!("mesh `{}`: {error}", path.display());
+        let describe = |error: &dyn std::fmt::Display| {
+            let path = path.display();
+            match other_format(file) {
+                Some(format) => format!(
+                    "mesh `{path}`: meshes are Wavefront OBJ files, not {format}: export it as OBJ, with normals"
+                ),
+                None => format!("mesh `{path}`: {error}"),
+            }
+        };
         let read = match self.open(&path, MAX_FILE) {
             Ok(bytes) => ObjFile::read(bytes).map(Rc::new).map_err(|error| describe(&error)),
             Err(error) => Err(describe(&error)),
@@ -317,6 +326,13 @@ impl MeshFiles {
         let from = self.uses.range((file.to_owned(), None)..);
         from.take_while(|((other, _), _)| other == file).count()
     }
+}
+
+/// The format that the ending of a file tells, if meshes in it are not read.
+fn other_format(file: &str) -> Option<&'static str> {
+    const OTHERS: [&str; 10] = ["PLY", "STL", "glTF", "GLB", "FBX", "DAE", "3DS", "USD", "ABC", "BLEND"];
+    let ending = Path::new(file).extension()?.to_str()?;
+    OTHERS.into_iter().find(|format| format.eq_ignore_ascii_case(ending))
 }
 
 /// All rotations of a list together; `None` if there are none.

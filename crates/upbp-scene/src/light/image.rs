@@ -8,11 +8,12 @@
 //! Oracle: `tests::the_density_of_an_image_integrates_to_one`.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
+use std::io::Read as _;
 use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec3;
-use upbp_core::open_exr;
+use upbp_core::{open_exr, open_file};
 use upbp_estimators::scene::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
 };
@@ -31,6 +32,9 @@ pub enum EnvironmentImageError {
     /// The file is no readable `OpenEXR` image with channels R, G and B.
     #[error("cannot be read as an OpenEXR image with channels R, G, B")]
     Unreadable(#[source] exr::error::Error),
+    /// The file is a picture in the Radiance format.
+    #[error("is a Radiance picture, and skies are OpenEXR images: convert it to .exr first")]
+    Radiance,
     /// More pixels than an environment may have.
     #[error("has {width} x {height} pixels, expected at most {MAX_PIXELS} in all")]
     TooLarge {
@@ -148,7 +152,13 @@ impl EnvironmentImage {
             height: usize,
             values: Vec<Spectrum>,
         }
-        let unreadable = EnvironmentImageError::Unreadable;
+        let unreadable = |error| {
+            if is_radiance(path) {
+                EnvironmentImageError::Radiance
+            } else {
+                EnvironmentImageError::Unreadable(error)
+            }
+        };
         let file = open_exr(path).map_err(|error| unreadable(error.into()))?;
         let image = read()
             .no_deep_data()
@@ -266,6 +276,14 @@ impl EnvironmentImage {
         let row = &self.columns[y * self.width..(y + 1) * self.width];
         [between(&self.rows, y, v), between(row, x, u)]
     }
+}
+
+/// Whether a file begins as pictures of the Radiance format do, or is named so.
+fn is_radiance(path: &Path) -> bool {
+    let mut first = [0; 6];
+    let read = open_file(path, u64::MAX).and_then(|mut file| file.read_exact(&mut first));
+    let begins = read.is_ok() && (first == *b"#?RADI" || first == *b"#?RGBE");
+    begins || path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("hdr"))
 }
 
 /// Puts the largest finite value of each channel, if there is any, in place of infinite ones; returns how

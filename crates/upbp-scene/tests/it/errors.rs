@@ -501,6 +501,44 @@ fn meshes_that_are_none_are_refused_by_line() {
 }
 
 #[test]
+fn files_of_other_formats_are_told_from_broken_ones() {
+    let mesh = |name: &str| {
+        problem(&format!(
+            "{MATERIALS} {LIGHT} shapes: [(geometry: Mesh(file: \"{name}\"), material: \"white\")]"
+        ))
+    };
+    for (name, format) in [
+        ("bunny.ply", "PLY"),
+        ("bunny.STL", "STL"),
+        ("bunny.gltf", "glTF"),
+        ("bunny.glb", "GLB"),
+        ("bunny.fbx", "FBX"),
+    ] {
+        let expected = format!(
+            "shape 1: mesh `no_such_folder/{name}`: meshes are Wavefront OBJ files, not {format}: export it as \
+             OBJ, with normals"
+        );
+        assert_eq!(mesh(name), expected);
+    }
+    assert!(!mesh("bunny.ply.obj").contains("Wavefront"));
+
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("formats-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let image = |name: &str, bytes: &[u8]| {
+        std::fs::write(folder.join(name), bytes).unwrap();
+        let text = format!("(version: 1, {CAMERA} lights: [Image(file: \"{name}\")])");
+        let Err(error) = ReadyScene::from_ron_str(&text, &folder) else { panic!("a sky: {name}") };
+        error
+            .to_string()
+            .contains("is a Radiance picture, and skies are OpenEXR images: convert it to .exr first")
+    };
+    assert!(image("sky.hdr", b"") && image("sky.HDR", b"#?RADIANCE\n"));
+    assert!(image("sky.exr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n") && image("sky.pic", b"#?RGBE\n"));
+    assert!(!image("sky.png", b"\x89PNG\r\n\x1a\n") && !image("short.exr", b"#?"));
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
 fn files_are_named() {
     let error = ReadyScene::load("no_such_folder/no_such_scene.ron").unwrap_err();
     assert!(matches!(error, SceneError::Read { .. }));
