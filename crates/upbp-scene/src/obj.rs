@@ -33,6 +33,8 @@ pub struct ObjFile {
     sections: Vec<Section>,
     /// The number of each name.
     names: BTreeMap<String, u32>,
+    /// Whether some faces are in a smoothing group (`s`).
+    has_smoothing_groups: bool,
 }
 
 /// Triangles one after the other that have the same names.
@@ -100,10 +102,9 @@ const MAX_TRIANGLES: usize = if cfg!(test) { 1 << 12 } else { 1 << 25 };
 const MAX_NAMES: usize = if cfg!(test) { 1 << 8 } else { 1 << 20 };
 
 /// Statements that do not change the surface, which are skipped.
-const SKIPPED: [&str; 17] = [
+const SKIPPED: [&str; 16] = [
     "vt",
     "vp",
-    "s",
     "mg",
     "mtllib",
     "usemap",
@@ -167,6 +168,12 @@ impl ObjFile {
     #[must_use]
     pub fn material_count(&self) -> usize {
         self.named_ranges().filter_map(|(section, _)| section.material).collect::<BTreeSet<_>>().len()
+    }
+
+    /// Whether faces are meant to look smooth, in smoothing groups, and the file has no normals for it.
+    #[must_use]
+    pub fn lacks_normals(&self) -> bool {
+        self.has_smoothing_groups && self.normals.is_empty()
     }
 
     /// The mesh of all triangles.
@@ -244,6 +251,7 @@ impl ObjFile {
                 self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|place| corners[place])));
             }
             Some(kind @ ("o" | "g" | "usemtl")) => self.begin(kind, &line[kind.len()..])?,
+            Some("s") => self.has_smoothing_groups |= words.next().is_some_and(|s| s != "off" && s != "0"),
             Some(word) if !SKIPPED.contains(&word) => {
                 return Err(format!(
                     "expected a statement about polygons, such as `v` or `f`, found `{}`",
@@ -474,6 +482,14 @@ mod tests {
         // An object that is really called so.
         let file = ObjFile::parse(&(text.to_owned() + "o usemtl Glass\nf 1 2 4\nf 1 2 4\nf 1 2 4")).unwrap();
         assert_eq!(file.part("usemtl Glass").unwrap().indices.len(), 3);
+    }
+
+    #[test]
+    fn smoothing_groups_without_normals_are_found() {
+        let lacks =
+            |begin: &str| ObjFile::parse(&(begin.to_owned() + "\nv 0 0 0\nf 1 1 1")).unwrap().lacks_normals();
+        assert!(lacks("s 1") && lacks("s on") && lacks("s 2\ns off"));
+        assert!(!lacks("") && !lacks("s") && !lacks("s off") && !lacks("s 0") && !lacks("vn 0 0 1\ns 1"));
     }
 
     #[test]

@@ -87,7 +87,7 @@ impl ReadyScene {
     }
 
     /// Notes about parts of the scene that can be rendered, but may not be meant: a medium that is nowhere, a
-    /// mesh whose parts overlap, an image that is not twice as wide as high.
+    /// priority of an opaque shape, a mesh whose parts overlap, an image that is not twice as wide as high.
     #[must_use]
     pub fn notes(&self) -> &[Problem] {
         &self.notes

@@ -129,6 +129,7 @@ impl Builder<'_> {
         self.check_bodies_count(&rooms, places);
         self.check_lamps_are_free(&rooms, places);
         self.note_media();
+        self.note_without_effect(&drafts);
         self.note_parts(places, origin);
         let bodies = bodies::rank(&drafts, &geometry).map_err(|error| self.problem("shapes", error)).ok()?;
         let largest_corner = extent::largest_corner(geometry.shapes(), &drafts);

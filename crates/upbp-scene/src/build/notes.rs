@@ -7,7 +7,8 @@ use upbp_accel::{Shape, ShapeId, offset_origin};
 
 use super::builder::Builder;
 use super::rooms::Places;
-use crate::description::{Geometry, Medium};
+use super::surfaces::{BoundaryDraft, SurfaceDraft};
+use crate::description::{Camera, Geometry, Medium};
 use crate::error::Problem;
 use crate::light::EnvironmentImage;
 
@@ -15,6 +16,44 @@ impl Builder<'_> {
     /// Notes something about a part of the scene.
     pub(super) fn note(&mut self, item: impl Into<String>, message: impl Into<String>) {
         self.notes.push(Problem { item: item.into(), message: message.into() });
+    }
+
+    /// Notes something that may have been noted before.
+    pub(super) fn note_once(&mut self, item: impl Into<String>, message: impl Into<String>) {
+        let note = Problem { item: item.into(), message: message.into() };
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// Notes what is said of the scene and changes nothing in it.
+    pub(super) fn note_without_effect(&mut self, drafts: &[SurfaceDraft]) {
+        let description = self.description;
+        let Camera::Perspective { lens_radius, focus_distance, .. } = &description.camera;
+        if focus_distance.is_some() && lens_radius.get() == 0.0 {
+            self.note("camera", "has a `focus_distance`, which has no effect without a `lens_radius`");
+        }
+        let used: BTreeSet<&str> = description.shapes.iter().map(|shape| shape.material.as_str()).collect();
+        for name in description.materials.names().filter(|name| !used.contains(name)) {
+            self.note(format!("material `{name}`"), "is nowhere: no shape has it");
+        }
+        let is_opaque = |index: usize| matches!(drafts[index].boundary, BoundaryDraft::Opaque(_));
+        let shapes = description.shapes.iter().enumerate();
+        let mut ranked = shapes.filter(|(index, shape)| shape.priority != 0 && is_opaque(*index));
+        if let Some((index, shape)) = ranked.next() {
+            let others = match ranked.count() {
+                0 => String::new(),
+                1 => " (and so has 1 other)".into(),
+                count => format!(" (and so have {count} others)"),
+            };
+            self.note(
+                self.shape_item(index),
+                format!(
+                    "has a `priority`, which has no effect: its material `{}` is opaque{others}",
+                    shape.material
+                ),
+            );
+        }
     }
 
     /// Notes media that nothing is filled with, and one around everything in which light never ends.

@@ -251,6 +251,12 @@ impl Builder<'_> {
                 let message = format!("has {materials} materials, and all of it is one shape: with `part` a shape takes the triangles of one of them");
                 self.note(format!("mesh `{file}`"), message);
             }
+            if read.lacks_normals() {
+                self.note_once(
+                    format!("mesh `{file}`"),
+                    "has smoothing groups but no normals: it is rendered with flat facets",
+                );
+            }
             let mesh = match part {
                 Some(part) => read.part(part).map_err(|error| match error {
                     PartError::Unknown => unknown("part", part, read.parts()),

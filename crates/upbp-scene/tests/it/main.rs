@@ -3,6 +3,7 @@
 mod checkers;
 mod errors;
 mod mesh_files;
+mod no_effect;
 mod placement;
 mod rooms;
 mod shipped_scenes;

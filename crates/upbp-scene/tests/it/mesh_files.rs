@@ -35,9 +35,13 @@ impl Folder {
     }
 
     fn scene(&self, shapes: &str) -> Result<ReadyScene, SceneError> {
+        // One that no shape has would be noted.
+        let materials = ["\"white\": Lambert(0.5),", "\"glass\": Dielectric(1.5),"];
+        let used = |material: &&str| shapes.contains(material.split(':').next().unwrap());
+        let materials: String = materials.into_iter().filter(used).collect();
         let text = format!(
             "(version: 1, camera: Perspective(origin: (0, 0, 9), target: (0, 0, 0), fov_degrees: 30),
-              materials: {{ \"white\": Lambert(0.5), \"glass\": Dielectric(1.5) }},
+              materials: {{ {materials} }},
               shapes: [{shapes}],
               lights: [Constant(1)])"
         );
@@ -89,6 +93,16 @@ fn files_of_several_materials_are_noted_once() {
     let note = "mesh `m.obj`: has 2 materials, and all of it is one shape: with `part` a shape takes the \
                 triangles of one of them";
     assert_eq!(folder.notes(&[shape, moved].join(", ")), [note]);
+}
+
+#[test]
+fn smoothing_groups_without_normals_are_noted_once() {
+    let mesh = format!("s 1\n{}{}", cube("a", 1.0, false, 0), cube("b", 0.5, false, 1));
+    let folder = Folder::with("smoothing", &mesh);
+    let shape =
+        |part: &str| format!("(geometry: Mesh(file: \"m.obj\", part: \"{part}\"), material: \"glass\")");
+    let note = "mesh `m.obj`: has smoothing groups but no normals: it is rendered with flat facets";
+    assert_eq!(folder.notes(&[shape("a"), shape("b"), shape("a")].join(", ")), [note]);
 }
 
 #[test]

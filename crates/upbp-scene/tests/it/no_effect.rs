@@ -1,0 +1,36 @@
+//! Notes about what is said of a scene and changes nothing in it.
+
+use upbp_scene::ReadyScene;
+
+/// The notes about a scene with a lens and shapes like these.
+fn notes(lens: &str, shapes: &str) -> Vec<String> {
+    let text = format!(
+        "(version: 1, camera: Perspective(origin: (0, 0, 9), target: (0, 0, 0), fov_degrees: 30, {lens}),
+          materials: {{ \"white\": Lambert(0.5), \"glass\": Dielectric(1.5) }},
+          shapes: [{shapes}],
+          lights: [Constant(1)])"
+    );
+    let scene = ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}"));
+    scene.notes().iter().map(ToString::to_string).collect()
+}
+
+fn ball(x: i32, material: &str, rest: &str) -> String {
+    format!("(geometry: Sphere(centre: ({x}, 0, 0), radius: 1), material: \"{material}\", {rest}),")
+}
+
+#[test]
+fn what_has_no_effect_is_noted() {
+    let both = ball(0, "white", "") + &ball(3, "glass", "priority: 1");
+    assert!(notes("", &both).is_empty());
+    assert!(notes("lens_radius: 0.1, focus_distance: 3", &both).is_empty());
+    assert_eq!(
+        notes("focus_distance: 3", &both),
+        ["camera: has a `focus_distance`, which has no effect without a `lens_radius`"]
+    );
+    assert_eq!(notes("", &ball(0, "glass", "")), ["material `white`: is nowhere: no shape has it"]);
+    let ranked = |x| ball(x, "white", &format!("name: \"ball {x}\", priority: -1"));
+    let note = "shape `ball 6`: has a `priority`, which has no effect: its material `white` is opaque";
+    assert_eq!(notes("", &(both.clone() + &ranked(6))), [note]);
+    let others = notes("", &[both, ranked(6), ranked(9), ranked(12)].concat());
+    assert_eq!(others, [format!("{note} (and so have 2 others)")]);
+}
