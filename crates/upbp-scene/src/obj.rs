@@ -11,6 +11,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 mod polygon;
+mod smooth;
 
 /// Corners, triangles and normals of a mesh.
 #[derive(Clone, Debug, PartialEq, Default)]

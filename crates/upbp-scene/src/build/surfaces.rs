@@ -9,7 +9,7 @@ use upbp_accel::{AxisBox, Border, GeometryError, Quad, Shape, Sphere, TriangleMe
 use upbp_media::{MediumId, Spectrum};
 
 use super::builder::{Builder, unknown};
-use crate::description::{self, Geometry, Vector};
+use crate::description::{self, Geometry, SmoothingAngle, Vector};
 use crate::material::{
     Conductor, Dielectric, Lambert, Material, MetalFresnel, Mirror, Phong, RoughDielectric, TrowbridgeReitz,
 };
@@ -189,13 +189,23 @@ impl Builder<'_> {
                     None => AxisBox::new(min.get(), max.get()).map(Shape::from),
                 }
             }
-            Geometry::Mesh { file, part, positions, indices, normals, scale, rotate, translate } => {
+            Geometry::Mesh {
+                file,
+                part,
+                positions,
+                indices,
+                normals,
+                smooth_degrees,
+                scale,
+                rotate,
+                translate,
+            } => {
                 let given_here = !(positions.is_empty() && indices.is_empty() && normals.is_empty());
                 let mesh = match file {
                     Some(_) if given_here => {
                         return Err("has a `file` as well as triangles of its own".into());
                     }
-                    Some(file) => self.obj_mesh(file, part.as_deref())?,
+                    Some(file) => self.obj_mesh(file, part.as_deref(), *smooth_degrees)?,
                     None if part.is_some() => return Err("has a `part`, but no `file`".into()),
                     None if positions.is_empty() || indices.is_empty() => {
                         return Err("needs a `file`, or `positions` and `indices`".into());
@@ -205,8 +215,8 @@ impl Builder<'_> {
                             |list: &[Vector]| list.iter().map(|vector| vector.get()).collect::<Vec<_>>();
                         check_triangles(&vectors(positions), indices)?;
                         let normals = (!normals.is_empty()).then(|| vectors(normals));
-                        let mesh = TriangleMesh::new(vectors(positions), indices.clone(), normals);
-                        mesh.map_err(|error| error.to_string())?
+                        let (positions, indices) = (vectors(positions), indices.clone());
+                        triangles(ObjMesh { positions, indices, normals }, *smooth_degrees)?
                     }
                 };
                 let rotation = rotation(rotate)?;
@@ -215,7 +225,9 @@ impl Builder<'_> {
                 let translate = translate.map_or(Vec3::ZERO, Vector::get);
                 let linear = rotation.unwrap_or(Mat3::IDENTITY) * scale;
                 let to_scene = Affine3A::from_mat3_translation(linear, translate);
-                let copies = file.as_deref().map_or(1, |file| self.meshes.copies(file, part.as_deref()));
+                let copies = file
+                    .as_deref()
+                    .map_or(1, |file| self.meshes.copies(&file_part(file, part.as_deref(), *smooth_degrees)));
                 let count = mesh.triangle_count();
                 let of_copies = copies.saturating_mul(count as usize);
                 let is_copy = copies > 1 && (count >= COPIED_FROM || of_copies > MOST_OF_COPIES);
@@ -240,8 +252,13 @@ impl Builder<'_> {
     }
 
     /// The mesh in a file, or a part of it; the file is read once.
-    fn obj_mesh(&mut self, file: &str, part: Option<&str>) -> Result<TriangleMesh, String> {
-        let key = (file.to_owned(), part.map(str::to_owned));
+    fn obj_mesh(
+        &mut self,
+        file: &str,
+        part: Option<&str>,
+        smooth: SmoothingAngle,
+    ) -> Result<TriangleMesh, String> {
+        let key = file_part(file, part, smooth);
         if let Some(known) = self.meshes.known.get(&key) {
             return known.clone();
         }
@@ -251,10 +268,11 @@ impl Builder<'_> {
                 let message = format!("has {materials} materials, and all of it is one shape: with `part` a shape takes the triangles of one of them");
                 self.note(format!("mesh `{file}`"), message);
             }
-            if read.lacks_normals() {
+            if read.lacks_normals() && smooth == SmoothingAngle::ZERO {
                 self.note_once(
                     format!("mesh `{file}`"),
-                    "has smoothing groups but no normals: it is rendered with flat facets",
+                    "has smoothing groups but no normals: it is rendered with flat facets, unless \
+                     `smooth_degrees` is given",
                 );
             }
             let mesh = match part {
@@ -266,8 +284,7 @@ impl Builder<'_> {
             };
             drop(read);
             let describe = |error: &dyn std::fmt::Display| format!("mesh `{file}`: {error}");
-            let ObjMesh { positions, indices, normals } = mesh.map_err(|error| describe(&error))?;
-            TriangleMesh::new(positions, indices, normals).map_err(|error| describe(&error))
+            mesh.and_then(|mesh| triangles(mesh, smooth)).map_err(|error| describe(&error))
         });
         self.meshes.known.insert(key, mesh.clone());
         mesh
@@ -304,33 +321,44 @@ impl Builder<'_> {
 pub(super) struct MeshFiles {
     /// Files of which there are several parts in the scene, or why they could not be read.
     files: BTreeMap<String, Result<Rc<ObjFile>, String>>,
-    /// Meshes, or why there are none, by file and part.
+    /// Meshes, or why there are none, by file, part and smoothing.
     known: BTreeMap<FilePart, Result<TriangleMesh, String>>,
     /// Number of shapes that refer to each.
     uses: BTreeMap<FilePart, usize>,
 }
 
-/// A file, and the part of it if not all.
-type FilePart = (String, Option<String>);
+/// A file, the part of it if not all, and the bits of the angle by which it is smoothed.
+type FilePart = (String, Option<String>, u32);
+
+fn file_part(file: &str, part: Option<&str>, smooth: SmoothingAngle) -> FilePart {
+    (file.to_owned(), part.map(str::to_owned), smooth.get().to_bits())
+}
+
+/// A mesh whose normals, if it has none, are those by an angle above 0.
+fn triangles(mesh: ObjMesh, smooth: SmoothingAngle) -> Result<TriangleMesh, String> {
+    let mesh = if smooth == SmoothingAngle::ZERO { mesh } else { mesh.smoothed(smooth.get())? };
+    let ObjMesh { positions, indices, normals } = mesh;
+    TriangleMesh::new(positions, indices, normals).map_err(|error| error.to_string())
+}
 
 impl MeshFiles {
     pub(super) fn of(description: &description::SceneDescription) -> Self {
         let mut files = Self::default();
         for shape in &description.shapes {
-            if let Geometry::Mesh { file: Some(file), part, .. } = &shape.geometry {
-                *files.uses.entry((file.clone(), part.clone())).or_default() += 1;
+            if let Geometry::Mesh { file: Some(file), part, smooth_degrees, .. } = &shape.geometry {
+                *files.uses.entry(file_part(file, part.as_deref(), *smooth_degrees)).or_default() += 1;
             }
         }
         files
     }
 
-    fn copies(&self, file: &str, part: Option<&str>) -> usize {
-        self.uses.get(&(file.to_owned(), part.map(str::to_owned))).copied().unwrap_or(1)
+    fn copies(&self, key: &FilePart) -> usize {
+        self.uses.get(key).copied().unwrap_or(1)
     }
 
     fn parts_of(&self, file: &str) -> usize {
-        let from = self.uses.range((file.to_owned(), None)..);
-        from.take_while(|((other, _), _)| other == file).count()
+        let from = self.uses.range((file.to_owned(), None, 0)..);
+        from.take_while(|((other, ..), _)| other == file).count()
     }
 }
 

@@ -30,6 +30,6 @@ pub use self::shape::{Geometry, Rotation, Shape};
 pub(crate) use self::text::Fnv1a;
 pub use self::value::{
     AngularDiameter, Asymmetries, Asymmetry, BeamAngle, Colour, Count, CutoffAngle, Degrees, Diameter,
-    Exponent, FieldOfView, Ior, NonNegative, Positive, Reflectance, Roughness, Share, ValueError, Vector,
-    Version,
+    Exponent, FieldOfView, Ior, NonNegative, Positive, Reflectance, Roughness, Share, SmoothingAngle,
+    ValueError, Vector, Version,
 };

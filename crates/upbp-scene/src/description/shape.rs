@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::value::{Colour, Degrees, Positive, Vector, is_default};
+use super::value::{Colour, Degrees, Positive, SmoothingAngle, Vector, is_default};
 
 /// A surface, or a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -76,6 +76,10 @@ pub enum Geometry {
         /// Shading normals, none or one per corner.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         normals: Vec<Vector>,
+        /// Where there are no normals, those of triangles around a corner whose planes differ by at most this
+        /// angle become one; 0 for flat triangles.
+        #[serde(default, skip_serializing_if = "is_default")]
+        smooth_degrees: SmoothingAngle,
         /// Factor for all coordinates, applied first.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         scale: Option<Positive>,

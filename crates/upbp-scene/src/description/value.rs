@@ -129,6 +129,10 @@ number!(
     AngularDiameter(f32), "an angle from 0.01 to 180 degrees", |x| (0.01..=180.0).contains(&x)
 );
 number!(
+    /// The largest angle in degrees between planes that are shaded as one surface, in `[0, 180]`.
+    SmoothingAngle(f32), "an angle from 0 to 180 degrees", |x| (0.0..=180.0).contains(&x)
+);
+number!(
     /// An angle in degrees, in `[-360, 360]`.
     Degrees(f32), "an angle from -360 to 360 degrees", |x| (-360.0..=360.0).contains(&x)
 );
@@ -146,6 +150,17 @@ impl AngularDiameter {
 impl Positive {
     /// One.
     pub const ONE: Self = Self(1.0);
+}
+
+impl SmoothingAngle {
+    /// No smoothing.
+    pub const ZERO: Self = Self(0.0);
+}
+
+impl Default for SmoothingAngle {
+    fn default() -> Self {
+        Self::ZERO
+    }
 }
 
 impl Degrees {

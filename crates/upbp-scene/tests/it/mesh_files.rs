@@ -5,6 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use glam::Vec3;
+use upbp_core::scene::Scene as _;
 use upbp_scene::{ReadyScene, SceneError};
 
 /// A cube around the origin as an object of a mesh file, of which `before` are there already. Inwards its
@@ -101,8 +102,64 @@ fn smoothing_groups_without_normals_are_noted_once() {
     let folder = Folder::with("smoothing", &mesh);
     let shape =
         |part: &str| format!("(geometry: Mesh(file: \"m.obj\", part: \"{part}\"), material: \"glass\")");
-    let note = "mesh `m.obj`: has smoothing groups but no normals: it is rendered with flat facets";
+    let note = "mesh `m.obj`: has smoothing groups but no normals: it is rendered with flat facets, \
+                unless `smooth_degrees` is given";
     assert_eq!(folder.notes(&[shape("a"), shape("b"), shape("a")].join(", ")), [note]);
+    let smooth = |part: &str| shape(part).replace("part", "smooth_degrees: 30, part");
+    assert!(folder.notes(&[smooth("a"), smooth("b")].join(", ")).is_empty());
+}
+
+/// A cylinder without normals in a file and in the scene.
+#[test]
+fn meshes_without_normals_become_smooth_bodies() {
+    let (mut positions, mut indices, mut faces) = (String::new(), String::new(), String::new());
+    let sides = 12;
+    for (number, y) in [0.0, 2.0].into_iter().flat_map(|y| (0..sides).map(move |side| (side, y))) {
+        let (sin, cos) = (number as f32 / sides as f32 * std::f32::consts::TAU).sin_cos();
+        write!(positions, "({cos}, {y}, {sin}),").unwrap();
+        writeln!(faces, "v {cos} {y} {sin}").unwrap();
+    }
+    let mut face = |corners: [u32; 3]| {
+        let [a, b, c] = corners;
+        write!(indices, "({a}, {b}, {c}),").unwrap();
+        writeln!(faces, "f {} {} {}", a + 1, b + 1, c + 1).unwrap();
+    };
+    for a in 0..sides {
+        let b = (a + 1) % sides;
+        face([a, a + sides, b]);
+        face([b, a + sides, b + sides]);
+    }
+    for a in 2..sides {
+        face([0, a - 1, a]);
+        face([sides, sides + a, sides + a - 1]);
+    }
+    let folder = Folder::with("smooth", &faces);
+    let here = format!("positions: [{positions}], indices: [{indices}]");
+    for source in ["file: \"m.obj\"", &here] {
+        // A ray onto a ridge of the side, a little beside it, and onto the cap.
+        let normals = |smooth: &str| {
+            let rest = format!("(geometry: Mesh({source}, {smooth} scale: 2), material: \"glass\")");
+            let scene = folder.scene(&rest).unwrap_or_else(|error| panic!("{error}"));
+            let upbp_accel::Shape::Mesh(mesh) = &scene.geometry().shapes()[0] else { panic!("no mesh") };
+            assert!(mesh.is_closed() && mesh.signed_volume() > 0.0);
+            [(Vec3::new(9.0, 1.3, 0.01), Vec3::NEG_X), (Vec3::new(1.0, 9.0, 0.3), Vec3::NEG_Y)].map(
+                |(origin, direction)| {
+                    let hit = scene.intersect(&upbp_accel::Ray::new(origin, direction)).expect("a hit");
+                    hit.shading_normal
+                },
+            )
+        };
+        let [side, cap] = normals("smooth_degrees: 40,");
+        assert!(side.distance(Vec3::new(1.0, 0.0, 0.005).normalize()) < 1e-3, "{side}");
+        assert_eq!(cap, Vec3::Y);
+        let [side, _] = normals("");
+        assert!(side.distance(Vec3::X) > 0.2, "{side}");
+    }
+    let with_normals = "(geometry: Mesh(positions: [(0, 0, 0), (1, 0, 0), (0, 1, 0)], indices: [(0, 1, 2)],
+        normals: [(0, 0, 1), (0, 0, 1), (0, 0, 1)], smooth_degrees: 30), material: \"white\")";
+    let error = folder.scene(with_normals).unwrap_err().to_string();
+    let expected = "shape 1: has normals of its own, and `smooth_degrees` is for meshes without";
+    assert!(error.ends_with(expected), "{error}");
 }
 
 #[test]
