@@ -8,6 +8,7 @@ use glam::Vec3;
 use upbp_media::{Homogeneous, Medium as _, MediumId};
 
 use super::builder::Builder;
+use super::surfaces::rotation;
 use crate::description::Light as Description;
 use crate::light::{
     ConstantEnvironment, DirectionalLight, EnvironmentImage, ImageEnvironment, Light, PointLight, SpotCone,
@@ -99,10 +100,14 @@ impl Builder<'_> {
             Description::Constant(radiance) => {
                 Light::Constant(ConstantEnvironment { radiance: radiance.get() })
             }
-            Description::Image { file, scale, rotation_degrees } => {
+            Description::Image { file, scale, rotation_degrees, rotate } => {
                 let image = self.environment_image(file)?;
-                let rotation = rotation_degrees.get().to_radians();
-                Light::Image(ImageEnvironment::new(image, scale.get(), rotation))
+                let about_y = rotation_degrees.get().to_radians();
+                let light = ImageEnvironment::new(image, scale.get(), about_y);
+                Light::Image(match rotation(rotate)? {
+                    Some(rotation) => light.turned(rotation),
+                    None => light,
+                })
             }
         })
     }

@@ -370,7 +370,7 @@ fn other_format(file: &str) -> Option<&'static str> {
 }
 
 /// All rotations of a list together; `None` if there are none.
-fn rotation(list: &[description::Rotation]) -> Result<Option<Mat3>, String> {
+pub(super) fn rotation(list: &[description::Rotation]) -> Result<Option<Mat3>, String> {
     let mut all = DMat3::IDENTITY;
     for (number, description::Rotation { axis, degrees }) in list.iter().enumerate() {
         let Some(axis) = axis.get().as_dvec3().try_normalize() else {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::shape::Rotation;
 use super::single_value;
 use super::value::{AngularDiameter, BeamAngle, Colour, CutoffAngle, Degrees, Positive, Vector, is_default};
 
@@ -64,6 +65,9 @@ pub enum Light {
         /// Rotation about +y, counter-clockwise as seen from above, degrees.
         #[serde(default = "default_rotation", skip_serializing_if = "is_default")]
         rotation_degrees: Degrees,
+        /// Rotations about axes through the origin, applied after that, one after the other.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        rotate: Vec<Rotation>,
     },
 }
 

@@ -12,7 +12,7 @@ use std::io::Read as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use upbp_core::{open_exr, open_file};
 use upbp_estimators::scene::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterKind, EmitterPoint, HitDensities, Incident,
@@ -333,6 +333,8 @@ pub struct ImageEnvironment {
     image: Arc<EnvironmentImage>,
     scale: f32,
     rotation: Rotation,
+    /// The rotation that follows, if any.
+    turn: Option<Mat3>,
 }
 
 /// A rotation about +y by its sine and cosine.
@@ -358,20 +360,38 @@ impl ImageEnvironment {
     #[must_use]
     pub fn new(image: Arc<EnvironmentImage>, scale: f32, rotation: f32) -> Self {
         let (sin, cos) = rotation.sin_cos();
-        Self { image, scale, rotation: Rotation { sin, cos } }
+        Self { image, scale, rotation: Rotation { sin, cos }, turn: None }
+    }
+
+    /// The same light, turned further by a rotation about any axis.
+    #[must_use]
+    pub fn turned(self, rotation: Mat3) -> Self {
+        Self { turn: Some(self.turn.map_or(rotation, |turn| rotation * turn)), ..self }
+    }
+
+    /// The direction of the scene that a direction of the image has become.
+    fn to_scene(&self, direction: Vec3) -> Vec3 {
+        let direction = self.rotation.apply(direction);
+        self.turn.map_or(direction, |turn| turn * direction)
+    }
+
+    /// The direction of the image that has become a direction of the scene.
+    fn to_image(&self, direction: Vec3) -> Vec3 {
+        let direction = self.turn.map_or(direction, |turn| turn.transpose() * direction);
+        self.rotation.inverse().apply(direction)
     }
 
     /// Radiance from `towards_light`, a unit vector of the scene, and the density of choosing it, sr⁻¹.
     #[must_use]
     pub fn radiance_and_pdf(&self, towards_light: Vec3) -> (Spectrum, f32) {
-        let (radiance, pdf) = self.image.lookup(self.rotation.inverse().apply(towards_light));
+        let (radiance, pdf) = self.image.lookup(self.to_image(towards_light));
         (radiance * self.scale, pdf)
     }
 }
 
 impl Environment for ImageEnvironment {
     fn sample(&self, u: [f32; 2]) -> Option<Parallel> {
-        let light = self.along(-self.rotation.apply(self.image.sample(u)).normalize())?;
+        let light = self.along(-self.to_scene(self.image.sample(u)).normalize())?;
         (light.pdf > 0.0).then_some(light)
     }
 
@@ -381,7 +401,7 @@ impl Environment for ImageEnvironment {
     }
 
     fn coordinates(&self, direction: Vec3) -> [f32; 2] {
-        self.image.coordinates(self.rotation.inverse().apply(-direction))
+        self.image.coordinates(self.to_image(-direction))
     }
 
     fn power_through(&self, area: f32) -> f32 {

@@ -3,6 +3,7 @@
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
+use glam::Mat3;
 use upbp_accel::{AxisBox, Quad, Shape, Sphere, TriangleMesh};
 use upbp_estimators::check::check_emitter;
 use upbp_media::{BodyId, Homogeneous, PhaseFunction, Spectrum};
@@ -48,6 +49,10 @@ fn image() -> Arc<EnvironmentImage> {
         i => Spectrum::new(i as f32, 1.0, 0.5) * 0.02,
     });
     Arc::new(EnvironmentImage::new(width, height, pixels.collect()).unwrap())
+}
+
+fn tilt() -> Mat3 {
+    Mat3::from_axis_angle(Vec3::new(2.0, -1.0, 3.0).normalize(), 1.9)
 }
 
 #[test]
@@ -173,6 +178,7 @@ fn infinite_lights_satisfy_the_contract() {
     check(Light::Constant(ConstantEnvironment { radiance: Spectrum::new(1.0, 0.5, 0.2) }));
     check(Light::Image(ImageEnvironment::new(image(), 1.0, 0.0)));
     check(Light::Image(ImageEnvironment::new(image(), 0.3, 2.1)));
+    check(Light::Image(ImageEnvironment::new(image(), 0.3, 2.1).turned(tilt())));
 }
 
 #[test]
@@ -240,6 +246,7 @@ fn power_is_what_emission_carries() {
         Light::Sun(SunLight::new(Vec3::NEG_Y, Spectrum::splat(2.0), 2.0)),
         Light::Constant(ConstantEnvironment { radiance: Spectrum::new(1.0, 0.5, 0.2) }),
         Light::Image(ImageEnvironment::new(image(), 3.0, 0.4)),
+        Light::Image(ImageEnvironment::new(image(), 3.0, 0.4).turned(tilt())),
     ];
     let finite = [
         area(Quad::new(Vec3::ZERO, Vec3::X, Vec3::Z * 1.5).unwrap()),
@@ -299,6 +306,13 @@ fn an_image_is_oriented_as_documented() {
     assert!(lit(6, 1, 0.0).radiance_and_pdf(Vec3::new(1.0, 0.1, 0.1).normalize()).1 > 0.0);
     let left = Vec3::new(-1.0, 0.1, -0.1).normalize();
     assert!(lit(4, 1, FRAC_PI_2).radiance_and_pdf(left).1 > 0.0);
+    // Then a quarter turn about x, which moves −z to +y and leaves −x, and one about z, which moves −x to −y.
+    let about_x = Mat3::from_rotation_x(FRAC_PI_2);
+    let up = Vec3::new(0.1, 1.0, 0.1).normalize();
+    assert!(lit(4, 1, 0.0).turned(about_x).radiance_and_pdf(up).1 > 0.0);
+    let turned = lit(4, 1, FRAC_PI_2).turned(about_x).turned(Mat3::from_rotation_z(FRAC_PI_2));
+    let [down, beside] = [-0.1, 0.1].map(|x| turned.radiance_and_pdf(Vec3::new(x, -1.0, 0.1).normalize()).1);
+    assert!(down > 0.0 && beside == 0.0);
     // All draws land in the only lit pixel.
     let light = lit(4, 1, 0.7);
     let draws = (0..1000_u16).map(|i| [f32::from(i) / 1000.0, f32::from(i * 37 % 1000) / 1000.0]);

@@ -3,9 +3,10 @@
 use std::fs;
 use std::path::PathBuf;
 
+use glam::Vec3;
 use upbp_core::scene::Scene as _;
 use upbp_media::Medium as _;
-use upbp_scene::ReadyScene;
+use upbp_scene::{Light, ReadyScene};
 
 /// A folder for the files of a test.
 struct Folder(PathBuf);
@@ -58,6 +59,27 @@ fn skies_that_are_stretched_or_were_infinite_are_noted_once() {
     ];
     assert_eq!(notes(&scene), expected);
     assert_eq!(scene.files().len(), 3, "each is read once");
+}
+
+/// In a world where +z is up, as the README has it: the middle at +y, and the right half at +x.
+#[test]
+fn an_image_may_be_turned_about_any_axis() {
+    let folder = Folder::new("turned");
+    folder.image("sky.exr", 4, 2, |x| x as f32);
+    let red = |rest: &str, direction: Vec3| {
+        let scene = folder.scene(&format!("lights: [Image(file: \"sky.exr\" {rest})]"));
+        let Light::Image(light) = &scene.emitters()[0] else { panic!("no image") };
+        light.radiance_and_pdf(direction.normalize()).0[0]
+    };
+    let rest = ", rotate: [(axis: (1, 0, 0), degrees: 90)]";
+    for (x, z, expected) in [(-1.0, 1.0, 0.0), (-1.0, -1.0, 1.0), (1.0, -1.0, 2.0), (1.0, 1.0, 3.0)] {
+        assert_eq!(red("", Vec3::new(x, 0.1, z)), expected);
+        assert_eq!(red(rest, Vec3::new(x, -z, 0.1)), expected);
+    }
+    // First about the axis of the image.
+    let both = format!(", rotation_degrees: 90 {rest}");
+    assert_eq!(red(&both, Vec3::new(-1.0, -0.1, 0.1)), 1.0);
+    assert_eq!(red(&both, Vec3::new(-1.0, 0.1, 0.1)), 2.0);
 }
 
 #[test]
