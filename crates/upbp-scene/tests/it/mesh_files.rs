@@ -162,6 +162,31 @@ fn meshes_without_normals_become_smooth_bodies() {
     assert!(error.ends_with(expected), "{error}");
 }
 
+/// The scenes with which the page of the format begins, as they are there.
+#[test]
+fn the_scenes_of_the_readme_are_ready() {
+    let page = upbp_scene::scene_format();
+    let blocks = page.split("```ron\n").skip(1).map(|rest| rest.split("```").next().unwrap());
+    let [alone, with_files]: [&str; 2] = blocks.collect::<Vec<_>>().try_into().expect("two scenes");
+    assert_eq!(alone.lines().count(), 12);
+    let small = alone.replace("width: 640, height: 480", "width: 16, height: 12");
+    assert_ne!(small, alone);
+    let scene = ReadyScene::from_ron_str(&small, "").unwrap();
+    assert!(scene.notes().is_empty(), "{:?}", scene.notes());
+    let settings = upbp_core::Settings::default().validate().unwrap();
+    assert!(scene.renderer(settings).unwrap().iterate());
+
+    let (wall, milk) = (cube("Glass", 0.05, false, 0), cube("Milk", 0.046, false, 2));
+    let folder = Folder::with("readme", &[wall, cube("Glass", 0.045, true, 1), milk].concat());
+    let sky = |_, _| (1.0_f32, 1.0_f32, 1.0_f32);
+    exr::prelude::write_rgb_file(folder.0.join("sky.exr"), 4, 2, sky).unwrap();
+    fs::rename(folder.0.join("m.obj"), folder.0.join("glass.obj")).unwrap();
+    let scene = ReadyScene::from_ron_str(with_files, &folder.0).unwrap_or_else(|error| panic!("{error}"));
+    assert!(scene.notes().is_empty(), "{:?}", scene.notes());
+    let is_milk = |x: f32| scene.stack_at(Vec3::new(x, 0.01, 0.0)).medium().is_some();
+    assert!([0.0, 0.0449, 0.0455, 0.0505].map(is_milk) == [true, true, false, false]);
+}
+
 #[test]
 fn hollows_that_are_wound_the_wrong_way_round_are_noted() {
     let glass = "(name: \"bulb\", geometry: Mesh(file: \"m.obj\"), material: \"glass\")";
