@@ -320,8 +320,8 @@ impl IterationPlan {
         self.techniques.iter().filter(has_turn).collect()
     }
 
-    /// The scale of kernel radii at a place, of those in media or of those on surfaces; 0, which is no merges,
-    /// where such a kernel would be narrower than [`LEAST_RADIUS`].
+    /// The scale of kernel radii at a place, of those in media or of those on surfaces; 0, which is no
+    /// merges, where such a kernel would be narrower than [`LEAST_RADIUS`].
     #[inline]
     pub(crate) fn radius_scale(&self, position: Vec3, in_medium: bool) -> f32 {
         let scale = self.radius_field.at(position);

@@ -240,9 +240,9 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     })
 }
 
-/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Distances from
-/// there have the digits of what is near, not those of a start as far away as the scene is wide: both faces of
-/// a pane of glass would be at one, and places in media beside their bodies.
+/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Distances
+/// from there have the digits of what is near, not those of a start as far away as the scene is wide: both
+/// faces of a pane of glass would be at one, and places in media beside their bodies.
 fn start_near_scene<S: Scene>(scene: &S, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Vec3> {
     crossings.clear();
     let hit = scene.trace(ray, crossings).map(|hit| hit.t);
