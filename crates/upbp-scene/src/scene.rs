@@ -11,6 +11,7 @@ use upbp_accel::{BoxTree, Candidate, Ray, SceneGeometry, ShapeId, Visit};
 use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId, Hit, Scene};
 use upbp_media::{Homogeneous, Interior, MediumId, MediumStack};
 
+pub(crate) use self::place::COINCIDENT;
 use self::place::largest_width_of_plane;
 use crate::camera::PerspectiveCamera;
 use crate::error::Problem;

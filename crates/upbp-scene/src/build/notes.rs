@@ -11,6 +11,7 @@ use super::surfaces::{BoundaryDraft, SurfaceDraft};
 use crate::description::{Camera, Geometry, Medium};
 use crate::error::Problem;
 use crate::light::EnvironmentImage;
+use crate::scene::COINCIDENT;
 
 impl Builder<'_> {
     /// Notes something about a part of the scene.
@@ -41,16 +42,35 @@ impl Builder<'_> {
         let shapes = description.shapes.iter().enumerate();
         let mut ranked = shapes.filter(|(index, shape)| shape.priority != 0 && is_opaque(*index));
         if let Some((index, shape)) = ranked.next() {
-            let others = match ranked.count() {
-                0 => String::new(),
-                1 => " (and so has 1 other)".into(),
-                count => format!(" (and so have {count} others)"),
-            };
             self.note(
                 self.shape_item(index),
                 format!(
-                    "has a `priority`, which has no effect: its material `{}` is opaque{others}",
-                    shape.material
+                    "has a `priority`, which has no effect: its material `{}` is opaque{}",
+                    shape.material,
+                    and_others(ranked.count(), ["has", "have"])
+                ),
+            );
+        }
+    }
+
+    /// Notes bodies both of whose faces are met as one, so that light passes as if there was nothing.
+    pub(super) fn note_thin_bodies(&mut self, places: Places<'_>) {
+        let is_thin = |index: usize| {
+            let shape = places.shape(index);
+            let (min, max) = shape.aabb();
+            let largest = min.abs().max(max.abs()).max_element();
+            let thickness = 2.0 * shape.volume() / shape.area();
+            let is_body = matches!(places.drafts[index].boundary, BoundaryDraft::Refracting(..));
+            (is_body && thickness < COINCIDENT * largest).then_some((index, thickness, largest))
+        };
+        let mut thin = (0..places.drafts.len()).filter_map(is_thin);
+        if let Some((index, thickness, largest)) = thin.next() {
+            self.note(
+                self.shape_item(index),
+                format!(
+                    "is {thickness} thick, at coordinates up to {largest}, and is not seen: surfaces that are nearer to each \
+                     other than 5e-6 of their coordinates are met as one{}",
+                    and_others(thin.count(), ["is", "are"])
                 ),
             );
         }
@@ -137,5 +157,14 @@ impl Builder<'_> {
                 );
             }
         }
+    }
+}
+
+/// The end of a note that holds for more shapes than it names, with its verb for one and for several.
+fn and_others(count: usize, [one, several]: [&str; 2]) -> String {
+    match count {
+        0 => String::new(),
+        1 => format!(" (and so {one} 1 other)"),
+        count => format!(" (and so {several} {count} others)"),
     }
 }

@@ -12,7 +12,7 @@ use crate::material::Material;
 /// Distance between surfaces that coincide, relative to the largest coordinate of the place. Rays start
 /// nearer than this to a surface, so that none that does not coincide with it is skipped. What one that
 /// leaves meets again was crossed already, which changes nothing.
-const COINCIDENT: f32 = 1.25 * RAY_OFFSET;
+pub(crate) const COINCIDENT: f32 = 1.25 * RAY_OFFSET;
 /// Distance between planes of triangles that are meant to coincide, relative to the largest coordinate of a
 /// corner: roundings of the corners. It counts where the plane passes near the origin, far from the corners.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;

@@ -34,3 +34,27 @@ fn what_has_no_effect_is_noted() {
     let others = notes("", &[both, ranked(6), ranked(9), ranked(12)].concat());
     assert_eq!(others, [format!("{note} (and so have 2 others)")]);
 }
+
+#[test]
+fn bodies_too_thin_to_be_seen_are_noted() {
+    let pane = |x: f32, thickness: f32| {
+        let end = x + 1.0;
+        format!(
+            "(name: \"pane {x}\", material: \"glass\",
+              geometry: Box(min: ({x:?}, 0, 0), max: ({end:?}, 1, {thickness:?}))),"
+        )
+    };
+    let ground = "(material: \"white\", geometry: Quad(origin: (-2000, 0, -2000), edge_u: (0, 0, 4000), edge_v: (4000, 0, 0))),";
+    let with = |panes: &str| notes("", &format!("{ground}{panes}"));
+    assert!(with(&(pane(0.0, 0.004) + &pane(1000.0, 0.01))).is_empty());
+    let found = with(&(pane(0.0, 0.004) + &pane(1000.0, 0.004) + &pane(1500.0, 0.006)));
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(
+        found[0].starts_with("shape `pane 1000`: is 0.00") && found[0].contains("and is not seen"),
+        "{found:?}"
+    );
+    assert!(
+        found[0].contains("coordinates up to 1001") && found[0].ends_with("(and so is 1 other)"),
+        "{found:?}"
+    );
+}
