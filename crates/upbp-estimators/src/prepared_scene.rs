@@ -94,9 +94,10 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         volumes.sort_unstable();
         let camera_stack = camera.is_pinhole().then(|| stack_of_pinhole(scene)).flatten();
         let emitting_media = scene.media().iter().any(Medium::emits);
-        let is_dense =
-            |medium: &S::Medium| medium.scatters() && !(medium.mean_free_path() > DENSE * bounds.radius);
-        let dense_media = scene.media().iter().map(is_dense).collect();
+        let is_dense = |(medium, id): (&S::Medium, u32)| {
+            medium.scatters() && !(medium.mean_free_path() > DENSE * scene.medium_extent(MediumId(id)))
+        };
+        let dense_media = scene.media().iter().zip(0..).map(is_dense).collect();
         let bounds_with_camera = bounds_with_camera(scene, bounds);
         let power = Selection::new(&powers);
         let choice = Arc::new(EmitterChoice {
@@ -511,8 +512,8 @@ fn tree_of<S: Scene>(scene: &S, power: &Selection, bounds: &BoundingSphere) -> O
     EmitterTree::new(emitters, &powers, bounds)
 }
 
-/// Media whose mean free path is a smaller part of the scene's radius are dense: of their vertices next to a
-/// boundary, one in ten thousand is within rounding of it.
+/// Media whose mean free path is a smaller part of their [extent](Scene::medium_extent) are dense: of their
+/// vertices next to a boundary, one in ten thousand is within rounding of it.
 const DENSE: f32 = 1e-3;
 
 /// A fault of a scene as a whole.

@@ -104,6 +104,12 @@ impl PerspectiveCamera {
         self.origin
     }
 
+    /// Radius of the lens, 0 for a pinhole, scene units.
+    #[must_use]
+    pub const fn lens_radius(&self) -> f32 {
+        self.lens_radius
+    }
+
     /// Unit vector into the middle of the image.
     #[must_use]
     pub const fn forward(&self) -> Vec3 {

@@ -3,6 +3,7 @@
 use upbp_media::{Lanes, MediumStack};
 
 use super::edge::{EdgeTrace, Extent};
+use super::interaction::{Interaction, MediumInterface};
 use crate::iteration::IterationPlan;
 use crate::prepared_scene::PreparedScene;
 use crate::scene::{Crossing, Scene};
@@ -30,6 +31,12 @@ impl<S: Scene> Context<'_, S> {
     pub(crate) fn extent(&self, all: bool, stack: &MediumStack) -> Extent {
         let to_surface = all || stack.medium().is_some_and(|medium| self.prepared.is_dense(medium));
         if to_surface { Extent::ToSurface } else { Extent::ToStop }
+    }
+
+    /// Whether a vertex is in a medium from which no straight line leads to a light or to the lens.
+    #[inline]
+    pub(crate) fn is_sealed(&self, vertex: &Interaction<S::Bsdf>, sides: &MediumInterface<'_>) -> bool {
+        vertex.in_medium() && sides.near.top().is_some_and(|top| self.prepared.scene.is_sealed(top.body))
     }
 }
 

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 use upbp_accel::Ray;
-use upbp_media::{Medium, MediumId, MediumStack};
+use upbp_media::{BodyId, Medium, MediumId, MediumStack};
 
 mod bsdf;
 mod camera;
@@ -64,6 +64,27 @@ pub trait Scene: Sync {
     /// from everywhere in all directions, so that fog that thins out needs a body with a top.
     fn outside(&self) -> Option<MediumId> {
         None
+    }
+
+    /// The largest coordinate of places in a medium, or the distance from which rays get into it without a
+    /// surface that scatters, whichever is more, scene units: positions in it are rounded in proportion.
+    ///
+    /// By default the radius of the [bounds](Self::bounds). Of a medium that is only in bodies that refract,
+    /// away from all others, a host may tell less; then walks in one that is dense in the scene, but not in
+    /// its body, are shorter.
+    fn medium_extent(&self, medium: MediumId) -> f32 {
+        let _ = medium;
+        self.bounds().radius
+    }
+
+    /// Whether every straight line to a light or to the lens, from any place where `body` is the one that
+    /// counts, meets a surface that scatters: milk in a glass is such a body.
+    ///
+    /// Then next events and connections to the lens, which would find nothing, are not tried from its medium.
+    /// `false`, the default, is always allowed.
+    fn is_sealed(&self, body: BodyId) -> bool {
+        let _ = body;
+        false
     }
 
     /// Whether any surface has a smooth lobe; `false` saves the preparation of what would find nothing.

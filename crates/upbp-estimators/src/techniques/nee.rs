@@ -21,7 +21,10 @@ pub(crate) fn next_events<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
-    if plan.next_events == 0.0 || !plan.lengths.contain(vertex.depth + 1) {
+    if plan.next_events == 0.0
+        || !plan.lengths.contain(vertex.depth + 1)
+        || context.is_sealed(&vertex.interaction, sides)
+    {
         return;
     }
     for _ in 0..stream.round(plan.next_events) {

@@ -112,7 +112,10 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             interaction,
         };
         if connectible {
-            if plan.mis.light_tracing > 0.0 && plan.lengths.contain(depth + 1) {
+            if plan.mis.light_tracing > 0.0
+                && plan.lengths.contain(depth + 1)
+                && !context.is_sealed(&vertex.interaction, &sides)
+            {
                 light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
                 observer.call(Technique::LightTracing, 0);
             }

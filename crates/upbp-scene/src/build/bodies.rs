@@ -60,19 +60,20 @@ pub(super) fn may_match(bodies: &[Body], surfaces: &[Surface], geometry: &SceneG
     let refracting: Vec<&Body> = bodies.iter().filter(|body| material(body).is_some()).collect();
     let is_rough = |body: &&&Body| matches!(material(body), Some(Material::RoughDielectric(_)));
     let rough: Vec<&Body> = refracting.iter().filter(is_rough).copied().collect();
-    let touch = |a: &Body, b: &Body| {
-        let [(min, max), (other_min, other_max)] = [a, b].map(|body| geometry.shape(body.shape).aabb());
-        let corners = [min, max, other_min, other_max].map(|corner| corner.abs().max_element());
-        // Surfaces that coincide may differ by rounding.
-        let rounding = Vec3::splat(1e-5 * corners.into_iter().fold(0.0, f32::max));
-        min.cmple(other_max + rounding).all() && other_min.cmple(max + rounding).all()
-    };
+    let aabb = |body: &Body| geometry.shape(body.shape).aabb();
     let matches = |a: &Body, b: &Body| {
-        a.shape != b.shape && is_matched([a.interior.ior, b.interior.ior]) && touch(a, b)
+        a.shape != b.shape && is_matched([a.interior.ior, b.interior.ior]) && touch(aabb(a), aabb(b))
     };
     rough.iter().any(|body| is_matched([body.interior.ior, 1.0]))
         || rough.len().saturating_mul(refracting.len()) > MOST_PAIRS
         || rough.iter().any(|body| refracting.iter().any(|other| matches(body, other)))
+}
+
+/// Whether boxes overlap or touch, where surfaces that coincide may differ by rounding.
+pub(super) fn touch((min, max): (Vec3, Vec3), (other_min, other_max): (Vec3, Vec3)) -> bool {
+    let corners = [min, max, other_min, other_max].map(|corner| corner.abs().max_element());
+    let rounding = Vec3::splat(1e-5 * corners.into_iter().fold(0.0, f32::max));
+    min.cmple(other_max + rounding).all() && other_min.cmple(max + rounding).all()
 }
 
 /// The shapes whose boxes hold a point, in their order: whatever lies inside of a shape has the centre of its

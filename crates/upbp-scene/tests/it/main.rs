@@ -9,3 +9,4 @@ mod rooms;
 mod shipped_scenes;
 mod skies;
 mod vessels;
+mod walls;

@@ -1,0 +1,79 @@
+//! Bodies whose surface is met by every way into or out of them.
+
+use glam::Vec3;
+use upbp_accel::SceneGeometry;
+use upbp_estimators::scene::Boundary;
+use upbp_media::{Homogeneous, Medium as _, MediumId};
+
+use super::bodies::touch;
+use crate::camera::PerspectiveCamera;
+use crate::light::Light;
+use crate::scene::{Body, Surface, Walls};
+
+/// In a scene of more pairs of bodies nothing is known of walls, which is always allowed.
+const MOST_PAIRS: usize = 1 << 24;
+
+/// A box around a shape.
+type Aabb = (Vec3, Vec3);
+
+/// The walls of bodies, which are in order, the lowest first.
+///
+/// A body that refracts has no surface where a stronger, index-matched one reaches into it: light goes on
+/// through that one. Boxes decide, so that a body may be taken for open that is not.
+pub(super) fn walls(
+    bodies: &[Body],
+    surfaces: &[Surface],
+    geometry: &SceneGeometry,
+    media: &[Homogeneous],
+    lights: &[Light],
+    camera: &PerspectiveCamera,
+) -> Vec<Walls> {
+    let aabb = |body: &Body| geometry.shape(body.shape).aabb();
+    let boundary = |body: &Body| &surfaces[body.shape.0 as usize].boundary;
+    let matched: Vec<(usize, Aabb)> = bodies
+        .iter()
+        .enumerate()
+        .filter(|(_, body)| matches!(boundary(body), Boundary::Null(_)))
+        .map(|(place, body)| (place, aabb(body)))
+        .collect();
+    let lamps = surfaces.iter().zip(geometry.shapes()).filter(|(surface, _)| surface.emitter.is_some());
+    let points = lights.iter().filter_map(Light::position).map(|point| (point, point));
+    let radius = Vec3::splat(camera.lens_radius());
+    let lens = (camera.origin() - radius, camera.origin() + radius);
+    let ends: Vec<Aabb> = lamps.map(|(_, shape)| shape.aabb()).chain(points).chain([lens]).collect();
+    if bodies.len().saturating_mul(matched.len() + ends.len()) > MOST_PAIRS {
+        return vec![Walls { refract: false, seal: false }; bodies.len()];
+    }
+    let of_body = |(place, body): (usize, &Body)| {
+        let own = aabb(body);
+        let refract = matches!(boundary(body), Boundary::Refracting(..))
+            && !matched.iter().any(|(other, aabb)| *other > place && touch(own, *aabb));
+        let emits = body.interior.medium.is_some_and(|id| media[id.0 as usize].emits());
+        Walls { refract, seal: refract && !emits && !ends.iter().any(|end| touch(own, *end)) }
+    };
+    bodies.iter().enumerate().map(of_body).collect()
+}
+
+/// The largest coordinate of places in each medium, or the distance from which a ray may get into it without
+/// a surface, whichever is more: the radius of the scene, but for media that are all behind walls.
+pub(super) fn extents(
+    bodies: &[Body],
+    walls: &[Walls],
+    geometry: &SceneGeometry,
+    media: usize,
+    outside: Option<MediumId>,
+    radius: f32,
+) -> Vec<f32> {
+    let mut extents = vec![0.0_f32; media];
+    if let Some(medium) = outside {
+        extents[medium.0 as usize] = radius;
+    }
+    for (body, walls) in bodies.iter().zip(walls) {
+        let Some(medium) = body.interior.medium else { continue };
+        let (min, max) = geometry.shape(body.shape).aabb();
+        let within = min.abs().max(max.abs()).max_element().max(min.distance(max));
+        let extent = &mut extents[medium.0 as usize];
+        *extent = extent.max(if walls.refract { within } else { radius });
+    }
+    extents
+}
