@@ -30,11 +30,11 @@ fn shipped(name: &str) -> ReadyScene {
     ReadyScene::load(root.join(format!("examples/scenes/{name}.ron"))).expect("a valid scene")
 }
 
-/// Matt things under an overcast sky.
+/// Matt things under an overcast sky, in a picture that is large enough for a pilot render to tell.
 const MATT: &str = r#"(
   version: 1,
   camera: Perspective(origin: (0, 1, 3.4), target: (0, 0.6, 0), fov_degrees: 40),
-  film: (width: 48, height: 48),
+  film: (width: 96, height: 96),
   materials: { "white": Lambert(0.7), "red": Lambert((0.6, 0.1, 0.1)) },
   shapes: [
     (material: "white", geometry: Quad(origin: (-2, 0, -2), edge_u: (0, 0, 4), edge_v: (4, 0, 0))),
