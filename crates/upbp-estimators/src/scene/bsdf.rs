@@ -133,6 +133,9 @@ pub trait Bsdf: Copy + Send + Sync {
 
     /// Probability in `(0, 1]` to continue a walk that arrives from `from`: local Russian roulette. It may
     /// depend on nothing but the point and `from`, since the walk of the other side has to know it.
+    ///
+    /// Tell the albedo. With the default, one, walks in a closed scene go on until nothing is left of them,
+    /// over hundreds of vertices.
     fn continuation(&self, from: Vec3) -> f32 {
         let _ = from;
         1.0

@@ -53,7 +53,9 @@ pub struct EmitterPoint {
     /// as wide as the sphere that is given and at least its radius before its centre; elsewhere whatever is
     /// at hand, since only the direction counts.
     pub position: Vec3,
-    /// The normal of the emitting side for [`EmitterKind::Area`]; of no meaning for the other kinds.
+    /// The normal of the emitting side for [`EmitterKind::Area`]; where a walk meets the light, the
+    /// [geometric normal](super::Hit::geometric_normal) of the hit, whichever side shines; of no meaning for
+    /// the other kinds.
     pub normal: Vec3,
 }
 

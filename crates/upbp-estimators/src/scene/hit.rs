@@ -52,7 +52,9 @@ impl<B> Boundary<B> {
 pub struct Hit<B> {
     /// Distance along the ray, scene units.
     pub t: f32,
-    /// The point, as close to the surface as the host can tell.
+    /// The point, within a few roundings of its own coordinates of the surface, however far away the ray
+    /// began: rays that leave start [`RAY_OFFSET`](crate::RAY_OFFSET) of these off it. The end of a ray has
+    /// the roundings of its length, so that a host puts it onto its plane or sphere.
     pub position: Vec3,
     /// Unit normal of the surface proper; points out of a closed body.
     pub geometric_normal: Vec3,
@@ -60,7 +62,8 @@ pub struct Hit<B> {
     pub shading_normal: Vec3,
     /// Scattering of the surface, and the body that it encloses.
     pub boundary: Boundary<B>,
-    /// The light that the surface carries.
+    /// The light that the surface carries. One that light passes straight carries none: walks do not stop
+    /// there.
     pub emitter: Option<EmitterId>,
 }
 

@@ -47,7 +47,8 @@ pub trait Scene: Sync {
     /// them, over the cosine, before the surface that it leads to.
     fn intersect(&self, ray: &Ray) -> Option<Hit<Self::Bsdf>>;
 
-    /// A sphere around all finite geometry and lights.
+    /// A sphere around all geometry, and all lights but infinite ones: light from infinity does not begin
+    /// elsewhere, so that what lies outside, as an endless ground does, gets too little of it.
     fn bounds(&self) -> BoundingSphere;
 
     /// All lights.
