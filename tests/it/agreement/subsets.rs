@@ -24,7 +24,7 @@ pub(crate) const SIZE: u32 = 48;
 
 const ITERATIONS: u64 = 30;
 
-fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoices {
+pub(super) fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> IterationChoices {
     let radius = 0.02;
     IterationChoices {
         seed,
@@ -91,7 +91,7 @@ fn iteration_in<S: Scene, L: Lanes>(scene: &S, choices: &IterationChoices) -> f6
 }
 
 /// Mean and standard error over the iterations.
-fn mean<S: Scene>(scene: &S, choices: &IterationChoices) -> (f64, f64) {
+pub(super) fn mean<S: Scene>(scene: &S, choices: &IterationChoices) -> (f64, f64) {
     mean_of_blocks(scene, choices, ITERATIONS, 1)
 }
 

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 use upbp_accel::Ray;
-use upbp_media::{EdgeDensity, Lanes, Medium, MediumId, MediumStack, RaySegment};
+use upbp_media::{BodyId, EdgeDensity, Lanes, Medium, MediumId, MediumStack, RaySegment};
 
 use super::crossing::{correction, correction_of_escape, cross_all, is_surface, may_correct};
 use super::interaction::MediumInterface;
@@ -459,6 +459,19 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             let _ = stack.cross(crossing.interior, crossing.entering);
         }
         stack
+    }
+
+    /// Whether any of the bodies that count within `span` is such a one.
+    pub(crate) fn any_body_in(&self, span: &MediumSpan<L>, is_such: impl Fn(BodyId) -> bool) -> bool {
+        let counts = |stack: &MediumStack| stack.top().is_some_and(|top| is_such(top.body));
+        let mut stack = self.start.clone();
+        cross_all(&mut stack, &self.crossings[..span.crossings]);
+        let within = &self.crossings[span.crossings..];
+        counts(&stack)
+            || within.iter().take_while(|crossing| crossing.t < span.end).any(|crossing| {
+                let _ = stack.cross(crossing.interior, crossing.entering);
+                counts(&stack)
+            })
     }
 
     /// The bodies where the walk stops, or on the two sides of the surface.

@@ -28,7 +28,7 @@ pub(crate) fn emission_along<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     if plan.mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
         return;
     }
-    let has_others = prepared.has_volume_emitters() && edge.depth > 1 && !edge.mis.is_alone();
+    let may_have_others = prepared.has_volume_emitters() && edge.depth > 1 && !edge.mis.is_alone();
     for span in &edge_trace.spans {
         let Some(medium) = span.medium else { continue };
         let medium = &prepared.scene.media()[medium.0 as usize];
@@ -36,7 +36,8 @@ pub(crate) fn emission_along<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             continue;
         }
         let segment = edge_trace.segment(span, span.end);
-        if has_others {
+        let is_emitter = |body| prepared.volume_emitter(body).is_some();
+        if may_have_others && edge_trace.any_body_in(span, is_emitter) {
             if let Some(t) = medium.sample_emitted(&segment, stream.uniform()) {
                 let pdf = medium.pdf_emitted(&segment, t);
                 emission_at(context, edge_trace, span, t, pdf, medium, edge, out);
