@@ -92,8 +92,9 @@ impl Room {
 
     /// Items that a small run of the preparation may have, with as many bytes of others beside them.
     pub(crate) const fn items<T>(&self) -> u64 {
-        /// As they are traced, put together in lists that double, and made ready for queries or predictions.
-        const COPIES: u64 = 4;
+        /// As they are traced, put together in lists that double, made ready for queries or predictions, and
+        /// once more as what neighbours have in common, which is most of them where light is merged.
+        const COPIES: u64 = 5;
         self.light_bytes / 2 / (COPIES * size_of::<T>() as u64)
     }
 

@@ -19,7 +19,8 @@ type Aabb = (Vec3, Vec3);
 /// The walls of bodies, which are in order, the lowest first.
 ///
 /// A body that refracts has no surface where a stronger, index-matched one reaches into it: light goes on
-/// through that one. Boxes decide, so that a body may be taken for open that is not.
+/// through that one. Boxes decide, so that a body may be taken for open that is not. A film that is too thin
+/// to be a wall, between equal indices, is left out.
 pub(super) fn walls(
     bodies: &[Body],
     surfaces: &[Surface],
