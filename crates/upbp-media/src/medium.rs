@@ -215,8 +215,8 @@ pub trait Medium: Send + Sync {
     /// Draws the distance from the ray's origin, in `[start, end)`, of a point whose light is looked at;
     /// `None` if nothing is seen. `u` is uniform in `[0, 1)`.
     ///
-    /// Good in proportion to the light that it sends to `start`; the default is uniform, and sees nothing of a
-    /// segment without an end, as no body has.
+    /// Good in proportion to the light that it sends to `start`; the default is uniform, and sees nothing of
+    /// a segment without an end, as no body has.
     fn sample_emitted(&self, segment: &RaySegment, u: f32) -> Option<f32> {
         let length = segment.length();
         (length > 0.0 && length.is_finite())
