@@ -109,7 +109,7 @@ pub(in crate::auto) fn pilot() -> PilotRender {
 
 #[test]
 fn the_only_cell_is_relative_to_itself() {
-    let [own, others] = [DVec3::new(0.3, 0.2, 0.1), DVec3::splat(0.7)];
+    let [own, others] = [DVec3::new(0.5, 0.25, 0.125), DVec3::splat(0.75)];
     assert_eq!(surroundings(&[own], 1), [own]);
     assert!(relative_to(&surroundings(&[own], 1))[0].max_element() < 10.0);
     assert_eq!(surroundings(&[own, others], 2), [others, own]);
