@@ -33,7 +33,7 @@ pub(crate) struct Body {
     pub(crate) interior: Interior,
 }
 
-/// What surrounds the place where a body counts.
+/// The walls of the place where a body counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Walls {
     /// Every way into or out of it meets a surface that scatters: that of the body itself, or of a stronger

@@ -55,8 +55,8 @@ const THIN: &str = "sigma_a: 0.5, emission: (3, 2, 1)";
 const THICK: &str = "sigma_a: (20, 40, 80), sigma_s: 5, emission: (3, 2, 1)";
 const GLOW: &str = "sigma_s: 2, glow: (3, 2, 1)";
 
-/// What shines around everything, whose channels end at very different distances, and a flame below the floor
-/// that nothing on it sees.
+/// A medium shines around everything, its channels to very different distances, and a flame below the floor,
+/// which nothing on it sees.
 #[test]
 fn light_that_no_other_technique_finds_is_gathered_without_noise() {
     let text = "(version: 1, camera: Perspective(origin: (0, 0.01, 0), target: (0, 0, 0), up: (0, 0, 1), fov_degrees: 1),

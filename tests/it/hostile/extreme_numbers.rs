@@ -1,6 +1,6 @@
 //! Everything that is sampled, with the random numbers at the ends of their range: 0 and the largest below 1.
 //!
-//! What is returned is finite, has a positive density, and lies where the contract says. Materials:
+//! All answers are finite, have a positive density, and lie where the contract says. Materials:
 //! `upbp-scene/src/material/tests.rs`.
 
 use glam::{Vec2, Vec3};

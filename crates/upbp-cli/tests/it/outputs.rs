@@ -213,7 +213,7 @@ fn a_name_that_ends_in_png_makes_a_png_alone() {
     }
 }
 
-/// What is known before the first iteration.
+/// The plan and the report are known before the first iteration.
 #[test]
 fn a_check_writes_the_plan_and_the_report() {
     let folder = prepared("check");

@@ -55,22 +55,27 @@ impl Builder<'_> {
 
     /// Notes bodies both of whose faces are met as one, so that light passes as if there was nothing.
     pub(super) fn note_thin_bodies(&mut self, places: Places<'_>) {
+        let mut known = BTreeSet::new();
         let is_thin = |index: usize| {
+            let is_body = matches!(places.drafts[index].boundary, BoundaryDraft::Refracting(..));
+            // The areas of a copy far away are its own.
+            if !is_body || is_known_mesh(&self.description.shapes[index].geometry, &mut known) {
+                return None;
+            }
             let shape = places.shape(index);
             let (min, max) = shape.aabb();
             let largest = min.abs().max(max.abs()).max_element();
             let thickness = 2.0 * shape.volume() / shape.area();
-            let is_body = matches!(places.drafts[index].boundary, BoundaryDraft::Refracting(..));
-            (is_body && thickness < COINCIDENT * largest).then_some((index, thickness, largest))
+            (thickness < COINCIDENT * largest).then_some((index, thickness, largest))
         };
-        let mut thin = (0..places.drafts.len()).filter_map(is_thin);
-        if let Some((index, thickness, largest)) = thin.next() {
+        let thin: Vec<_> = (0..places.drafts.len()).filter_map(is_thin).collect();
+        if let [(index, thickness, largest), others @ ..] = thin[..] {
             self.note(
                 self.shape_item(index),
                 format!(
-                    "is {thickness} thick, at coordinates up to {largest}, and is not seen: surfaces that are nearer to each \
+                    "is {thickness} thick, and is not seen at coordinates up to {largest}: surfaces that are nearer to each \
                      other than 5e-6 of their coordinates are met as one{}",
-                    and_others(thin.count(), ["is", "are"])
+                    and_others(others.len(), ["is", "are"])
                 ),
             );
         }
@@ -134,10 +139,7 @@ impl Builder<'_> {
                 continue;
             };
             // Of copies one is enough.
-            let is_copy = match &self.description.shapes[index].geometry {
-                Geometry::Mesh { file: Some(file), part, .. } => !known.insert((file, part)),
-                _ => false,
-            };
+            let is_copy = is_known_mesh(&self.description.shapes[index].geometry, &mut known);
             if is_copy || mesh.parts().len() < 2 {
                 continue;
             }
@@ -157,6 +159,14 @@ impl Builder<'_> {
                 );
             }
         }
+    }
+}
+
+/// Whether a geometry is the same part of the same file as one in `known`, to which it belongs from then on.
+fn is_known_mesh<'a>(geometry: &'a Geometry, known: &mut BTreeSet<(&'a str, Option<&'a str>)>) -> bool {
+    match geometry {
+        Geometry::Mesh { file: Some(file), part, .. } => !known.insert((file, part.as_deref())),
+        _ => false,
     }
 }
 

@@ -50,7 +50,7 @@ fn bodies_too_thin_to_be_seen_are_noted() {
     let found = with(&(pane(0.0, 0.004) + &pane(1000.0, 0.004) + &pane(1500.0, 0.006)));
     assert_eq!(found.len(), 1, "{found:?}");
     assert!(
-        found[0].starts_with("shape `pane 1000`: is 0.00") && found[0].contains("and is not seen"),
+        found[0].starts_with("shape `pane 1000`: is 0.00") && found[0].contains("is not seen at coordinates"),
         "{found:?}"
     );
     assert!(
