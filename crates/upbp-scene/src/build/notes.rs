@@ -69,9 +69,9 @@ impl Builder<'_> {
             (thickness < COINCIDENT * largest).then_some((index, thickness, largest))
         };
         let thin: Vec<_> = (0..places.drafts.len()).filter_map(is_thin).collect();
-        if let [(index, thickness, largest), others @ ..] = thin[..] {
+        if let [(index, thickness, largest), others @ ..] = &thin[..] {
             self.note(
-                self.shape_item(index),
+                self.shape_item(*index),
                 format!(
                     "is {thickness} thick, and is not seen at coordinates up to {largest}: surfaces that are nearer to each \
                      other than 5e-6 of their coordinates are met as one{}",
