@@ -110,37 +110,46 @@ pub(crate) trait Task {
 /// Runs a task with the best instructions that this processor has.
 #[inline]
 pub(crate) fn run(task: impl Task) {
+    run_or(task, |task| task.run(Plain));
+}
+
+/// Runs a task with the best instructions that this processor has, but with `otherwise` on one that has a
+/// choice and lacks the better ones.
+///
+/// A task with closures is compiled for each of them: this saves to compile it twice for instructions that
+/// few processors lack.
+#[inline]
+pub(crate) fn run_or<T: Task>(task: T, otherwise: impl FnOnce(T)) {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     match Arch::new() {
-        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         Arch::V3(simd) => simd.vectorize(avx2::Vectorised { task, simd }),
-        _ => task.run(Plain),
+        _ => otherwise(task),
+    }
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    {
+        let _ = otherwise;
+        task.run(Plain);
     }
 }
 
 /// A choice of instructions.
 #[cfg(feature = "geometry")]
-pub(crate) trait Instructions: Copy {
-    fn run(self, task: impl Task);
-}
-
-/// The best that this processor has.
-#[cfg(feature = "geometry")]
 #[derive(Clone, Copy)]
-pub(crate) struct Best;
-
-#[cfg(feature = "geometry")]
-impl Instructions for Best {
-    #[inline]
-    fn run(self, task: impl Task) {
-        run(task);
-    }
+pub(crate) enum Instructions {
+    /// The best that this processor has.
+    Best,
+    /// Those that every processor has.
+    Plain,
 }
 
 #[cfg(feature = "geometry")]
-impl Instructions for Plain {
-    #[inline]
-    fn run(self, task: impl Task) {
-        task.run(self);
+impl Instructions {
+    pub(crate) fn run(self, task: impl Task) {
+        match (self, Arch::new()) {
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            (Self::Best, Arch::V3(simd)) => simd.vectorize(avx2::Vectorised { task, simd }),
+            _ => task.run(Plain),
+        }
     }
 }
 

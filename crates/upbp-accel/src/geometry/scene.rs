@@ -16,7 +16,7 @@ use super::primitive::{Name, Packing, Primitives, Probe};
 use super::shape::Shape;
 use super::sphere::Sphere;
 use crate::ray::Ray;
-use crate::simd::{Best, Instructions, Task, Wide};
+use crate::simd::{Instructions, Task, Wide, run_or};
 
 /// The shapes of a scene, ready for rays.
 #[derive(Clone, Debug)]
@@ -78,7 +78,7 @@ impl SceneGeometry {
         let Shape::Mesh(mesh) = self.shape(id) else { return self.shape(id).contains(point) };
         mesh.contains_by(point, |ray| {
             let mut crossings = 0;
-            self.search::<false>(Best, ray, |candidate| {
+            self.search::<false>(ray, |candidate| {
                 crossings += usize::from(candidate.shape == id);
                 Visit::Continue
             });
@@ -92,7 +92,7 @@ impl SceneGeometry {
     /// Spheres and boxes report where the line enters and where it leaves. The visitor may shorten the ray
     /// or stop.
     pub fn for_each_hit(&self, ray: Ray, visit: impl FnMut(&Candidate) -> Visit) {
-        self.search::<true>(Best, ray, visit);
+        self.search::<true>(ray, visit);
     }
 
     /// The nearest intersection in `(t_min, t_max)`; of several at the same distance, that of the earliest
@@ -122,45 +122,47 @@ impl SceneGeometry {
     /// Cheaper than [`for_each_hit`](Self::for_each_hit) where the nearest intersection is of no interest.
     pub fn any_where(&self, ray: Ray, mut accept: impl FnMut(&Candidate) -> bool) -> bool {
         let mut found = false;
-        self.search::<false>(Best, ray, |candidate| {
+        self.search::<false>(ray, |candidate| {
             found = accept(candidate);
             if found { Visit::Stop } else { Visit::Continue }
         });
         found
     }
 
-    /// Visits what is no copy first.
+    /// Calls `visit` for every intersection, those of nearer boxes first or in any order.
     #[inline]
-    fn search<const IN_ORDER: bool>(
-        &self,
-        instructions: impl Instructions,
-        ray: Ray,
-        mut visit: impl FnMut(&Candidate) -> Visit,
-    ) {
+    fn search<const IN_ORDER: bool>(&self, ray: Ray, mut visit: impl FnMut(&Candidate) -> Visit) {
         if self.instances.is_empty() {
-            instructions.run(Search::<_, IN_ORDER> { scene: self, ray, visit });
+            run_or(Search::<_, IN_ORDER> { scene: self, ray, visit }, |mut search| {
+                self.search_with(Instructions::Plain, IN_ORDER, ray, &mut search.visit);
+            });
         } else {
-            self.search_with_copies::<IN_ORDER>(instructions, ray, &mut visit);
+            self.search_with(Instructions::Best, IN_ORDER, ray, &mut visit);
         }
     }
 
-    /// The part of [`search`](Self::search) for scenes with copies of meshes.
-    fn search_with_copies<const IN_ORDER: bool>(
-        &self,
-        instructions: impl Instructions,
-        ray: Ray,
-        visit: OnHit,
-    ) {
+    /// As [`search`](Self::search), with these instructions and copies of meshes, which come last. Compiled
+    /// once instead of once per caller.
+    fn search_with(&self, instructions: Instructions, in_order: bool, ray: Ray, visit: OnHit) {
         let (mut rest, mut is_done) = (ray, false);
         let visit_first: OnHit = &mut |candidate| {
             let answer = visit(candidate);
             is_done = answer.apply(&mut rest.t_max).is_break();
             answer
         };
-        instructions.run(Search::<_, IN_ORDER> { scene: self, ray, visit: visit_first });
-        if !is_done {
-            let (instances, extent) = (&self.instances, self.extent_from(rest.origin));
-            instructions.run(InstanceSearch::<IN_ORDER> { instances, ray: rest, extent, visit });
+        if in_order {
+            instructions.run(Search::<_, true> { scene: self, ray, visit: visit_first });
+        } else {
+            instructions.run(Search::<_, false> { scene: self, ray, visit: visit_first });
+        }
+        if is_done || self.instances.is_empty() {
+            return;
+        }
+        let (instances, extent) = (&self.instances, self.extent_from(rest.origin));
+        if in_order {
+            instructions.run(InstanceSearch::<true> { instances, ray: rest, extent, visit });
+        } else {
+            instructions.run(InstanceSearch::<false> { instances, ray: rest, extent, visit });
         }
     }
 

@@ -23,3 +23,6 @@ pub use point_tree::PointTree;
 pub use radius::{GrowingRadius, SearchRadius};
 pub use segment_tree::SegmentTree;
 pub use split::SplitParams;
+
+#[cfg(test)]
+mod tests;

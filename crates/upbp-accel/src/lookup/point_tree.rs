@@ -90,7 +90,22 @@ impl PointTree {
             return 0;
         }
         let ball = Ball::exact(centre, radius);
-        self.tree.search(ball, InBall { centre, radius2: radius * radius, ahead, visit })
+        let query = InBall { centre, radius2: radius * radius, ahead, visit };
+        self.tree.search(ball, query, |mut query| {
+            self.in_ball_plainly(centre, radius, &query.ahead, &mut query.visit)
+        })
+    }
+
+    /// As `in_ball_ahead`, with instructions that every processor has; compiled once.
+    pub(super) fn in_ball_plainly(
+        &self,
+        centre: Vec3,
+        radius: f32,
+        ahead: &dyn Fn(u32),
+        visit: &mut dyn FnMut(u32, f32),
+    ) -> u32 {
+        let query = InBall { centre, radius2: radius * radius, ahead, visit };
+        self.tree.search_plainly(Ball::exact(centre, radius), query)
     }
 
     /// Visits every point nearer to the ray than `radius`, at the foot of the perpendicular.
@@ -115,24 +130,51 @@ impl PointTree {
         ahead: impl Fn(u32),
         visit: impl FnMut(u32, f32, f32),
     ) -> u32 {
-        match radius.into() {
-            SearchRadius::Constant(radius) => self.within(ray, radius, ahead, visit),
-            SearchRadius::Growing(radius) => self.within(ray, GrowingAlong::new(&radius, ray), ahead, visit),
+        let radius = radius.into();
+        match radius {
+            SearchRadius::Constant(constant) => self.within(ray, constant, radius, ahead, visit),
+            SearchRadius::Growing(growing) => {
+                self.within(ray, GrowingAlong::new(&growing, ray), radius, ahead, visit)
+            }
         }
     }
 
     fn within(
         &self,
         ray: &Ray,
-        radius: impl RadiusAlong,
+        along: impl RadiusAlong,
+        radius: SearchRadius,
         ahead: impl Fn(u32),
         visit: impl FnMut(u32, f32, f32),
     ) -> u32 {
-        if !(radius.largest() > 0.0) {
+        if !(along.largest() > 0.0) {
             return 0;
         }
-        let region = ThickRay::new(ray, radius);
-        self.tree.search(region, AroundRay { ray: *ray, radius, ahead, visit })
+        let query = AroundRay { ray: *ray, radius: along, ahead, visit };
+        self.tree.search(ThickRay::new(ray, along), query, |mut query| {
+            self.around_ray_plainly(ray, radius, &query.ahead, &mut query.visit)
+        })
+    }
+
+    /// As `around_ray`, with instructions that every processor has; compiled once.
+    pub(super) fn around_ray_plainly(
+        &self,
+        ray: &Ray,
+        radius: SearchRadius,
+        ahead: &dyn Fn(u32),
+        visit: &mut dyn FnMut(u32, f32, f32),
+    ) -> u32 {
+        match radius {
+            SearchRadius::Constant(radius) => {
+                let query = AroundRay { ray: *ray, radius, ahead, visit };
+                self.tree.search_plainly(ThickRay::new(ray, radius), query)
+            }
+            SearchRadius::Growing(radius) => {
+                let radius = GrowingAlong::new(&radius, ray);
+                let query = AroundRay { ray: *ray, radius, ahead, visit };
+                self.tree.search_plainly(ThickRay::new(ray, radius), query)
+            }
+        }
     }
 }
 

@@ -7,7 +7,7 @@
 use super::boxes::Boxes;
 use super::region::Region;
 use super::tree::{MAX_LEVELS, PackedTree};
-use crate::simd::{Task, WIDTH, Wide, run, set_lanes};
+use crate::simd::{Plain, Task, WIDTH, Wide, run_or, set_lanes};
 
 /// The greatest number of blocks or leaves that wait to be looked at.
 const WAITING: usize = 24;
@@ -36,11 +36,31 @@ pub(super) trait Query<B> {
 impl<L: Boxes, B> PackedTree<L, B> {
     /// Reports the wanted items of all blocks whose boxes overlap `region`, in the order of the blocks.
     /// Returns the number of nodes, leaves and blocks that it looked at.
+    ///
+    /// Without vector instructions `otherwise` is asked, since all this is compiled for each query: it
+    /// [searches](Self::search_plainly) with a query of its own, whose closures are called by reference.
     #[inline]
-    pub(super) fn search(&self, region: impl Region, query: impl Query<B>) -> u32 {
+    pub(super) fn search<R: Region, Q: Query<B>>(
+        &self,
+        region: R,
+        query: Q,
+        otherwise: impl FnOnce(Q) -> u32,
+    ) -> u32 {
         let mut tests = 0;
         if !self.nodes.is_empty() {
-            run(Traversal { tree: self, region, query, tests: &mut tests });
+            let mut plain = None;
+            let traversal = Traversal { tree: self, region, query, tests: &mut tests };
+            run_or(traversal, |traversal| plain = Some(otherwise(traversal.query)));
+            tests = plain.unwrap_or(tests);
+        }
+        tests
+    }
+
+    /// As [`search`](Self::search), with instructions that every processor has.
+    pub(super) fn search_plainly(&self, region: impl Region, query: impl Query<B>) -> u32 {
+        let mut tests = 0;
+        if !self.nodes.is_empty() {
+            Traversal { tree: self, region, query, tests: &mut tests }.run(Plain);
         }
         tests
     }

@@ -117,18 +117,50 @@ impl SegmentTree {
         radius: impl Into<SearchRadius>,
         visit: impl FnMut(u32, ClosestApproach),
     ) -> u32 {
-        match radius.into() {
-            SearchRadius::Constant(radius) => self.within(ray, radius, visit),
-            SearchRadius::Growing(radius) => self.within(ray, GrowingAlong::new(&radius, ray), visit),
+        let radius = radius.into();
+        match radius {
+            SearchRadius::Constant(constant) => self.within(ray, constant, radius, visit),
+            SearchRadius::Growing(growing) => {
+                self.within(ray, GrowingAlong::new(&growing, ray), radius, visit)
+            }
         }
     }
 
-    fn within(&self, ray: &Ray, radius: impl RadiusAlong, visit: impl FnMut(u32, ClosestApproach)) -> u32 {
-        if !(radius.largest() > 0.0) {
+    fn within(
+        &self,
+        ray: &Ray,
+        along: impl RadiusAlong,
+        radius: SearchRadius,
+        visit: impl FnMut(u32, ClosestApproach),
+    ) -> u32 {
+        if !(along.largest() > 0.0) {
             return 0;
         }
-        let region = ThickRay::new(ray, radius);
-        self.tree.search(region, AroundRay { payloads: &self.payloads, ray: *ray, radius, visit })
+        let query = AroundRay { payloads: &self.payloads, ray: *ray, radius: along, visit };
+        self.tree.search(ThickRay::new(ray, along), query, |mut query| {
+            self.around_ray_plainly(ray, radius, &mut query.visit)
+        })
+    }
+
+    /// As `around_ray`, with instructions that every processor has; compiled once.
+    pub(super) fn around_ray_plainly(
+        &self,
+        ray: &Ray,
+        radius: SearchRadius,
+        visit: &mut dyn FnMut(u32, ClosestApproach),
+    ) -> u32 {
+        let payloads = &self.payloads;
+        match radius {
+            SearchRadius::Constant(radius) => {
+                let query = AroundRay { payloads, ray: *ray, radius, visit };
+                self.tree.search_plainly(ThickRay::new(ray, radius), query)
+            }
+            SearchRadius::Growing(radius) => {
+                let radius = GrowingAlong::new(&radius, ray);
+                let query = AroundRay { payloads, ray: *ray, radius, visit };
+                self.tree.search_plainly(ThickRay::new(ray, radius), query)
+            }
+        }
     }
 
     /// Visits every segment nearer than `radius` to `point`.
@@ -139,9 +171,21 @@ impl SegmentTree {
         if !(radius > 0.0) {
             return 0;
         }
-        let ball = Ball::widened(point, radius);
-        let radius2 = radius * radius;
-        self.tree.search(ball, AroundPoint { payloads: &self.payloads, point, radius2, visit })
+        let query = AroundPoint { payloads: &self.payloads, point, radius2: radius * radius, visit };
+        self.tree.search(Ball::widened(point, radius), query, |mut query| {
+            self.around_point_plainly(point, radius, &mut query.visit)
+        })
+    }
+
+    /// As `around_point`, with instructions that every processor has; compiled once.
+    pub(super) fn around_point_plainly(
+        &self,
+        point: Vec3,
+        radius: f32,
+        visit: &mut dyn FnMut(u32, f32, f32),
+    ) -> u32 {
+        let query = AroundPoint { payloads: &self.payloads, point, radius2: radius * radius, visit };
+        self.tree.search_plainly(Ball::widened(point, radius), query)
     }
 }
 

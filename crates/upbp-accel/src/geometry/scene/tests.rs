@@ -10,7 +10,7 @@ use rand_xoshiro::rand_core::SeedableRng as _;
 use super::super::{Quad, TriangleMesh};
 use super::*;
 use crate::geometry::triangle::RayShear;
-use crate::simd::Plain;
+use crate::simd::Instructions;
 
 struct Random(Xoshiro256PlusPlus);
 
@@ -153,11 +153,10 @@ fn check(shapes: usize, rays: usize, scale: f32, offset: Vec3, random: &mut Rand
             Visit::Continue
         };
         scene.for_each_hit(ray, &mut collect);
-        let collect = |candidate: &Candidate| {
+        scene.search_with(Instructions::Plain, true, ray, &mut |candidate| {
             plain.push(*candidate);
             Visit::Continue
-        };
-        scene.search::<true>(Plain, ray, collect);
+        });
         assert_eq!(best, plain, "instruction sets differ: {ray:?}");
         best.sort_by(|a, b| a.t.total_cmp(&b.t).then((a.shape, a.primitive).cmp(&(b.shape, b.primitive))));
         assert_eq!(best, expected, "{ray:?} {shapes:?}");
