@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 use upbp_accel::{BoxTree, Candidate, Ray, SceneGeometry, ShapeId, Visit};
-use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId, Hit, Scene};
+use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId, Enclosure, Hit, Scene};
 use upbp_media::{BodyId, Homogeneous, Interior, MediumId, MediumStack};
 
 pub(crate) use self::place::COINCIDENT;
@@ -33,16 +33,6 @@ pub(crate) struct Body {
     pub(crate) interior: Interior,
 }
 
-/// The walls of the place where a body counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Walls {
-    /// Every way into or out of it meets a surface that scatters: that of the body itself, or of a stronger
-    /// one that refracts.
-    pub(crate) refract: bool,
-    /// So it is, and there is neither a light nor the lens within.
-    pub(crate) seal: bool,
-}
-
 /// A scene that is ready to render: read it with [`load`](Self::load) or
 /// [`from_ron_str`](Self::from_ron_str), or [`build`](Self::build) it from a description.
 #[derive(Clone, Debug)]
@@ -52,7 +42,7 @@ pub struct ReadyScene {
     pub(crate) surfaces: Vec<Surface>,
     pub(crate) bodies: Vec<Body>,
     /// By the number of the body.
-    pub(crate) walls: Vec<Walls>,
+    pub(crate) enclosures: Vec<Option<Enclosure>>,
     /// By the number of the body.
     pub(crate) body_boxes: BoxTree,
     pub(crate) lights: Vec<Light>,
@@ -213,8 +203,8 @@ impl Scene for ReadyScene {
         self.extents.get(medium.0 as usize).copied().unwrap_or(self.bounds.radius)
     }
 
-    fn is_sealed(&self, body: BodyId) -> bool {
-        self.walls.get(body.0 as usize).is_some_and(|walls| walls.seal)
+    fn enclosure(&self, body: BodyId) -> Option<Enclosure> {
+        self.enclosures.get(body.0 as usize).copied().flatten()
     }
 
     fn has_connectible_surfaces(&self) -> bool {

@@ -3,10 +3,9 @@
 use upbp_media::{Lanes, MediumStack};
 
 use super::edge::{EdgeTrace, Extent};
-use super::interaction::{Interaction, MediumInterface};
 use crate::iteration::IterationPlan;
 use crate::prepared_scene::PreparedScene;
-use crate::scene::{Crossing, Scene};
+use crate::scene::{Crossing, Enclosure, Scene};
 
 /// The scene and the plan of an iteration.
 pub struct Context<'a, S: Scene> {
@@ -33,10 +32,21 @@ impl<S: Scene> Context<'_, S> {
         if to_surface { Extent::ToSurface } else { Extent::ToStop }
     }
 
-    /// Whether a vertex is in a medium from which no straight line leads to a light or to the lens.
+    /// Whether no straight line leads to a light from within the bodies of `stack`.
     #[inline]
-    pub(crate) fn is_sealed(&self, vertex: &Interaction<S::Bsdf>, sides: &MediumInterface<'_>) -> bool {
-        vertex.in_medium() && sides.near.top().is_some_and(|top| self.prepared.scene.is_sealed(top.body))
+    pub(crate) fn hides_lights(&self, stack: &MediumStack) -> bool {
+        self.enclosure(stack).is_some_and(|enclosure| !enclosure.lights)
+    }
+
+    /// Whether no straight line leads to the lens from within the bodies of `stack`.
+    #[inline]
+    pub(crate) fn hides_lens(&self, stack: &MediumStack) -> bool {
+        self.enclosure(stack).is_some_and(|enclosure| !enclosure.lens)
+    }
+
+    #[inline]
+    fn enclosure(&self, stack: &MediumStack) -> Option<Enclosure> {
+        stack.top().and_then(|top| self.prepared.scene.enclosure(top.body))
     }
 }
 

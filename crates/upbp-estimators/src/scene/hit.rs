@@ -106,3 +106,12 @@ pub struct Crossing {
     /// body of higher priority.
     pub scatters: bool,
 }
+
+/// The surfaces all around a body, and what is among them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Enclosure {
+    /// Whether a light may be where the body counts, the body itself included.
+    pub lights: bool,
+    /// Whether the lens may be, or a part of it.
+    pub lens: bool,
+}

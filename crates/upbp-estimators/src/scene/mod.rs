@@ -24,7 +24,7 @@ pub use emitter::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
     HitDensities, Incident,
 };
-pub use hit::{Boundary, Crossing, EmitterId, Hit};
+pub use hit::{Boundary, Crossing, EmitterId, Enclosure, Hit};
 
 /// A scene to render: the host's geometry and everything on it.
 ///
@@ -78,14 +78,15 @@ pub trait Scene: Sync {
         self.bounds().radius
     }
 
-    /// Whether every straight line to a light or to the lens, from any place where `body` is the one that
-    /// counts, meets a surface that scatters: milk in a glass is such a body.
+    /// What is within the surfaces all around `body`: milk in a glass and water in a pool have such.
+    /// `Some` says that every straight line from a place where `body` is the one that counts to one where it
+    /// is not meets a surface that scatters.
     ///
-    /// Then next events and connections to the lens, which would find nothing, are not tried from its medium.
-    /// `false`, the default, is always allowed.
-    fn is_sealed(&self, body: BodyId) -> bool {
+    /// Then next events and connections to the lens that would find nothing are not tried. `None`, the
+    /// default, is always allowed.
+    fn enclosure(&self, body: BodyId) -> Option<Enclosure> {
         let _ = body;
-        false
+        None
     }
 
     /// Whether any surface has a smooth lobe; `false` saves the preparation of what would find nothing.

@@ -36,16 +36,17 @@ pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let between = view.lens - vertex.position;
     let distance = between.length();
     let direction = between / distance;
+    let stack = sides.towards(vertex.interaction.crosses(vertex.towards_light, direction));
+    if context.hides_lens(stack) {
+        return;
+    }
     let Some(scattering) = vertex.evaluate(context, direction) else {
         return;
     };
     out.counters.shadow_rays += 1;
-    let crosses = vertex.interaction.crosses(vertex.towards_light, direction);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
     let target = Target::Pinpoint(view.lens);
-    let Some(density) = clear_edge::<_, L>(scene, sides.towards(crosses), origin, &target, crossings) else {
-        return;
-    };
+    let Some(density) = clear_edge::<_, L>(scene, stack, origin, &target, crossings) else { return };
     let in_medium = vertex.interaction.in_medium();
     let distance2 = f64::from(distance) * f64::from(distance);
     let ray_pdf = f64::from(view.pdf) * scattering.cos / distance2;

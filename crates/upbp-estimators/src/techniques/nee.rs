@@ -23,7 +23,7 @@ pub(crate) fn next_events<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let plan = context.plan;
     if plan.next_events == 0.0
         || !plan.lengths.contain(vertex.depth + 1)
-        || context.is_sealed(&vertex.interaction, sides)
+        || (context.hides_lights(sides.near) && context.hides_lights(sides.far))
     {
         return;
     }
@@ -49,11 +49,14 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         return;
     };
     let (kind, direction) = (light.kind(), incident.towards_light);
+    let stack = sides.towards(vertex.interaction.crosses(vertex.towards_camera, direction));
+    if context.hides_lights(stack) {
+        return;
+    }
     let Some(scattering) = vertex.evaluate(context, direction) else {
         return;
     };
     out.counters.shadow_rays += 1;
-    let crosses = vertex.interaction.crosses(vertex.towards_camera, direction);
     let origin = ray_origin(&vertex.interaction, vertex.position, direction);
     let target = match kind {
         EmitterKind::Area => Target::Surface(incident.point.position, incident.point.normal),
@@ -61,7 +64,6 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         EmitterKind::Volume(_) => Target::Medium(incident.point.position),
         EmitterKind::Directional | EmitterKind::Environment => Target::Infinity(direction),
     };
-    let stack = sides.towards(crosses);
     let Some(density) = clear_edge::<_, L>(scene, stack, origin, &target, crossings) else { return };
     if let EmitterKind::Volume(body) = kind
         && !is_in_body(stack.clone(), crossings, body)

@@ -114,7 +114,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         if connectible {
             if plan.mis.light_tracing > 0.0
                 && plan.lengths.contain(depth + 1)
-                && !context.is_sealed(&vertex.interaction, &sides)
+                && !(context.hides_lens(sides.near) && context.hides_lens(sides.far))
             {
                 light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
                 observer.call(Technique::LightTracing, 0);

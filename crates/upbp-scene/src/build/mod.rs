@@ -7,13 +7,13 @@
 mod bodies;
 mod builder;
 mod camera;
+mod enclosures;
 mod extent;
 mod lights;
 mod media;
 mod notes;
 mod rooms;
 mod surfaces;
-mod walls;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -140,8 +140,9 @@ impl Builder<'_> {
         let is_specular =
             surfaces.iter().filter_map(|surface| surface.boundary.bsdf()).any(Material::is_specular)
                 || bodies::may_match(&bodies, &surfaces, &geometry);
-        let walls = walls::walls(&bodies, &surfaces, &geometry, &media, &lights, &camera);
-        let extents = walls::extents(&bodies, &walls, &geometry, media.len(), outside, bounds.radius);
+        let enclosures = enclosures::find(&bodies, &surfaces, &geometry, &media, &lights, &camera);
+        let extents =
+            enclosures::extents(&bodies, &enclosures, &geometry, media.len(), outside, bounds.radius);
         let body_boxes = BoxTree::new(bodies.iter().map(|body| geometry.shape(body.shape).aabb()));
         let body_boxes = body_boxes.map_err(|error| self.problem("shapes", error)).ok()?;
         let (hash, files) = (self.hash.0, std::mem::take(&mut self.files));
@@ -150,7 +151,7 @@ impl Builder<'_> {
             geometry,
             surfaces,
             bodies,
-            walls,
+            enclosures,
             body_boxes,
             lights,
             media,

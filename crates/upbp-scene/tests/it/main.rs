@@ -1,6 +1,7 @@
 //! Scenes from files: what is refused, what ships, and what the checkers say.
 
 mod checkers;
+mod enclosures;
 mod errors;
 mod mesh_files;
 mod no_effect;
@@ -9,4 +10,3 @@ mod rooms;
 mod shipped_scenes;
 mod skies;
 mod vessels;
-mod walls;

@@ -1,34 +1,34 @@
-//! Bodies whose surface is met by every way into or out of them.
+//! Surfaces all around bodies, which every way into or out of them meets.
 
 use glam::Vec3;
 use upbp_accel::SceneGeometry;
-use upbp_estimators::scene::Boundary;
+use upbp_estimators::scene::{Boundary, Enclosure};
 use upbp_media::{Homogeneous, Medium as _, MediumId};
 
 use super::bodies::touch;
 use crate::camera::PerspectiveCamera;
 use crate::light::Light;
-use crate::scene::{Body, Surface, Walls};
+use crate::scene::{Body, Surface};
 
-/// In a scene of more pairs of bodies nothing is known of walls, which is always allowed.
+/// In a scene of more pairs of bodies nothing is known, which is always allowed.
 const MOST_PAIRS: usize = 1 << 24;
 
 /// A box around a shape.
 type Aabb = (Vec3, Vec3);
 
-/// The walls of bodies, which are in order, the lowest first.
+/// The enclosures of bodies, which are in order, the lowest first.
 ///
 /// A body that refracts has no surface where a stronger, index-matched one reaches into it: light goes on
-/// through that one. Boxes decide, so that a body may be taken for open that is not. A film that is too thin
-/// to be a wall, between equal indices, is left out.
-pub(super) fn walls(
+/// through that one. Boxes decide, so that a body may be taken for open that is not, and a light to be within
+/// that is beside. A film that is too thin to be a body of its own, between equal indices, is left out.
+pub(super) fn find(
     bodies: &[Body],
     surfaces: &[Surface],
     geometry: &SceneGeometry,
     media: &[Homogeneous],
     lights: &[Light],
     camera: &PerspectiveCamera,
-) -> Vec<Walls> {
+) -> Vec<Option<Enclosure>> {
     let aabb = |body: &Body| geometry.shape(body.shape).aabb();
     let boundary = |body: &Body| &surfaces[body.shape.0 as usize].boundary;
     let matched: Vec<(usize, Aabb)> = bodies
@@ -37,29 +37,33 @@ pub(super) fn walls(
         .filter(|(_, body)| matches!(boundary(body), Boundary::Null(_)))
         .map(|(place, body)| (place, aabb(body)))
         .collect();
-    let lamps = surfaces.iter().zip(geometry.shapes()).filter(|(surface, _)| surface.emitter.is_some());
+    let surface_lamps =
+        surfaces.iter().zip(geometry.shapes()).filter(|(surface, _)| surface.emitter.is_some());
     let points = lights.iter().filter_map(Light::position).map(|point| (point, point));
+    let lamps: Vec<Aabb> = surface_lamps.map(|(_, shape)| shape.aabb()).chain(points).collect();
     let radius = Vec3::splat(camera.lens_radius());
     let lens = (camera.origin() - radius, camera.origin() + radius);
-    let ends: Vec<Aabb> = lamps.map(|(_, shape)| shape.aabb()).chain(points).chain([lens]).collect();
-    if bodies.len().saturating_mul(matched.len() + ends.len()) > MOST_PAIRS {
-        return vec![Walls { refract: false, seal: false }; bodies.len()];
+    if bodies.len().saturating_mul(matched.len() + lamps.len()) > MOST_PAIRS {
+        return vec![None; bodies.len()];
     }
     let of_body = |(place, body): (usize, &Body)| {
         let own = aabb(body);
-        let refract = matches!(boundary(body), Boundary::Refracting(..))
+        let encloses = matches!(boundary(body), Boundary::Refracting(..))
             && !matched.iter().any(|(other, aabb)| *other > place && touch(own, *aabb));
-        let emits = body.interior.medium.is_some_and(|id| media[id.0 as usize].emits());
-        Walls { refract, seal: refract && !emits && !ends.iter().any(|end| touch(own, *end)) }
+        let emits = || body.interior.medium.is_some_and(|id| media[id.0 as usize].emits());
+        encloses.then(|| Enclosure {
+            lights: emits() || lamps.iter().any(|lamp| touch(own, *lamp)),
+            lens: touch(own, lens),
+        })
     };
     bodies.iter().enumerate().map(of_body).collect()
 }
 
 /// The largest coordinate of places in each medium, or the distance from which a ray may get into it without
-/// a surface, whichever is more: the radius of the scene, but for media that are all behind walls.
+/// a surface, whichever is more: the radius of the scene, but for media in bodies that are all enclosed.
 pub(super) fn extents(
     bodies: &[Body],
-    walls: &[Walls],
+    enclosures: &[Option<Enclosure>],
     geometry: &SceneGeometry,
     media: usize,
     outside: Option<MediumId>,
@@ -69,12 +73,12 @@ pub(super) fn extents(
     if let Some(medium) = outside {
         extents[medium.0 as usize] = radius;
     }
-    for (body, walls) in bodies.iter().zip(walls) {
+    for (body, enclosure) in bodies.iter().zip(enclosures) {
         let Some(medium) = body.interior.medium else { continue };
         let (min, max) = geometry.shape(body.shape).aabb();
         let within = min.abs().max(max.abs()).max_element().max(min.distance(max));
         let extent = &mut extents[medium.0 as usize];
-        *extent = extent.max(if walls.refract { within } else { radius });
+        *extent = extent.max(if enclosure.is_some() { within } else { radius });
     }
     extents
 }

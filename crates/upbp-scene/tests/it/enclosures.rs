@@ -1,10 +1,10 @@
-//! Bodies that no straight line leaves for a light or the lens without meeting a surface.
+//! Bodies that no straight line leaves without meeting a surface, and what is in them.
 
 use glam::Vec3;
 use proptest::prelude::*;
 use upbp_estimators::PreparedScene;
 use upbp_estimators::path::{Target, clear_edge};
-use upbp_estimators::scene::{Camera as _, Scene};
+use upbp_estimators::scene::{Camera as _, Enclosure, Scene};
 use upbp_media::MediumId;
 use upbp_scene::ReadyScene;
 
@@ -30,8 +30,11 @@ fn ball(radius: f32, x: f32, rest: &str) -> String {
 }
 
 #[test]
-fn milk_is_sealed_unless_light_or_the_lens_is_in_it_or_a_cloud_reaches_out() {
+fn milk_is_enclosed_unless_a_cloud_reaches_out_and_what_is_in_it_is_told() {
     const FAR: &str = "(0, 0, 9)";
+    const EMPTY: Option<Enclosure> = Some(Enclosure { lights: false, lens: false });
+    const LIT: Option<Enclosure> = Some(Enclosure { lights: true, lens: false });
+    const SEEN: Option<Enclosure> = Some(Enclosure { lights: false, lens: true });
     let milk = ball(1.0, 0.0, "material: \"liquid\", interior: \"milk\"");
     let haze = "(geometry: Box(min: (-9, -3, -9), max: (9, 9, 9)), material: \"null\", interior: \"haze\"),";
     let ice = ball(0.3, 0.2, "material: \"glass\"");
@@ -43,21 +46,22 @@ fn milk_is_sealed_unless_light_or_the_lens_is_in_it_or_a_cloud_reaches_out() {
           emission: 1),";
     let glowing = ball(1.0, 0.0, "material: \"liquid\", interior: \"glow\"");
     let point = "Point(position: (0, 0.5, 0), intensity: 1)";
-    for (what, eye, shapes, lights, is_sealed, has_walls) in [
-        ("alone", FAR, milk.clone(), "", true, true),
-        ("in haze", FAR, milk.clone() + haze, "", true, true),
-        ("with ice", FAR, milk.clone() + &ice, "", true, true),
-        ("a cloud above it", FAR, milk.clone() + &cloud(0), "", false, false),
-        ("a cloud below it", FAR, milk.clone() + &cloud(-1), "", true, true),
-        ("a lamp", FAR, milk.clone() + lamp, "", false, true),
-        ("a point", FAR, milk.clone(), point, false, true),
-        ("the lens", "(0, 0.5, 0)", milk.clone(), "", false, true),
-        ("glowing", FAR, glowing, "", false, true),
-        ("index-matched", FAR, ball(1.0, 0.0, "material: \"null\", interior: \"milk\""), "", false, false),
+    for (what, eye, shapes, lights, expected) in [
+        ("alone", FAR, milk.clone(), "", EMPTY),
+        ("in haze", FAR, milk.clone() + haze, "", EMPTY),
+        ("with ice", FAR, milk.clone() + &ice, "", EMPTY),
+        ("a cloud above it", FAR, milk.clone() + &cloud(0), "", None),
+        ("a cloud below it", FAR, milk.clone() + &cloud(-1), "", EMPTY),
+        ("a lamp", FAR, milk.clone() + lamp, "", LIT),
+        ("a point", FAR, milk.clone(), point, LIT),
+        ("the lens", "(0, 0.5, 0)", milk.clone(), "", SEEN),
+        ("glowing", FAR, glowing, "", LIT),
+        ("index-matched", FAR, ball(1.0, 0.0, "material: \"null\", interior: \"milk\""), "", None),
     ] {
         let scene = scene(eye, &shapes, lights);
         let inside = scene.stack_at(Vec3::new(-0.5, 0.0, 0.0)).top().expect("a body");
-        assert_eq!(scene.is_sealed(inside.body), is_sealed, "{what}");
+        assert_eq!(scene.enclosure(inside.body), expected, "{what}");
+        let has_walls = expected.is_some();
         let medium = inside.medium.expect("a medium");
         let extent = scene.medium_extent(medium);
         assert_eq!(extent < 4.0, has_walls, "{what}: {extent}");
@@ -74,7 +78,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     /// As connections see it: however bodies overlap, nothing is seen from a sealed one.
     #[test]
-    fn nothing_is_seen_from_sealed_bodies(
+    fn nothing_is_seen_from_within_enclosed_bodies(
         bodies in prop::collection::vec(([-1.0_f32..1.0, -1.0..1.0, -1.0..1.0], 0.1_f32..1.0, 0..4, -1..2), 1..7),
         points in prop::collection::vec([-1.5_f32..1.5, -1.5..1.5, -1.5..1.5], 64),
         directions in prop::collection::vec([-1.0_f32..1.0, -1.0..1.0, -1.0..1.0], 64),
@@ -101,12 +105,19 @@ proptest! {
         let Ok(scene) = ReadyScene::from_ron_str(&text, "") else { return Ok(()) };
         let lens = scene.camera().ray(glam::Vec2::ZERO, [0.5; 2]).expect("a ray").origin;
         let mut crossings = Vec::new();
-        for (point, direction) in points.into_iter().map(Vec3::from).zip(directions.into_iter().map(Vec3::from)) {
+        let points: Vec<Vec3> = points.into_iter().map(Vec3::from).collect();
+        let body_at = |point: Vec3| scene.stack_at(point).top().map(|top| top.body);
+        for (place, (&point, direction)) in points.iter().zip(directions).enumerate() {
             let stack = scene.stack_at(point);
-            let Some(top) = stack.top().filter(|top| scene.is_sealed(top.body)) else { continue };
-            for target in [Target::Infinity(direction.normalize_or(Vec3::X)), Target::Pinpoint(lens)] {
+            let Some(body) = body_at(point).filter(|&body| scene.enclosure(body).is_some()) else { continue };
+            let others = points.iter().cycle().skip(place + 1).take(8).filter(|&&other| body_at(other) != Some(body));
+            let targets = others.map(|&other| Target::Medium(other)).chain([
+                Target::Infinity(Vec3::from(direction).normalize_or(Vec3::X)),
+                Target::Pinpoint(lens),
+            ]);
+            for target in targets {
                 let edge = clear_edge::<_, f64>(&scene, &stack, point, &target, &mut crossings);
-                prop_assert!(edge.is_none(), "{top:?} {point} {target:?}\n{text}");
+                prop_assert!(edge.is_none(), "{body:?} {point} {target:?}\n{text}");
             }
         }
     }
