@@ -120,15 +120,16 @@ pub(crate) fn run(task: impl Task) {
 /// few processors lack.
 #[inline]
 pub(crate) fn run_or<T: Task>(task: T, otherwise: impl FnOnce(T)) {
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     match Arch::new() {
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         Arch::V3(simd) => simd.vectorize(avx2::Vectorised { task, simd }),
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         _ => otherwise(task),
-    }
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    {
-        let _ = otherwise;
-        task.run(Plain);
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        _ => {
+            drop(otherwise);
+            task.run(Plain);
+        }
     }
 }
 
