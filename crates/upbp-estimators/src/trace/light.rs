@@ -14,7 +14,7 @@ use crate::path::{
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
-use crate::scene::{Crossing, Emitter, EmitterKind, Scene, Walk};
+use crate::scene::{Emitter, EmitterKind, Scene, Walk};
 use crate::technique::Technique;
 use crate::techniques::light_tracing;
 
@@ -41,8 +41,8 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let Context { prepared, plan } = *context;
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
-    let (crossings, counters) = (&mut scratch.crossings, &mut out.counters);
-    let Some(mut flight) = emit(context, index, &mut stream, crossings, counters, observer) else { return };
+    let counters = &mut out.counters;
+    let Some(mut flight) = emit(context, index, &mut stream, counters, observer) else { return };
     let scene = prepared.scene;
     let mut survival = Survival::of_light(plan.roulette, prepared.surroundings());
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
@@ -165,7 +165,6 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     index: u32,
     stream: &mut Stream,
-    crossings: &mut Vec<Crossing>,
     counters: &mut Counters,
     observer: &mut O,
 ) -> Option<Flight<O::Densities, L>> {
@@ -220,7 +219,7 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     };
     observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
     let origin = if kind.is_infinite() {
-        start_near_scene(prepared.scene, &Ray::new(origin, emission.direction), crossings)?
+        start_near_scene(prepared.scene, &Ray::new(origin, emission.direction))?
     } else {
         origin
     };
@@ -246,10 +245,8 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 /// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Distances
 /// from there have the digits of what is near, not those of a start as far away as the scene is wide: both
 /// faces of a pane of glass would be at one, and places in media beside their bodies.
-fn start_near_scene<S: Scene>(scene: &S, ray: &Ray, crossings: &mut Vec<Crossing>) -> Option<Vec3> {
-    crossings.clear();
-    let hit = scene.trace(ray, crossings).map(|hit| hit.t);
-    let first = crossings.iter().map(|crossing| crossing.t).chain(hit).reduce(f32::min)?;
+fn start_near_scene<S: Scene>(scene: &S, ray: &Ray) -> Option<Vec3> {
+    let first = scene.intersect(ray)?.t;
     let margin = 16.0 * f32::EPSILON * (first + ray.origin.abs().max_element());
     let along = f64::from((first - margin).max(0.0));
     Some((ray.origin.as_dvec3() + along * ray.direction.as_dvec3()).as_vec3())
