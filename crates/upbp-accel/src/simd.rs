@@ -113,10 +113,10 @@ pub(crate) fn run(task: impl Task) {
     run_or(task, |task| task.run(Plain));
 }
 
-/// Runs a task with the best instructions that this processor has, but with `otherwise` on one that has a
-/// choice and lacks the better ones.
+/// Runs a task with the best instructions that this processor has. Where that would be a second form of the
+/// task, on x86 without AVX2, calls `otherwise` instead, which has to do the same.
 ///
-/// A task with closures is compiled for each of them: this saves to compile it twice for instructions that
+/// A task with closures is compiled for each of them: this saves compiling it twice, for instructions that
 /// few processors lack.
 #[inline]
 pub(crate) fn run_or<T: Task>(task: T, otherwise: impl FnOnce(T)) {

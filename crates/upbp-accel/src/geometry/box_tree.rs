@@ -9,7 +9,7 @@ use super::error::GeometryError;
 use super::hierarchy::{BlockRef, Child, Hierarchy, Kind, MAX_INDEX, Visitor};
 use super::lane_ray::{LaneRay, SlabRay};
 use crate::ray::Ray;
-use crate::simd::{Plain, Task, Wide, run_or};
+use crate::simd::{Task, Wide, run};
 
 /// Boxes behind a hierarchy that finds those around a point.
 #[derive(Clone, Debug)]
@@ -45,8 +45,7 @@ impl BoxTree {
                 visit(index);
             }
         };
-        let hierarchy = &self.hierarchy;
-        run_or(Around { hierarchy, point, check }, |mut around| plainly(hierarchy, point, &mut around.check));
+        run(Around { hierarchy: &self.hierarchy, point, check });
     }
 }
 
@@ -65,11 +64,6 @@ impl<V: FnMut(usize)> Task for Around<'_, V> {
         let ray = LaneRay::new(wide, &Ray::new(point, Vec3::X).with_range(0.0, 0.0));
         let _ = hierarchy.traverse::<false, SlabRay<_>, _>(wide, &ray, (), &mut 0.0, &mut Each(check));
     }
-}
-
-/// Compiled once instead of once per caller.
-fn plainly(hierarchy: &Hierarchy, point: Vec3, check: &mut dyn FnMut(usize)) {
-    Around { hierarchy, point, check }.run(Plain);
 }
 
 struct Each<V>(V);

@@ -129,7 +129,7 @@ impl SceneGeometry {
         found
     }
 
-    /// Calls `visit` for every intersection, those of nearer boxes first or in any order.
+    /// Calls `visit` for every intersection: nearer boxes first if `IN_ORDER`, copies of meshes last.
     #[inline]
     fn search<const IN_ORDER: bool>(&self, ray: Ray, mut visit: impl FnMut(&Candidate) -> Visit) {
         if self.instances.is_empty() {
@@ -141,28 +141,26 @@ impl SceneGeometry {
         }
     }
 
-    /// As [`search`](Self::search), with these instructions and copies of meshes, which come last. Compiled
-    /// once instead of once per caller.
+    /// As [`search`](Self::search), with these instructions; compiled once instead of once per caller.
     fn search_with(&self, instructions: Instructions, in_order: bool, ray: Ray, visit: OnHit) {
+        if in_order {
+            self.search_with_copies::<true>(instructions, ray, visit);
+        } else {
+            self.search_with_copies::<false>(instructions, ray, visit);
+        }
+    }
+
+    fn search_with_copies<const IN_ORDER: bool>(&self, instructions: Instructions, ray: Ray, visit: OnHit) {
         let (mut rest, mut is_done) = (ray, false);
         let visit_first: OnHit = &mut |candidate| {
             let answer = visit(candidate);
             is_done = answer.apply(&mut rest.t_max).is_break();
             answer
         };
-        if in_order {
-            instructions.run(Search::<_, true> { scene: self, ray, visit: visit_first });
-        } else {
-            instructions.run(Search::<_, false> { scene: self, ray, visit: visit_first });
-        }
-        if is_done || self.instances.is_empty() {
-            return;
-        }
-        let (instances, extent) = (&self.instances, self.extent_from(rest.origin));
-        if in_order {
-            instructions.run(InstanceSearch::<true> { instances, ray: rest, extent, visit });
-        } else {
-            instructions.run(InstanceSearch::<false> { instances, ray: rest, extent, visit });
+        instructions.run(Search::<_, IN_ORDER> { scene: self, ray, visit: visit_first });
+        if !is_done && !self.instances.is_empty() {
+            let (instances, extent) = (&self.instances, self.extent_from(rest.origin));
+            instructions.run(InstanceSearch::<IN_ORDER> { instances, ray: rest, extent, visit });
         }
     }
 

@@ -37,8 +37,8 @@ impl<L: Boxes, B> PackedTree<L, B> {
     /// Reports the wanted items of all blocks whose boxes overlap `region`, in the order of the blocks.
     /// Returns the number of nodes, leaves and blocks that it looked at.
     ///
-    /// Without vector instructions `otherwise` is asked, since all this is compiled for each query: it
-    /// [searches](Self::search_plainly) with a query of its own, whose closures are called by reference.
+    /// On an x86 processor without AVX2 `otherwise` is asked, since all this is compiled for each query: it
+    /// [searches](Self::search_plainly) with a query whose closures are called by reference.
     #[inline]
     pub(super) fn search<R: Region, Q: Query<B>>(
         &self,
@@ -48,10 +48,8 @@ impl<L: Boxes, B> PackedTree<L, B> {
     ) -> u32 {
         let mut tests = 0;
         if !self.nodes.is_empty() {
-            let mut plain = None;
             let traversal = Traversal { tree: self, region, query, tests: &mut tests };
-            run_or(traversal, |traversal| plain = Some(otherwise(traversal.query)));
-            tests = plain.unwrap_or(tests);
+            run_or(traversal, |traversal| *traversal.tests = otherwise(traversal.query));
         }
         tests
     }

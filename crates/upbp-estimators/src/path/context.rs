@@ -32,13 +32,13 @@ impl<S: Scene> Context<'_, S> {
         if to_surface { Extent::ToSurface } else { Extent::ToStop }
     }
 
-    /// Whether no straight line leads to a light from within the bodies of `stack`.
+    /// Whether it is known that no straight line leads to a light from where the top body of `stack` counts.
     #[inline]
     pub(crate) fn hides_lights(&self, stack: &MediumStack) -> bool {
         self.enclosure(stack).is_some_and(|enclosure| !enclosure.lights)
     }
 
-    /// Whether no straight line leads to the lens from within the bodies of `stack`.
+    /// Whether it is known that no straight line leads to the lens from where the top body of `stack` counts.
     #[inline]
     pub(crate) fn hides_lens(&self, stack: &MediumStack) -> bool {
         self.enclosure(stack).is_some_and(|enclosure| !enclosure.lens)

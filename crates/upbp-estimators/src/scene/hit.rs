@@ -107,11 +107,11 @@ pub struct Crossing {
     pub scatters: bool,
 }
 
-/// The surfaces all around a body, and what is among them.
+/// Ends of paths that may be within the surfaces all around a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Enclosure {
     /// Whether a light may be where the body counts, the body itself included.
     pub lights: bool,
-    /// Whether the lens may be, or a part of it.
+    /// Whether the lens, or a part of it, may be there.
     pub lens: bool,
 }

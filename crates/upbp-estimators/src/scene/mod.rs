@@ -78,12 +78,12 @@ pub trait Scene: Sync {
         self.bounds().radius
     }
 
-    /// What is within the surfaces all around `body`: milk in a glass and water in a pool have such.
-    /// `Some` says that every straight line from a place where `body` is the one that counts to one where it
-    /// is not meets a surface that scatters.
+    /// Ends of paths that may be within the surfaces all around `body`, as around milk in a glass and the
+    /// water of a pool.
     ///
-    /// Then next events and connections to the lens that would find nothing are not tried. `None`, the
-    /// default, is always allowed.
+    /// `Some` says that every straight line from a place where `body` is the one that counts to one where it
+    /// is not meets a surface that scatters: then next events and connections to the lens that would find
+    /// nothing are not tried. `None`, the default, is always allowed.
     fn enclosure(&self, body: BodyId) -> Option<Enclosure> {
         let _ = body;
         None

@@ -1,7 +1,7 @@
 //! Surfaces all around bodies, which every way into or out of them meets.
 
 use glam::Vec3;
-use upbp_accel::SceneGeometry;
+use upbp_accel::{Ray, SceneGeometry, ShapeId};
 use upbp_estimators::scene::{Boundary, Enclosure};
 use upbp_media::{Homogeneous, Medium as _, MediumId};
 
@@ -11,7 +11,7 @@ use crate::light::Light;
 use crate::scene::{Body, Surface};
 
 /// In a scene of more pairs of bodies nothing is known, which is always allowed.
-const MOST_PAIRS: usize = 1 << 24;
+const MOST_PAIRS: usize = 1 << 22;
 
 /// A box around a shape.
 type Aabb = (Vec3, Vec3);
@@ -19,8 +19,8 @@ type Aabb = (Vec3, Vec3);
 /// The enclosures of bodies, which are in order, the lowest first.
 ///
 /// A body that refracts has no surface where a stronger, index-matched one reaches into it: light goes on
-/// through that one. Boxes decide, so that a body may be taken for open that is not, and a light to be within
-/// that is beside. A film that is too thin to be a body of its own, between equal indices, is left out.
+/// through that one. Boxes decide, so that a body may be taken for open that is not, and a light beside a
+/// body for one within. A film that is too thin to be a body of its own, between equal indices, is left out.
 pub(super) fn find(
     bodies: &[Body],
     surfaces: &[Surface],
@@ -51,12 +51,29 @@ pub(super) fn find(
         let encloses = matches!(boundary(body), Boundary::Refracting(..))
             && !matched.iter().any(|(other, aabb)| *other > place && touch(own, *aabb));
         let emits = || body.interior.medium.is_some_and(|id| media[id.0 as usize].emits());
+        // A sub-path that starts in the surface may go on as if from the other side of it.
+        let is_in_surface = |end: Aabb| touch(own, end) && meets(geometry, body.shape, end);
         encloses.then(|| Enclosure {
-            lights: emits() || lamps.iter().any(|lamp| touch(own, *lamp)),
-            lens: touch(own, lens),
+            lights: emits() || lamps.iter().any(|lamp| touch(own, *lamp)) || is_in_surface(lens),
+            lens: touch(own, lens) || lamps.iter().any(|lamp| is_in_surface(*lamp)),
         })
     };
     bodies.iter().enumerate().map(of_body).collect()
+}
+
+/// Whether the surface of a shape meets a box, or almost. That of a plane does if it meets a diagonal of the
+/// box.
+fn meets(geometry: &SceneGeometry, shape: ShapeId, (min, max): Aabb) -> bool {
+    /// Part of the coordinates of the shape by which starts of sub-paths may be off.
+    const OFF: f32 = 1e-5;
+    let (low, high) = geometry.shape(shape).aabb();
+    let off = Vec3::splat(OFF * low.abs().max(high.abs()).max_element());
+    let (middle, half) = (0.5 * (min + max), 0.5 * (max - min) + off);
+    let signs = [Vec3::ONE, Vec3::new(-1.0, 1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(1.0, 1.0, -1.0)];
+    signs.into_iter().map(|sign| half * sign).any(|corner| {
+        let ray = Ray::new(middle - corner, corner.normalize()).with_range(0.0, 2.0 * corner.length());
+        geometry.any_where(ray, |candidate| candidate.shape == shape)
+    })
 }
 
 /// The largest coordinate of places in each medium, or the distance from which a ray may get into it without

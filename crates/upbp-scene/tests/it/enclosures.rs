@@ -35,6 +35,7 @@ fn milk_is_enclosed_unless_a_cloud_reaches_out_and_what_is_in_it_is_told() {
     const EMPTY: Option<Enclosure> = Some(Enclosure { lights: false, lens: false });
     const LIT: Option<Enclosure> = Some(Enclosure { lights: true, lens: false });
     const SEEN: Option<Enclosure> = Some(Enclosure { lights: false, lens: true });
+    const BOTH: Option<Enclosure> = Some(Enclosure { lights: true, lens: true });
     let milk = ball(1.0, 0.0, "material: \"liquid\", interior: \"milk\"");
     let haze = "(geometry: Box(min: (-9, -3, -9), max: (9, 9, 9)), material: \"null\", interior: \"haze\"),";
     let ice = ball(0.3, 0.2, "material: \"glass\"");
@@ -55,19 +56,21 @@ fn milk_is_enclosed_unless_a_cloud_reaches_out_and_what_is_in_it_is_told() {
         ("a lamp", FAR, milk.clone() + lamp, "", LIT),
         ("a point", FAR, milk.clone(), point, LIT),
         ("the lens", "(0, 0.5, 0)", milk.clone(), "", SEEN),
+        ("a point in its surface", FAR, milk.clone(), "Point(position: (0, 1, 0), intensity: 1)", BOTH),
+        ("the lens in its surface", "(0.6, 0.8, 0)", milk.clone(), "", BOTH),
         ("glowing", FAR, glowing, "", LIT),
         ("index-matched", FAR, ball(1.0, 0.0, "material: \"null\", interior: \"milk\""), "", None),
     ] {
         let scene = scene(eye, &shapes, lights);
         let inside = scene.stack_at(Vec3::new(-0.5, 0.0, 0.0)).top().expect("a body");
         assert_eq!(scene.enclosure(inside.body), expected, "{what}");
-        let has_walls = expected.is_some();
+        let is_enclosed = expected.is_some();
         let medium = inside.medium.expect("a medium");
         let extent = scene.medium_extent(medium);
-        assert_eq!(extent < 4.0, has_walls, "{what}: {extent}");
+        assert_eq!(extent < 4.0, is_enclosed, "{what}: {extent}");
         // A mean free path of a hundredth is short on the ground, not in the milk.
         let prepared = PreparedScene::new(&scene).expect("a valid scene");
-        assert_eq!(prepared.is_dense(medium), !has_walls, "{what}");
+        assert_eq!(prepared.is_dense(medium), !is_enclosed, "{what}");
     }
     let outside = scene(FAR, &(milk + haze), "");
     let haze = outside.stack_at(Vec3::new(5.0, 0.0, 0.0)).medium().expect("haze");
@@ -76,7 +79,7 @@ fn milk_is_enclosed_unless_a_cloud_reaches_out_and_what_is_in_it_is_told() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
-    /// As connections see it: however bodies overlap, nothing is seen from a sealed one.
+    /// As connections see it: however bodies overlap, nothing is seen from an enclosed one.
     #[test]
     fn nothing_is_seen_from_within_enclosed_bodies(
         bodies in prop::collection::vec(([-1.0_f32..1.0, -1.0..1.0, -1.0..1.0], 0.1_f32..1.0, 0..4, -1..2), 1..7),
