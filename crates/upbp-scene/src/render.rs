@@ -2,7 +2,7 @@
 //!
 //! The renderer is compiled for every type of scene that it is given, in the crate that gives it one. For
 //! [`ReadyScene`] that is this one: programs that ask here need not compile the walks again, which takes
-//! minutes.
+//! longer than all else of them.
 
 use upbp_core::{CheckedSettings, RenderError, Renderer, Start};
 

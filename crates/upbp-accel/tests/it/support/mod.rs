@@ -51,8 +51,7 @@ impl Random {
     }
 }
 
-/// [`SceneGeometry::for_each_hit`] for visitors of one type: its code is long, and a test program that
-/// compiles it for each visitor takes a minute more to build.
+/// [`SceneGeometry::for_each_hit`] for visitors of one type: its code is long, and compiled for each type.
 #[cfg(feature = "geometry")]
 pub(crate) fn visit_hits(scene: &SceneGeometry, ray: Ray, visit: &mut dyn FnMut(&Candidate) -> Visit) {
     scene.for_each_hit(ray, visit);
