@@ -8,9 +8,10 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 use upbp_accel::{BoxTree, Candidate, Ray, SceneGeometry, ShapeId, Visit};
-use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId, Enclosure, Hit, Scene};
+use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId, Hit, PathEnd, Scene};
 use upbp_media::{BodyId, Homogeneous, Interior, MediumId, MediumStack};
 
+pub(crate) use self::enclosures::{Enclosures, Ends};
 pub(crate) use self::place::COINCIDENT;
 use self::place::largest_width_of_plane;
 use crate::camera::PerspectiveCamera;
@@ -41,8 +42,7 @@ pub struct ReadyScene {
     /// By [`ShapeId`].
     pub(crate) surfaces: Vec<Surface>,
     pub(crate) bodies: Vec<Body>,
-    /// By the number of the body.
-    pub(crate) enclosures: Vec<Option<Enclosure>>,
+    pub(crate) enclosures: Enclosures,
     /// By the number of the body.
     pub(crate) body_boxes: BoxTree,
     pub(crate) lights: Vec<Light>,
@@ -203,8 +203,9 @@ impl Scene for ReadyScene {
         self.extents.get(medium.0 as usize).copied().unwrap_or(self.bounds.radius)
     }
 
-    fn enclosure(&self, body: BodyId) -> Option<Enclosure> {
-        self.enclosures.get(body.0 as usize).copied().flatten()
+    #[inline]
+    fn hides(&self, body: Option<BodyId>, end: PathEnd) -> bool {
+        self.enclosures.hides(body, end)
     }
 
     fn has_connectible_surfaces(&self) -> bool {
@@ -294,6 +295,7 @@ impl Scene for ReadyScene {
     }
 }
 
+mod enclosures;
 mod place;
 #[cfg(test)]
 mod tests;

@@ -2,10 +2,11 @@
 
 use upbp_media::{Lanes, MediumStack};
 
+use super::MediumInterface;
 use super::edge::{EdgeTrace, Extent};
 use crate::iteration::IterationPlan;
 use crate::prepared_scene::PreparedScene;
-use crate::scene::{Crossing, Enclosure, Scene};
+use crate::scene::{Crossing, PathEnd, Scene};
 
 /// The scene and the plan of an iteration.
 pub struct Context<'a, S: Scene> {
@@ -32,21 +33,16 @@ impl<S: Scene> Context<'_, S> {
         if to_surface { Extent::ToSurface } else { Extent::ToStop }
     }
 
-    /// Whether it is known that no straight line leads to a light from where the top body of `stack` counts.
+    /// Whether it is known that no straight line leads to `end` from where the top body of `stack` counts.
     #[inline]
-    pub(crate) fn hides_lights(&self, stack: &MediumStack) -> bool {
-        self.enclosure(stack).is_some_and(|enclosure| !enclosure.lights)
+    pub(crate) fn hides(&self, stack: &MediumStack, end: PathEnd) -> bool {
+        self.prepared.scene.hides(stack.top().map(|top| top.body), end)
     }
 
-    /// Whether it is known that no straight line leads to the lens from where the top body of `stack` counts.
+    /// The same from both sides of a surface.
     #[inline]
-    pub(crate) fn hides_lens(&self, stack: &MediumStack) -> bool {
-        self.enclosure(stack).is_some_and(|enclosure| !enclosure.lens)
-    }
-
-    #[inline]
-    fn enclosure(&self, stack: &MediumStack) -> Option<Enclosure> {
-        stack.top().and_then(|top| self.prepared.scene.enclosure(top.body))
+    pub(crate) fn hides_from_both(&self, sides: &MediumInterface<'_>, end: PathEnd) -> bool {
+        self.hides(sides.near, end) && self.hides(sides.far, end)
     }
 }
 

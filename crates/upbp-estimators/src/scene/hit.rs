@@ -107,11 +107,13 @@ pub struct Crossing {
     pub scatters: bool,
 }
 
-/// Ends of paths that may be within the surfaces all around a body.
+/// Where paths end, seen from a place in the scene ([`Scene::hides`](super::Scene::hides)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Enclosure {
-    /// Whether a light may be where the body counts, the body itself included.
-    pub lights: bool,
-    /// Whether the lens, or a part of it, may be there.
-    pub lens: bool,
+pub enum PathEnd {
+    /// Every light.
+    Lights,
+    /// A light, all of it.
+    Light(EmitterId),
+    /// The lens, all of it.
+    Lens,
 }

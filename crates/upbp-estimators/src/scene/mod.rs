@@ -24,7 +24,7 @@ pub use emitter::{
     BoundingSphere, Emission, EmissionCoordinates, Emitter, EmitterBounds, EmitterKind, EmitterPoint,
     HitDensities, Incident,
 };
-pub use hit::{Boundary, Crossing, EmitterId, Enclosure, Hit};
+pub use hit::{Boundary, Crossing, EmitterId, Hit, PathEnd};
 
 /// A scene to render: the host's geometry and everything on it.
 ///
@@ -78,15 +78,15 @@ pub trait Scene: Sync {
         self.bounds().radius
     }
 
-    /// Ends of paths that may be within the surfaces all around `body`, as around milk in a glass and the
-    /// water of a pool.
+    /// Whether every straight line from a place where `body` counts (`None`: where none does) to `end` is
+    /// known to meet a surface that scatters.
     ///
-    /// `Some` says that every straight line from a place where `body` is the one that counts to one where it
-    /// is not meets a surface that scatters: then next events and connections to the lens that would find
-    /// nothing are not tried. `None`, the default, is always allowed.
-    fn enclosure(&self, body: BodyId) -> Option<Enclosure> {
-        let _ = body;
-        None
+    /// So it is from the milk in a glass to the sun, from the bottom of a pool to a lens above the water, and
+    /// from a room to the filament of a bulb: next events and connections to the lens that would find nothing
+    /// are not tried. `false`, the default, is always allowed.
+    fn hides(&self, body: Option<BodyId>, end: PathEnd) -> bool {
+        let _ = (body, end);
+        false
     }
 
     /// Whether any surface has a smooth lobe; `false` saves the preparation of what would find nothing.

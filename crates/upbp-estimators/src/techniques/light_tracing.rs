@@ -5,7 +5,7 @@ use upbp_media::Lanes;
 use crate::observer::{Completion, ObservedSample, Observer};
 use crate::path::{Context, LightChunk, LightVertex, MediumInterface, Splat, Target, clear_edge, ray_origin};
 use crate::random::Stream;
-use crate::scene::{Camera, Crossing, Scene, Walk};
+use crate::scene::{Camera, Crossing, PathEnd, Scene, Walk};
 use crate::technique::Technique;
 
 /// Connects a light vertex to the camera; `sides` are the bodies around it.
@@ -37,7 +37,7 @@ pub(crate) fn light_tracing<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let distance = between.length();
     let direction = between / distance;
     let stack = sides.towards(vertex.interaction.crosses(vertex.towards_light, direction));
-    if context.hides_lens(stack) {
+    if context.hides(stack, PathEnd::Lens) {
         return;
     }
     let Some(scattering) = vertex.evaluate(context, direction) else {

@@ -6,9 +6,10 @@ use upbp_media::{BodyId, Lanes, MediumStack};
 use crate::film_sample::Output;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, ray_origin};
-use crate::prepared_scene::PreparedScene;
 use crate::random::Stream;
-use crate::scene::{Crossing, Emitter, EmitterId, EmitterKind, Incident, Scene, Walk};
+use crate::scene::{
+    BoundingSphere, Crossing, Emitter, EmitterId, EmitterKind, Incident, PathEnd, Scene, Walk,
+};
 use crate::technique::Technique;
 
 /// Connects `vertex` to as many points on lights as the plan says.
@@ -23,13 +24,17 @@ pub(crate) fn next_events<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let plan = context.plan;
     if plan.next_events == 0.0
         || !plan.lengths.contain(vertex.depth + 1)
-        || (context.hides_lights(sides.near) && context.hides_lights(sides.far))
+        || context.hides_from_both(sides, PathEnd::Lights)
     {
         return;
     }
     for _ in 0..stream.round(plan.next_events) {
-        next_event(context, vertex, sides, stream, crossings, out);
-        out.observer.call(Technique::Nee, 0);
+        let chosen = context.prepared.choose_next_event(vertex.position, stream.decide());
+        let Some((emitter, probability)) = chosen else { return };
+        if !context.hides_from_both(sides, PathEnd::Light(emitter)) {
+            next_event(context, vertex, sides, (emitter, probability), stream, crossings, out);
+            out.observer.call(Technique::Nee, 0);
+        }
     }
 }
 
@@ -37,20 +42,22 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     vertex: &CameraVertex<S::Bsdf, O::Densities, L>,
     sides: &MediumInterface<'_>,
+    (emitter, probability): (EmitterId, f32),
     stream: &mut Stream,
     crossings: &mut Vec<Crossing>,
     out: &mut Output<'_, O>,
 ) {
     let Context { prepared, plan } = *context;
     let (scene, mis) = (prepared.scene, &plan.mis);
-    let Some(Chosen { emitter, light, probability, incident, cos_light }) =
-        choose(prepared, vertex.position, stream)
+    let light = &scene.emitters()[emitter.0 as usize];
+    let Some(Chosen { incident, cos_light }) =
+        choose_point(light, prepared.emission_bounds(), vertex.position, stream)
     else {
         return;
     };
     let (kind, direction) = (light.kind(), incident.towards_light);
     let stack = sides.towards(vertex.interaction.crosses(vertex.towards_camera, direction));
-    if context.hides_lights(stack) {
+    if context.hides(stack, PathEnd::Light(emitter)) {
         return;
     }
     let Some(scattering) = vertex.evaluate(context, direction) else {
@@ -115,31 +122,26 @@ fn next_event<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 }
 
 /// A point on a light, as a receiver sees it.
-struct Chosen<'a, E> {
-    emitter: EmitterId,
-    light: &'a E,
-    /// Probability of choosing this light.
-    probability: f32,
+struct Chosen {
     incident: Incident,
     /// Cosine at the light, 1 where it is no surface.
     cos_light: f32,
 }
 
 /// Chooses a point on a light, unless it sends nothing to the receiver.
-fn choose<'a, S: Scene>(
-    prepared: &PreparedScene<'a, S>,
+fn choose_point<E: Emitter>(
+    light: &E,
+    bounds: &BoundingSphere,
     receiver: Vec3,
     stream: &mut Stream,
-) -> Option<Chosen<'a, S::Emitter>> {
-    let (emitter, probability) = prepared.choose_next_event(receiver, stream.decide())?;
-    let light = &prepared.scene.emitters()[emitter.0 as usize];
-    let incident = light.sample_incident(prepared.emission_bounds(), receiver, stream.pair())?;
+) -> Option<Chosen> {
+    let incident = light.sample_incident(bounds, receiver, stream.pair())?;
     let cos_light = match light.kind() {
         EmitterKind::Area => -incident.point.normal.dot(incident.towards_light),
         _ => 1.0,
     };
     let shines = cos_light >= MIN_COSINE && incident.pdf > 0.0 && !incident.radiance.is_black();
-    shines.then_some(Chosen { emitter, light, probability, incident, cos_light })
+    shines.then_some(Chosen { incident, cos_light })
 }
 
 /// Whether `body` counts at the end of an edge that starts in the bodies of `stack`.

@@ -14,7 +14,7 @@ use crate::path::{
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
-use crate::scene::{Emitter, EmitterKind, Scene, Walk};
+use crate::scene::{Emitter, EmitterKind, PathEnd, Scene, Walk};
 use crate::technique::Technique;
 use crate::techniques::light_tracing;
 
@@ -114,7 +114,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         if connectible {
             if plan.mis.light_tracing > 0.0
                 && plan.lengths.contain(depth + 1)
-                && !(context.hides_lens(sides.near) && context.hides_lens(sides.far))
+                && !context.hides_from_both(&sides, PathEnd::Lens)
             {
                 light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
                 observer.call(Technique::LightTracing, 0);

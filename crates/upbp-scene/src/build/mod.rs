@@ -140,7 +140,7 @@ impl Builder<'_> {
         let is_specular =
             surfaces.iter().filter_map(|surface| surface.boundary.bsdf()).any(Material::is_specular)
                 || bodies::may_match(&bodies, &surfaces, &geometry);
-        let enclosures = enclosures::find(&bodies, &surfaces, &geometry, &media, &lights, &camera);
+        let enclosures = enclosures::find(&bodies, &surfaces, &geometry, &lights, &camera);
         let extents =
             enclosures::extents(&bodies, &enclosures, &geometry, media.len(), outside, bounds.radius);
         let body_boxes = BoxTree::new(bodies.iter().map(|body| geometry.shape(body.shape).aabb()));
