@@ -100,6 +100,7 @@ fn plan() -> MisPlan {
             bb1d: 200.0 * 1e-2,
         }],
         width: Vec::new(),
+        greatest_scales: Vec::new(),
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
         lanes: [0.0; 3],

@@ -103,6 +103,11 @@ impl Plan {
                 FootprintField::RANGE,
                 radii.field
             ))
+        } else if !radii.most_mean_free_paths.is_none_or(|most| most > 0.0 && most.is_finite()) {
+            Err(format!(
+                "radii.most_mean_free_paths: expected None, or a number above 0, found {:?}",
+                radii.most_mean_free_paths
+            ))
         } else if !self.lanes.is_none_or(is_distribution) {
             Err(format!("lanes: expected None, or probabilities that sum to one, found {:?}", self.lanes))
         } else {
@@ -219,6 +224,7 @@ pub(crate) mod tests {
                 bp2d: 0.0,
                 bb1d: 0.0,
                 field: RadiusField::Uniform,
+                most_mean_free_paths: None,
                 progressive: true,
                 floor: 1e-6,
             },
@@ -252,6 +258,7 @@ pub(crate) mod tests {
         assert!(wrong(|p| p.beam_paths = 2000).contains("beam_paths"));
         assert!(wrong(|p| p.radii.pb2d = f32::NAN).contains("radii"));
         assert!(wrong(|p| p.radii.pp3d = 1e16).contains("radii: expected lengths up to 1e12"));
+        assert!(wrong(|p| p.radii.most_mean_free_paths = Some(0.0)).contains("radii.most_mean_free_paths"));
         assert!(wrong(|p| p.lanes = Some([0.5; 3])).contains("lanes: expected None, or"));
         let message = wrong(|p| p.connections = 1e9);
         assert!(message.contains(": connections, next_events: expected 0.001"), "{message}");

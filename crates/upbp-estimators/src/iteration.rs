@@ -1,6 +1,7 @@
 //! Techniques, counts, kernels and the weights' constants of one iteration.
 
 use glam::Vec3;
+use upbp_accel::SearchRadius;
 use upbp_media::{Medium, MediumId};
 
 use crate::kernel::Kernel;
@@ -138,6 +139,9 @@ pub struct IterationChoices {
     pub kernels: Kernels,
     /// Scale of radii over the scene.
     pub radius_field: RadiusField,
+    /// Most mean free paths that a radius may be in a medium: positive; infinite for no limit. A radius that
+    /// coordinates in the medium have digits for is always allowed.
+    pub mean_free_paths: PerMerge<f32>,
     /// Periods of photon queries.
     pub periods: MergePeriods,
     /// Heuristic of the weights.
@@ -149,6 +153,32 @@ pub struct IterationChoices {
     /// The probability of each lane to be the hero of a sub-path, if walks run in lanes; they sum to one.
     pub lanes: Option<[f64; 3]>,
 }
+
+/// The kernels of a technique in a medium.
+#[derive(Clone, Copy)]
+pub(crate) struct MediumKernels {
+    kernel: Kernel,
+    greatest_scale: f32,
+}
+
+impl MediumKernels {
+    /// The kernel where radii have some scale.
+    #[inline]
+    pub(crate) fn at(&self, scale: f32) -> Kernel {
+        self.kernel.scaled(scale.min(self.greatest_scale))
+    }
+
+    /// Radii of searches along a ray.
+    pub(crate) fn search_radius(&self, field: &RadiusField) -> SearchRadius {
+        field.search_radius(self.kernel.radius(), self.greatest_scale)
+    }
+}
+
+/// Kernels in media of any number of mean free paths.
+pub const NO_LIMIT: PerMerge<f32> = {
+    let none = f32::INFINITY;
+    PerMerge { surf: none, pp3d: none, pb2d: none, bp2d: none, bb1d: none }
+};
 
 /// Least radius of a kernel, relative to the largest coordinate of its place: sixteen roundings. Positions
 /// lie on the grid of what single precision can tell apart, and a kernel that holds a few of its nodes finds
@@ -202,6 +232,18 @@ impl IterationPlan {
             let Kernels { pp3d, pb2d, bp2d, bb1d, .. } = &kernels;
             VolumeMerges { pp3d: width(pp3d), pb2d: width(pb2d), bp2d: width(bp2d), bb1d: width(bb1d) }
         };
+        let greatest_scales = |(id, medium): (u32, &S::Medium)| {
+            // Twice the least one, so that no rounding of the two makes it too narrow.
+            let resolved = 2.0 * LEAST_RADIUS * scene.medium_extent(MediumId(id));
+            PerMerge::from_fn(|technique| {
+                let most = choices.mean_free_paths.get(technique).unwrap_or(&f32::INFINITY);
+                let radius = kernels.get(technique).map_or(0.0, Kernel::radius);
+                let scale = (most * medium.mean_free_path()).max(resolved) / radius;
+                // A host may not know the mean free path.
+                let is_limited = most.is_finite() && medium.mean_free_path() >= 0.0 && scale > 0.0;
+                if is_limited { scale } else { f32::INFINITY }
+            })
+        };
         // Expected samples of one connection: draws per vertex over stored vertices per light path.
         let connect = if choices.vertices_per_light_path > 0.0 && light_paths > 0 {
             on(Technique::Connect, f64::from(choices.connections) / choices.vertices_per_light_path)
@@ -219,6 +261,7 @@ impl IterationPlan {
             surf: merge(Technique::Surf, &kernels.surf),
             volume: scene.media().iter().map(in_medium).collect(),
             width: scene.media().iter().map(widths).collect(),
+            greatest_scales: (0..).zip(scene.media()).map(greatest_scales).collect(),
             photon_beams: choices.photon_beams,
             query_beams: choices.query_beams,
             lanes: choices.lanes.unwrap_or_default(),
@@ -327,6 +370,15 @@ impl IterationPlan {
         let scale = self.radius_field.at(position);
         let resolved = self.resolved[usize::from(in_medium)];
         if position.abs().max_element() <= scale * resolved { scale } else { 0.0 }
+    }
+
+    /// The kernels of a technique in a medium.
+    #[inline]
+    pub(crate) fn kernels_in(&self, medium: MediumId, technique: Technique) -> MediumKernels {
+        MediumKernels {
+            kernel: *self.kernels.get(technique).unwrap_or(&Kernel::NONE),
+            greatest_scale: *self.mis.greatest_scales_in(medium).get(technique).unwrap_or(&f32::INFINITY),
+        }
     }
 
     /// The merges that a path with this sine between its lines takes part in at a vertex, where kernel radii

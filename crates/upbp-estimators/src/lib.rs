@@ -32,7 +32,7 @@ pub use emitter_choice::EmitterChoice;
 pub use emitter_selection::{EmitterSample, EmitterShares, effective_samples};
 pub use features::Features;
 pub use film_sample::CameraWalk;
-pub use iteration::{IterationChoices, IterationPlan, Kernels, LEAST_RADIUS, PathLengths};
+pub use iteration::{IterationChoices, IterationPlan, Kernels, LEAST_RADIUS, NO_LIMIT, PathLengths};
 pub use kernel::Kernel;
 pub use light_map::LightMap;
 pub use merge_periods::MergePeriods;

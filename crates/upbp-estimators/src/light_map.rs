@@ -45,7 +45,7 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
         let segments: Vec<_> = beams.iter().enumerate().map(|(i, b)| (b.segment, i as u32)).collect();
         // A technique that does not run has a radius of zero.
         let radius = plan.kernels.bb1d.radius().max(plan.kernels.bp2d.radius());
-        let radius = plan.radius_field.search_radius(radius);
+        let radius = plan.radius_field.search_radius(radius, f32::INFINITY);
         let split = SplitParams::choose(&segments, radius);
         let beam_tree = SegmentTree::build(segments, split);
         Self { vertices, beams, surface, medium, beam_tree }

@@ -91,17 +91,17 @@ impl RadiusField {
     }
 
     /// Radii along a ray, of searches for what a kernel reaches; `radius` (scene units) is that where the
-    /// factor is one.
+    /// factor is one, and `greatest` is what the factor is where it would be more.
     #[must_use]
-    pub fn search_radius(&self, radius: f32) -> SearchRadius {
+    pub fn search_radius(&self, radius: f32, greatest: f32) -> SearchRadius {
         match *self {
-            Self::Uniform => SearchRadius::Constant(radius),
+            Self::Uniform => SearchRadius::Constant(radius * greatest.min(1.0)),
             Self::Footprint(field) => SearchRadius::Growing(GrowingRadius {
                 centre: field.eye.into(),
                 offset: radius * field.offset,
                 slope: radius * field.slope,
-                least: radius * field.least,
-                most: radius * field.most,
+                least: radius * field.least.min(greatest),
+                most: radius * field.most.min(greatest),
             }),
         }
     }

@@ -13,8 +13,8 @@ use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::scene::{Bsdf, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
-    PreparedScene, RadiusField, Roulette, Spectrum, StreamKind, Technique,
+    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, NO_LIMIT,
+    PathLengths, PreparedScene, RadiusField, Roulette, Spectrum, StreamKind, Technique,
 };
 use upbp_media::Lanes;
 
@@ -47,6 +47,7 @@ pub(super) fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> Iter
             bb1d: Kernel::parabolic_line(radius),
         },
         radius_field: RadiusField::Uniform,
+        mean_free_paths: NO_LIMIT,
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,

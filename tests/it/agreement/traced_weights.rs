@@ -14,8 +14,8 @@ use upbp_estimators::path::{Context, EdgeTrace, Extent};
 use upbp_estimators::scene::{EmitterId, Scene};
 use upbp_estimators::{
     EmissionGuide, EmissionSample, EmitterChoice, EmitterSample, FootprintField, IterationChoices,
-    IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, RadiusField, Roulette, Stream,
-    StreamKind, Technique, TechniqueSet,
+    IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PerMerge, PreparedScene,
+    RadiusField, Roulette, Stream, StreamKind, Technique, TechniqueSet,
 };
 use upbp_media::Medium as _;
 use upbp_testing::closed_form::fog::Fog;
@@ -51,6 +51,7 @@ fn choices() -> IterationChoices {
         roulette: Roulette::Below(0.6),
         kernels: kernels(1.0),
         radius_field: RadiusField::Uniform,
+        mean_free_paths: NO_LIMIT,
         heuristic: Heuristic::Balance,
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
@@ -160,6 +161,9 @@ fn radii_that_are_a_function_of_place() {
             let radius_field = footprint();
             let choices = IterationChoices { radius_field, query_beams, heuristic, ..choices() };
             audit("radii by place", camera, 64, &choices, 500);
+            // Below and above the radii.
+            let mean_free_paths = PerMerge { surf: 0.1, pp3d: 0.05, pb2d: 0.03, bp2d: 0.5, bb1d: 0.01 };
+            audit("radii by medium", camera, 64, &IterationChoices { mean_free_paths, ..choices }, 500);
         }
     }
 }

@@ -33,7 +33,7 @@ use upbp_estimators::scene::{
 };
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{
-    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MediumId, MergePeriods,
+    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MediumId, MergePeriods, NO_LIMIT,
     PathLengths, PreparedScene, RadiusField, Ray, Roulette, Spectrum, StreamKind, TechniqueSet,
 };
 
@@ -262,6 +262,7 @@ impl Setup {
                     bb1d: kernel,
                 },
                 radius_field: RadiusField::Uniform,
+                mean_free_paths: NO_LIMIT,
                 heuristic: Heuristic::Balance,
                 photon_beams: self.photon_beams,
                 query_beams: self.query_beams,

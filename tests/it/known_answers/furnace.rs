@@ -149,3 +149,19 @@ fn chromatic_white_furnace() {
         }
     }
 }
+
+#[test]
+fn a_dense_ball_keeps_its_light() {
+    // 200 mean free paths from the centre to the surface: as wide as the picture asks for, kernels would have
+    // one of them, and lose 5 % and more.
+    let text = "camera: Perspective(origin: (0.0, 0.0, 6.0), target: (0.0, 0.0, 0.0), fov_degrees: 8.0),
+        film: (width: 16, height: 16), media: {\"m\": Homogeneous(sigma_s: 200)}, materials: {\"null\": Null},
+        shapes: [(geometry: Sphere(centre: (0.0, 0.0, 0.0), radius: 1.0), material: \"null\", interior: \"m\")],
+        lights: [Constant(1.0)],";
+    let mut table = Table::default();
+    for techniques in ["hit+pp3d", "hit+pb2d"] {
+        let (result, _) = render(&scene(text), &settings(techniques, None), 24);
+        table.check(techniques, result, 1.0, 0.01);
+    }
+    table.finish();
+}

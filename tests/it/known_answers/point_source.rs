@@ -9,8 +9,8 @@ use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, Scratch};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
-    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, RadiusField,
-    Roulette, StreamKind,
+    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PreparedScene,
+    RadiusField, Roulette, StreamKind,
 };
 
 use upbp_testing::Estimate;
@@ -56,6 +56,7 @@ fn photons_in(
             roulette,
             kernels: Kernels { pp3d: Kernel::ball(0.1), ..Kernels::NONE },
             radius_field: RadiusField::Uniform,
+            mean_free_paths: NO_LIMIT,
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,

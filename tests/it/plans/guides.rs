@@ -5,8 +5,8 @@ use upbp_core::{Settings, Start, Stop, TechniqueSet, Techniques};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::scene::{Emitter, EmitterId, Scene};
 use upbp_estimators::{
-    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, PathLengths, PreparedScene, RadiusField,
-    Roulette,
+    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PreparedScene,
+    RadiusField, Roulette,
 };
 use upbp_scene::ReadyScene;
 use upbp_testing::{Estimate, assert_same, channels, renderer};
@@ -206,6 +206,7 @@ fn kernels_of_fewer_light_sub_paths_hold_as_many_photons() {
                 bb1d: Kernel::parabolic_line(0.05),
             },
             radius_field: RadiusField::Uniform,
+            mean_free_paths: NO_LIMIT,
             heuristic: Heuristic::Balance,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Short,

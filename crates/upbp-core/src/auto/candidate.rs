@@ -239,6 +239,7 @@ mod tests {
             bp2d: 1e-3,
             bb1d: 1e-3,
             field: RadiusField::Uniform,
+            most_mean_free_paths: None,
             progressive: true,
             floor: 1e-6,
         };

@@ -9,7 +9,7 @@
 //! rounds learn where on the emitters light sub-paths should start ([`guides`]).
 
 use glam::Vec3;
-use upbp_estimators::mis::{ByTechnique, Densities};
+use upbp_estimators::mis::{ByTechnique, Densities, MisPlan};
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, LightChunk, LightVertex};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
@@ -100,7 +100,8 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let few = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / PATHS_PER_BEAM_PATH]);
     let full = full_plan(scene, settings, techniques, &statistics, room, budget);
     let [few, full] = [few, full].map(|plan| iteration_plan(scene, settings, &plan, 0));
-    let plan = IterationPlan { mis: few.mis, ..full };
+    let mis = MisPlan { greatest_scales: full.mis.greatest_scales.clone(), ..few.mis };
+    let plan = IterationPlan { mis, ..full };
     let most = (plan.light_paths / paths[0].max(1)).max(1);
     let mut first = Vec::new();
     for (round, &(part, times)) in rounds.iter().enumerate() {

@@ -12,7 +12,7 @@ use super::roulette::usual_roulette;
 use super::statistics::Statistics;
 use crate::deadline::Budget;
 use crate::plan::Plan;
-use crate::radius_schedule::{LARGEST_RADIUS, Radius, RadiusSchedule};
+use crate::radius_schedule::{LARGEST_RADIUS, MOST_MEAN_FREE_PATHS, Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
 
 /// The techniques with photon beams.
@@ -198,6 +198,7 @@ fn first_radii<S: Scene>(
         bp2d: radius(Technique::Bp2d, radii.bp2d, statistics.bp2d, 8.0, beam_paths, LARGEST_BEAM_RADIUS),
         bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
         field: statistics.radius_field,
+        most_mean_free_paths: radii.are_auto(techniques).then_some(MOST_MEAN_FREE_PATHS),
         progressive: settings.progressive,
         floor,
     }
@@ -226,6 +227,7 @@ pub(crate) fn iteration_plan<S: Scene>(
             roulette: plan.roulette,
             kernels: plan.radii.kernels(iteration),
             radius_field: plan.radii.field,
+            mean_free_paths: plan.radii.mean_free_paths(iteration),
             periods: plan.periods,
             heuristic: settings.heuristic,
             photon_beams: settings.photon_beams,

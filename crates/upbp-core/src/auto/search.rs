@@ -188,6 +188,7 @@ mod tests {
             bp2d: 0.0,
             bb1d: 0.0,
             field: RadiusField::Uniform,
+            most_mean_free_paths: None,
             progressive: true,
             floor: 1e-6,
         };

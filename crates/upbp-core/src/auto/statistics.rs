@@ -8,8 +8,8 @@ use upbp_estimators::path::{Context, Interaction, LightChunk, LightVertex};
 use upbp_estimators::scene::{BoundingSphere, Camera, CameraRay, Scene};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
-    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, PathLengths,
-    PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
+    Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, NO_LIMIT,
+    PathLengths, PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
 };
 use upbp_media::Lanes;
 
@@ -148,6 +148,7 @@ fn nominal_plan<S: Scene>(
             bb1d: Kernel::parabolic_line(nominal),
         },
         radius_field: RadiusField::Uniform,
+        mean_free_paths: NO_LIMIT,
         heuristic: Heuristic::Balance,
         photon_beams: settings.photon_beams,
         query_beams: BeamExtent::Short,
@@ -260,7 +261,7 @@ impl LightPaths {
             pp3d: of(Technique::Pp3d, &|| around_points(&queries.media, &medium, 3.0)),
             pb2d: of(Technique::Pb2d, &|| {
                 near.of(&queries.edges, medium.len(), 2.0, &|edge, radius, found| {
-                    medium.around_ray(edge, field.search_radius(radius), |_, t, distance2| {
+                    medium.around_ray(edge, field.search_radius(radius, f32::INFINITY), |_, t, distance2| {
                         found(distance2.sqrt() / field.at(edge.at(t)));
                     });
                 })
@@ -275,7 +276,7 @@ impl LightPaths {
             }),
             // Tells how many beams are enough, too.
             bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, &|edge, radius, found| {
-                beams.around_ray(edge, field.search_radius(radius), |_, approach| {
+                beams.around_ray(edge, field.search_radius(radius, f32::INFINITY), |_, approach| {
                     found(approach.distance / field.at(edge.at(approach.t_ray)));
                 });
             }),

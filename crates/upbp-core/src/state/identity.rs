@@ -111,7 +111,7 @@ impl Identity {
 }
 
 /// The same of the plan, all of it.
-fn plan_fields(plan: &Plan) -> [(&'static str, String); 18] {
+fn plan_fields(plan: &Plan) -> [(&'static str, String); 19] {
     let Plan {
         techniques,
         light_paths,
@@ -122,7 +122,8 @@ fn plan_fields(plan: &Plan) -> [(&'static str, String); 18] {
         roulette,
         periods,
         vertices_per_light_path,
-        radii: RadiusSchedule { surf, pp3d, pb2d, bp2d, bb1d, field, progressive, floor },
+        radii:
+            RadiusSchedule { surf, pp3d, pb2d, bp2d, bb1d, field, most_mean_free_paths, progressive, floor },
         lanes,
     } = plan;
     [
@@ -141,6 +142,7 @@ fn plan_fields(plan: &Plan) -> [(&'static str, String); 18] {
         ("radii.bp2d", bp2d.to_string()),
         ("radii.bb1d", bb1d.to_string()),
         ("radii.field", format!("{field:?}")),
+        ("mean free paths", format!("{most_mean_free_paths:?}")),
         ("least radius", floor.to_string()),
         ("progressive", progressive.to_string()),
         ("lanes", format!("{lanes:?}")),
@@ -189,7 +191,7 @@ mod tests {
             i.emitters = ron::from_str(&text).unwrap();
         };
         let field = FootprintField { eye: [0.0; 3], offset: 1.0, slope: 0.01, least: 0.5, most: 2.0 };
-        let changes: [Change<'_>; 31] = [
+        let changes: [Change<'_>; 32] = [
             ("version", &|i| i.version = "1.2.4".into()),
             ("version of samples", &|i| i.samples = 5),
             ("scene", &|i| i.fingerprint = "cd".into()),
@@ -220,6 +222,7 @@ mod tests {
             ("radii.bp2d", &|i| i.plan.radii.bp2d = 0.2),
             ("radii.bb1d", &|i| i.plan.radii.bb1d = 0.2),
             ("radii.field", &|i| i.plan.radii.field = RadiusField::Footprint(field)),
+            ("mean free paths", &|i| i.plan.radii.most_mean_free_paths = Some(0.5)),
             ("least radius", &|i| i.plan.radii.floor = 0.2),
             ("progressive", &|i| i.plan.radii.progressive = false),
             ("lanes", &|i| i.plan.lanes = None),

@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 use upbp_media::{Lanes, MediumId};
 
 use super::density_sum::Densities;
+use crate::iteration::NO_LIMIT;
 use crate::scene::Walk;
-use crate::technique::Technique;
+use crate::technique::{PerMerge, Technique};
 
 /// Below this `sin²θ` two beams count as parallel: BB1D neither contributes nor counts in weights.
 pub const PARALLEL_SIN2: f64 = upbp_accel::PARALLEL_SIN2 as f64;
@@ -122,6 +123,9 @@ pub struct MisPlan {
     /// `(r/ℓ)⁴` of the merges in each medium (section 6.5), where the scale of radii is one; zero for media
     /// that are left out.
     pub width: Vec<VolumeMerges>,
+    /// The greatest scales of radii in each medium, which hold where that of a vertex is greater; none for
+    /// media that are left out.
+    pub greatest_scales: Vec<PerMerge<f32>>,
     /// Extent of photon beams.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
@@ -212,21 +216,31 @@ impl MisPlan {
         self.pow(self.surf * scale * scale)
     }
 
+    /// The greatest scales of radii in a medium.
+    #[inline]
+    #[must_use]
+    pub fn greatest_scales_in(&self, medium: MediumId) -> &PerMerge<f32> {
+        self.greatest_scales.get(medium.0 as usize).unwrap_or(&NO_LIMIT)
+    }
+
     /// The merges in a medium at a vertex with some scale of radii (section 5.4).
     #[inline]
     fn merges_at(&self, medium: MediumId, scale: f64) -> VolumeMerges {
         let merges = self.merges_in(medium);
-        if scale == 1.0 {
-            return merges;
-        }
         let width = self.width.get(medium.0 as usize).copied().unwrap_or_default();
-        let (s2, s4) = (scale * scale, (scale * scale).powi(2));
-        let trust = |width: f64| (1.0 + width) / (1.0 + width * s4);
+        let greatest = self.greatest_scales_in(medium);
+        let at = |merges: f64, dimension: i32, width: f64, greatest: f32| {
+            let scale = scale.min(f64::from(greatest));
+            if merges == 0.0 || scale == 1.0 {
+                return merges;
+            }
+            merges * scale.powi(dimension) * ((1.0 + width) / (1.0 + width * scale.powi(4)))
+        };
         VolumeMerges {
-            pp3d: merges.pp3d * s2 * scale * trust(width.pp3d),
-            pb2d: merges.pb2d * s2 * trust(width.pb2d),
-            bp2d: merges.bp2d * s2 * trust(width.bp2d),
-            bb1d: merges.bb1d * scale * trust(width.bb1d),
+            pp3d: at(merges.pp3d, 3, width.pp3d, greatest.pp3d),
+            pb2d: at(merges.pb2d, 2, width.pb2d, greatest.pb2d),
+            bp2d: at(merges.bp2d, 2, width.bp2d, greatest.bp2d),
+            bb1d: at(merges.bb1d, 1, width.bb1d, greatest.bb1d),
         }
     }
 

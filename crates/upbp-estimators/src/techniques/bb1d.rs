@@ -19,13 +19,13 @@ pub(crate) fn bb1d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
-    let kernel = &plan.kernels.bb1d;
     for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Bb1d) {
-        let radius = plan.radius_field.search_radius(kernel.radius());
+        let kernels = plan.kernels_in(medium, Technique::Bb1d);
+        let radius = kernels.search_radius(&plan.radius_field);
         let tests = map.beam_tree.around_ray(&beam, radius, |index, approach| {
             let t = approach.t_ray;
             let scale = plan.radius_scale(beam.at(t), true);
-            let kernel = kernel.scaled(scale).value(approach.distance * approach.distance);
+            let kernel = kernels.at(scale).value(approach.distance * approach.distance);
             let photons = &map.beams[index as usize];
             if kernel > 0.0
                 && photons.medium == medium

@@ -22,7 +22,7 @@ pub(crate) fn bp2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     if !plan.merges_in(medium, Technique::Bp2d) {
         return;
     }
-    let kernel = plan.kernels.bp2d.scaled(vertex.scale);
+    let kernel = plan.kernels_in(medium, Technique::Bp2d).at(vertex.scale);
     let tests = map.beam_tree.around_point(vertex.position, kernel.radius(), |index, t, distance2| {
         let beam = &map.beams[index as usize];
         if beam.medium == medium

@@ -19,13 +19,13 @@ pub(crate) fn pb2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let plan = context.plan;
-    let kernel = &plan.kernels.pb2d;
     for (span, medium, beam) in edge_trace.query_beams(plan, edge.depth, Technique::Pb2d) {
-        let radius = plan.radius_field.search_radius(kernel.radius());
+        let kernels = plan.kernels_in(medium, Technique::Pb2d);
+        let radius = kernels.search_radius(&plan.radius_field);
         let ahead = |index| map.read_ahead(index);
         let tests = map.medium.around_ray_ahead(&beam, radius, ahead, |index, t, distance2| {
             let scale = plan.radius_scale(beam.at(t), true);
-            let kernel = kernel.scaled(scale).value(distance2);
+            let kernel = kernels.at(scale).value(distance2);
             let photon = &map.vertices[index as usize];
             if kernel > 0.0
                 && matches!(photon.interaction, Interaction::Medium(other) if other == medium)

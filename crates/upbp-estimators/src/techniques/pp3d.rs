@@ -22,7 +22,7 @@ pub(crate) fn pp3d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     if !plan.merges_in(medium, Technique::Pp3d) {
         return;
     }
-    let kernel = plan.kernels.pp3d.scaled(vertex.scale);
+    let kernel = plan.kernels_in(medium, Technique::Pp3d).at(vertex.scale);
     let ahead = |index| map.read_ahead(index);
     let tests = map.medium.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
         let photon = &map.vertices[index as usize];

@@ -70,6 +70,7 @@ pub(in crate::auto) fn planned(paths: u32) -> Plan {
         bp2d: 0.0,
         bb1d: 0.0,
         field: RadiusField::Uniform,
+        most_mean_free_paths: None,
         progressive: true,
         floor: 1e-6,
     };

@@ -2,9 +2,9 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
-use upbp_estimators::MediumId;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
 use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2, VolumeMerges};
+use upbp_estimators::{MediumId, PerMerge};
 
 /// The number of techniques, in the order hit, nee, connect, light tracing, surf, pp3d, pb2d, bp2d, bb1d.
 pub(crate) const TECHNIQUES: u32 = 9;
@@ -136,8 +136,15 @@ pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
             media.into_iter().map(merges).collect::<Vec<_>>()
         })
     };
-    (1.0..4.0, 1e-3..10.0, 1.0..1e5, 1e-3..1e3, merges(1e3), merges(3.0)).prop_map(
-        |(nee, connect, light_tracing, surf, volume, width)| MisPlan {
+    // Some of the scales at vertices are greater.
+    let greatest = prop_oneof![Just(f32::INFINITY), 0.1_f32..3.0];
+    let greatest_scales = vec([0; 4].map(|_| greatest.clone()), MEDIA as usize).prop_map(|media| {
+        let scales =
+            |[pp3d, pb2d, bp2d, bb1d]: [f32; 4]| PerMerge { surf: f32::INFINITY, pp3d, pb2d, bp2d, bb1d };
+        media.into_iter().map(scales).collect::<Vec<_>>()
+    });
+    (1.0..4.0, 1e-3..10.0, 1.0..1e5, 1e-3..1e3, merges(1e3), merges(3.0), greatest_scales).prop_map(
+        |(nee, connect, light_tracing, surf, volume, width, greatest_scales)| MisPlan {
             heuristic: Heuristic::Balance,
             hit: 1.0,
             nee,
@@ -146,6 +153,7 @@ pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
             surf,
             volume,
             width,
+            greatest_scales,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
             lanes: [0.0; 3],

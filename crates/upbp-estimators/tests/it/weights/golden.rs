@@ -81,6 +81,7 @@ fn golden_plan(query_beams: BeamExtent) -> MisPlan {
             bb1d: 200.0 * 0.05 / 3.0,
         }],
         width: Vec::new(),
+        greatest_scales: Vec::new(),
         photon_beams: BeamExtent::Short,
         query_beams,
         lanes: [0.0; 3],
