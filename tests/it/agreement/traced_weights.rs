@@ -17,7 +17,7 @@ use upbp_estimators::{
     IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PerMerge, PreparedScene,
     RadiusField, Roulette, Stream, StreamKind, Technique, TechniqueSet,
 };
-use upbp_media::Medium as _;
+use upbp_media::{Medium as _, MediumId};
 use upbp_testing::closed_form::fog::Fog;
 use upbp_testing::closed_form::material::Material;
 use upbp_testing::closed_form::scene::ClosedForm;
@@ -415,6 +415,30 @@ fn pilot_runs_have_fewer_paths_and_wider_kernels() {
     let of = |techniques| IterationChoices { techniques, radius_field: footprint(), ..choices() };
     let field = |techniques| IterationPlan::new(&scene, &of(techniques)).radius_field;
     assert_eq!([field(TechniqueSet::ALL), field(TechniqueSet::BPT)], [footprint(), RadiusField::Uniform]);
+}
+
+#[test]
+fn radii_in_a_medium_are_at_most_so_many_mean_free_paths() {
+    let scene = ClosedForm::new(CAMERAS[0], 1);
+    let radii = |mean_free_paths: PerMerge<f32>| {
+        let plan = IterationPlan::new(&scene, &IterationChoices { mean_free_paths, ..choices() });
+        let of = move |(id, medium): (u32, &Fog)| {
+            let scales = *plan.mis.greatest_scales_in(MediumId(id));
+            let radius = |technique| plan.kernels.get(technique).expect("it merges").radius();
+            PerMerge::from_fn(|technique| {
+                scales.get(technique).unwrap() * radius(technique) / medium.mean_free_path()
+            })
+        };
+        (0..).zip(scene.media()).map(of).collect::<Vec<_>>()
+    };
+    let most = PerMerge { surf: 0.1, pp3d: 0.05, pb2d: 0.03, bp2d: 0.5, bb1d: 0.01 };
+    for found in radii(most) {
+        for technique in [Technique::Pp3d, Technique::Pb2d, Technique::Bp2d, Technique::Bb1d] {
+            let (found, most) = (found.get(technique).unwrap(), most.get(technique).unwrap());
+            assert!((found / most - 1.0).abs() < 1e-5, "{technique:?}: {found}, {most}");
+        }
+    }
+    assert!(radii(NO_LIMIT).iter().all(|found| found.pp3d == f32::INFINITY));
 }
 
 #[test]

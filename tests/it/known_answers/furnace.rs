@@ -1,7 +1,7 @@
 //! Nothing absorbs, or what is absorbed is emitted again: every ray has radiance 1.
 
 use upbp_testing::analytic::{Case, Table, cases, scene, settings, vector};
-use upbp_testing::{render, render_channels};
+use upbp_testing::{render, render_channels, renderer};
 
 /// The part that merges may lose at boundaries, where a kernel sticks out of its medium; falls with the
 /// radius.
@@ -152,12 +152,17 @@ fn chromatic_white_furnace() {
 
 #[test]
 fn a_dense_ball_keeps_its_light() {
-    // 200 mean free paths from the centre to the surface: as wide as the picture asks for, kernels would have
-    // one of them, and lose 5 % and more.
+    // 200 mean free paths from the centre to the surface, where merges take place.
     let text = "camera: Perspective(origin: (0.0, 0.0, 6.0), target: (0.0, 0.0, 0.0), fov_degrees: 8.0),
         film: (width: 16, height: 16), media: {\"m\": Homogeneous(sigma_s: 200)}, materials: {\"null\": Null},
         shapes: [(geometry: Sphere(centre: (0.0, 0.0, 0.0), radius: 1.0), material: \"null\", interior: \"m\")],
         lights: [Constant(1.0)],";
+    // Kernels that stick out of it lose light, so that automatic ones are at most a part of a mean free path.
+    let limit = |radius| {
+        let scene = scene(text);
+        renderer(&scene, settings("hit+pp3d", radius)).report().plan.radii.most_mean_free_paths
+    };
+    assert_eq!([limit(None), limit(Some(0.01))], [Some(0.3), None]);
     let mut table = Table::default();
     for techniques in ["hit+pp3d", "hit+pb2d"] {
         let (result, _) = render(&scene(text), &settings(techniques, None), 24);
