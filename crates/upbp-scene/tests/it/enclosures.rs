@@ -146,7 +146,7 @@ fn all_is_dark_around_bulbs_unless_the_lens_is_in_some_surface() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
     /// As connections see it: however bodies overlap, no line leads to what is hidden.
     #[test]
     fn what_is_hidden_is_not_seen(
