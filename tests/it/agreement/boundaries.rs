@@ -57,6 +57,38 @@ fn a_camera_on_a_boundary_is_inside_even_if_no_ray_gets_out() {
     }
 }
 
+/// A box of white fog, two thirds of a mean free path wide and 100 units from the origin: one vertex in some
+/// hundred thousand comes out beyond its boundary.
+#[test]
+fn no_walk_scatters_for_ever_beyond_a_boundary_that_rounding_took_it_across() {
+    let scene = scene(
+        "(version: 1, camera: Perspective(origin: (100, 0, 0.5), target: (100, 0, 0), fov_degrees: 23),
+        film: (width: 64, height: 64), media: {\"m\": Homogeneous(sigma_s: 8)},
+        materials: {\"null\": Null, \"black\": Lambert(0)},
+        shapes: [
+            (geometry: Box(min: (99.9, -0.1, -0.1), max: (100.1, 0.1, 0.1)), material: \"null\", interior: \"m\"),
+            // The scene is moved to its middle.
+            (geometry: Sphere(centre: (-100, 0, 0), radius: 0.01), material: \"black\"),
+        ],
+        lights: [Constant(1), Spot(position: (100, 0, 0.5), target: (100, 0, 0), intensity: 1, cutoff_degrees: 12)])",
+    );
+    let rendered = |techniques: &str, max_length: u32| {
+        let settings = Settings { max_length, ..settings(techniques) };
+        let mut renderer = scene.renderer(settings.validate().expect("valid settings")).expect("a scene");
+        for _ in 0..200 {
+            renderer.iterate();
+        }
+        (renderer.film().image().mean()[0], renderer.report().counters)
+    };
+    // Nothing absorbs: whoever is not cut sees the light.
+    let (mean, counters) = rendered("hit", 100);
+    assert_eq!(counters.cut_walks, 0);
+    assert!((mean - 1.0).abs() < 1e-6, "{mean}");
+    // Light sub-paths of the lamp and of the sky: none has a hundred edges.
+    let edges = |max_length| rendered("lt", max_length).1.light_edges;
+    assert_eq!(edges(100), edges(200));
+}
+
 #[test]
 fn no_walk_is_lost_where_free_paths_are_as_short_as_roundings() {
     let scene = scene(

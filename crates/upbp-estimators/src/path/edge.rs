@@ -174,6 +174,11 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         self.lost = true;
     }
 
+    /// Whether the ray has crossed a boundary, up to its end.
+    pub(crate) const fn has_crossed(&self) -> bool {
+        !self.crossings.is_empty()
+    }
+
     /// Whether nothing is known of the ray, since the scene's answers cannot be true.
     #[must_use]
     pub const fn is_lost(&self) -> bool {

@@ -10,7 +10,8 @@ use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, ray_origin, scatter,
+    Arrival, Arrived, BodyCheck, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, ray_origin,
+    scatter,
 };
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
@@ -61,6 +62,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         depth: 1,
     };
 
+    let mut body_check = BodyCheck::default();
     let mut travelled = 0.0;
     let mut survival = Survival::of_camera(plan.roulette, prepared.surroundings());
     let hero = L::draw(&plan.mis.lanes, || stream.uniform());
@@ -188,6 +190,9 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         origin = ray_origin(&vertex.interaction, vertex.position, scattered.direction);
         direction = scattered.direction;
         stack.clone_from(sides.towards(scattered.transmitted));
+        let corrected =
+            body_check.at_vertex(scene, (vertex.position, in_medium), edge_trace.has_crossed(), &mut stack);
+        out.counters.boundary_conflicts += u64::from(corrected);
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
             mis: scatter(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),

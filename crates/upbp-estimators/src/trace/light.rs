@@ -8,8 +8,8 @@ use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE, MediumSpan,
-    PhotonBeam, Scratch, arrive, ray_origin, scatter,
+    Arrival, Arrived, BodyCheck, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE,
+    MediumSpan, PhotonBeam, Scratch, arrive, ray_origin, scatter,
 };
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
@@ -45,6 +45,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Some(mut flight) = emit(context, index, &mut stream, counters, observer) else { return };
     let scene = prepared.scene;
     let mut survival = Survival::of_light(plan.roulette, prepared.surroundings());
+    let mut body_check = BodyCheck::default();
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
     let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
@@ -158,6 +159,9 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             infinite: false,
             hero,
         };
+        let corrected =
+            body_check.at_vertex(scene, (position, in_medium), edge_trace.has_crossed(), &mut flight.stack);
+        out.counters.boundary_conflicts += u64::from(corrected);
     }
 }
 
