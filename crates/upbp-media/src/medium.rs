@@ -236,6 +236,7 @@ pub trait Medium: Send + Sync {
     fn continuation(&self, position: Vec3) -> f32;
 
     /// One over the mean extinction, in scene units; infinite without extinction. For heuristics: it steers
-    /// the weights of techniques, never their sum, and bounds automatic radii of kernels in the medium.
+    /// the weights of techniques, never their sum, bounds automatic radii of kernels in the medium, and how
+    /// near to a boundary walks stop.
     fn mean_free_path(&self) -> f32;
 }

@@ -79,13 +79,22 @@ pub(crate) fn cone_inverse(axis: Vec3, height: f32, direction: Vec3) -> [f32; 2]
     cone_local_inverse(height, to_local(axis, direction))
 }
 
+/// Whether `direction` is within the cone: whether the first number of [`cone_inverse`] is at most 1.
+pub(crate) fn is_in_cone(axis: Vec3, height: f32, direction: Vec3) -> bool {
+    below_pole(to_local(axis, direction)) / height <= 1.0
+}
+
 fn cone_local_inverse(height: f32, direction: Vec3) -> [f32; 2] {
-    let below_pole = if direction.z > 0.0 {
+    [below_pole(direction) / height, (direction.y.atan2(direction.x) / TAU).rem_euclid(1.0)]
+}
+
+/// `1 − cos θ` of a direction, with its digits around +z.
+fn below_pole(direction: Vec3) -> f32 {
+    if direction.z > 0.0 {
         direction.truncate().length_squared() / (1.0 + direction.z)
     } else {
         1.0 - direction.z
-    };
-    [below_pole / height, (direction.y.atan2(direction.x) / TAU).rem_euclid(1.0)]
+    }
 }
 
 /// Turns a direction of the world into one of the frame in which `axis` is z.

@@ -1,7 +1,9 @@
 //! Starts of rays on, or within rounding of, the boundary of a body.
 
-use upbp_core::Settings;
+use glam::Vec3;
 use upbp_core::check::check_scene;
+use upbp_core::scene::{BoundingSphere, Hit, Scene};
+use upbp_core::{MediumStack, Ray, Renderer, Settings};
 use upbp_scene::ReadyScene;
 use upbp_testing::{assert_same, render, render_channels};
 
@@ -57,6 +59,59 @@ fn a_camera_on_a_boundary_is_inside_even_if_no_ray_gets_out() {
     }
 }
 
+/// A scene that takes every start of a walk for one within its first body.
+struct Misled(ReadyScene);
+
+impl Scene for Misled {
+    type Bsdf = <ReadyScene as Scene>::Bsdf;
+    type Emitter = <ReadyScene as Scene>::Emitter;
+    type Medium = <ReadyScene as Scene>::Medium;
+    type Camera = <ReadyScene as Scene>::Camera;
+
+    fn intersect(&self, ray: &Ray) -> Option<Hit<Self::Bsdf>> {
+        self.0.intersect(ray)
+    }
+
+    fn bounds(&self) -> BoundingSphere {
+        self.0.bounds()
+    }
+
+    fn emitters(&self) -> &[Self::Emitter] {
+        self.0.emitters()
+    }
+
+    fn media(&self) -> &[Self::Medium] {
+        self.0.media()
+    }
+
+    fn camera(&self) -> &Self::Camera {
+        self.0.camera()
+    }
+
+    fn stack_at(&self, _: Vec3) -> MediumStack {
+        self.0.stack_at(Vec3::ZERO)
+    }
+}
+
+#[test]
+fn a_walk_in_fog_finds_out_that_there_is_none() {
+    let scene = Misled(scene(
+        "(version: 1, camera: Perspective(origin: (0, 0, 3), target: (0, 0, 6), fov_degrees: 40),
+        film: (width: 16, height: 16), media: {\"m\": Homogeneous(sigma_s: 2)}, materials: {\"null\": Null},
+        shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"null\", interior: \"m\")],
+        lights: [Constant(1)])",
+    ));
+    let settings = Settings { max_length: 100, ..settings("hit") };
+    let mut renderer = Renderer::new(&scene, settings.validate().expect("valid settings")).expect("a scene");
+    for _ in 0..4 {
+        renderer.iterate();
+    }
+    // Nothing absorbs: whoever is not cut sees the sky.
+    assert_eq!(renderer.report().counters.cut_walks, 0);
+    let mean = renderer.film().image().mean()[0];
+    assert!((mean - 1.0).abs() < 1e-6, "{mean}");
+}
+
 /// A box of white fog, two thirds of a mean free path wide and 100 units from the origin: one vertex in some
 /// hundred thousand comes out beyond its boundary.
 #[test]
@@ -87,6 +142,46 @@ fn no_walk_scatters_for_ever_beyond_a_boundary_that_rounding_took_it_across() {
     // Light sub-paths of the lamp and of the sky: none has a hundred edges.
     let edges = |max_length| rendered("lt", max_length).1.light_edges;
     assert_eq!(edges(100), edges(200));
+}
+
+/// A room of black walls without thickness, 300 units from the origin and full of white fog, with a lamp
+/// in it or a sky around it: of some ten thousand walks one comes out behind a wall.
+#[test]
+fn fog_does_not_carry_light_through_walls() {
+    let mean = |techniques: &str, eye: &str, light: &str| {
+        // They go past the edges of the room.
+        let wall = |origin: &str, u: &str, v: &str| {
+            format!(
+                "(geometry: Quad(origin: ({origin}), edge_u: ({u}), edge_v: ({v})), material: \"black\"),"
+            )
+        };
+        let walls = [
+            wall("299, -1.1, -1.1", "0, 2.2, 0", "0, 0, 2.2"),
+            wall("301, -1.1, -1.1", "0, 2.2, 0", "0, 0, 2.2"),
+            wall("298.9, -1, -1.1", "2.2, 0, 0", "0, 0, 2.2"),
+            wall("298.9, 1, -1.1", "2.2, 0, 0", "0, 0, 2.2"),
+            wall("298.9, -1.1, -1", "2.2, 0, 0", "0, 2.2, 0"),
+            wall("298.9, -1.1, 1", "2.2, 0, 0", "0, 2.2, 0"),
+        ];
+        let scene = scene(&format!(
+            "(version: 1, camera: Perspective(origin: ({eye}), target: (300, 0, 0), fov_degrees: 60),
+            film: (width: 16, height: 16), media: {{\"m\": Homogeneous(sigma_s: 6)}},
+            materials: {{\"null\": Null, \"black\": Lambert(0)}},
+            shapes: [
+                {}
+                (geometry: Box(min: (299, -1, -1), max: (301, 1, 1)), material: \"null\", interior: \"m\"),
+                // The scene is moved to its middle.
+                (geometry: Sphere(centre: (-300, 0, 0), radius: 0.01), material: \"black\"),
+            ],
+            lights: [{light}])",
+            walls.concat()
+        ));
+        render(&scene, &settings(techniques), 2000).0.mean
+    };
+    assert_eq!(mean("pt", "300.3, 0, 0.9", "Constant(1)"), 0.0);
+    let lamp = "Point(position: (300, 0.5, 0), intensity: 1)";
+    let [inside, outside] = ["300.3, 0, 0.9", "303, 0.2, 0.3"].map(|eye| mean("nee+lt", eye, lamp));
+    assert!(inside > 0.01 && outside == 0.0, "{inside} {outside}");
 }
 
 #[test]

@@ -25,11 +25,18 @@ impl<S: Scene> Clone for Context<'_, S> {
 impl<S: Scene> Copy for Context<'_, S> {}
 
 impl<S: Scene> Context<'_, S> {
-    /// Distance that must be known along a ray from within the bodies of `stack`: `all` of it if somebody
-    /// else asks for that.
+    /// Distance that must be known along a ray of a walk that has stopped in media `stops` times, from within
+    /// the bodies of `stack`: `all` of it if somebody else asks for that.
+    ///
+    /// Where rounding has taken a walk out of a body, and its ray leads away from there, nothing but the end
+    /// of the ray may tell: the walk would scatter for ever in a medium without end, in full light.
     #[inline]
-    pub(crate) fn extent(&self, all: bool, stack: &MediumStack) -> Extent {
-        let to_surface = all || stack.medium().is_some_and(|medium| self.prepared.is_dense(medium));
+    pub(crate) fn extent(&self, all: bool, stops: u32, stack: &MediumStack) -> Extent {
+        /// Stops after which the bodies are put to the proof.
+        const PROOF: u32 = 32;
+        let is_proof = stops % PROOF == PROOF - 1;
+        let to_surface =
+            all || is_proof || stack.medium().is_some_and(|medium| self.prepared.is_dense(medium));
         if to_surface { Extent::ToSurface } else { Extent::ToStop }
     }
 

@@ -75,8 +75,11 @@ pub(crate) fn medium_of<S: Scene>(scene: &S, stack: &MediumStack) -> Option<Medi
     stack.medium().filter(|medium| (medium.0 as usize) < scene.media().len())
 }
 
-/// A distance is followed by this share farther than it was drawn: some roundings.
-const DISTANCE_MARGIN: f32 = 8.0 * f32::EPSILON;
+/// Roundings of the largest coordinate that walks stop at before a boundary or a surface, lest they come out
+/// beyond it. What coincides is nearer than this.
+const ROUNDINGS: f32 = 64.0;
+/// The part of a mean free path that a stop is moved by at most.
+const MOST_OF_FREE_PATH: f32 = 1.0 / 128.0;
 
 /// The decision where a walk stops, while it is followed.
 struct Flight<L: Lanes> {
@@ -88,12 +91,33 @@ struct Flight<L: Lanes> {
     /// Distance where the walk stops if the current medium goes on; infinite if it never does, or if that is
     /// not known yet, where the ray is followed to the surface anyway.
     stop: f32,
+    /// The largest coordinate of the ray's origin.
+    origin: f32,
 }
 
 impl<L: Lanes> Flight<L> {
-    /// Distance to which the ray has to be followed if the current medium goes on.
+    /// Distance to which the ray has to be followed if the current medium goes on: as far as whatever may
+    /// move the stop.
     fn max_distance(&self) -> f32 {
-        self.stop + DISTANCE_MARGIN * self.stop
+        self.stop + 2.0 * self.inset(self.stop)
+    }
+
+    /// How far from boundaries a stop at distance `t` has to be.
+    fn inset(&self, t: f32) -> f32 {
+        ROUNDINGS * f32::EPSILON * (self.origin + t)
+    }
+
+    /// The stop at distance `t`, moved away from the boundaries next to it; at distance 0 there is none.
+    fn stop_between<M: Medium>(&self, [before, behind]: [f32; 2], t: f32, medium: &M) -> f32 {
+        let inset = self.inset(t);
+        if (before == 0.0 || t - before > inset) && behind - t > inset {
+            return t;
+        }
+        let inset = inset.min(MOST_OF_FREE_PATH * medium.mean_free_path());
+        let least = if before == 0.0 { t.min(0.5 * behind) } else { before + inset };
+        let most = behind - inset;
+        let middle = 0.5 * (before + behind);
+        if least < most { t.clamp(least, most) } else { middle.min(behind.next_down()).max(before) }
     }
 }
 
@@ -174,11 +198,6 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         self.lost = true;
     }
 
-    /// Whether the ray has crossed a boundary, up to its end.
-    pub(crate) const fn has_crossed(&self) -> bool {
-        !self.crossings.is_empty()
-    }
-
     /// Whether nothing is known of the ray, since the scene's answers cannot be true.
     #[must_use]
     pub const fn is_lost(&self) -> bool {
@@ -198,7 +217,8 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         self.spans.clear();
         self.stop = None;
         self.hit = None;
-        let mut flight = Flight::<L> { extent, hero, decision: None, stop: f32::INFINITY };
+        let largest = self.origin.abs().max_element();
+        let mut flight = Flight::<L> { extent, hero, decision: None, stop: f32::INFINITY, origin: largest };
         let medium = medium_of(scene, &self.start);
         let mut span = MediumSpan { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
@@ -340,12 +360,19 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             // origin must not carry the stop over the end.
             let t = if flight.max_distance() < end {
                 Some(flight.stop)
-            } else if flight.stop < f32::INFINITY && flight.stop - DISTANCE_MARGIN * flight.stop > end {
+            } else if flight.stop < f32::INFINITY && flight.stop - flight.inset(flight.stop) > end {
                 None
             } else {
                 L::sample_distance(medium, &self.segment(span, end), flight.hero, u)
             };
-            self.stop = t.map(|t| (self.spans.len(), t));
+            self.stop = t.map(|t| {
+                // Boundaries that change no medium are within the stretch.
+                let hidden = self.crossings[span.crossings..].iter().map(|crossing| crossing.t);
+                let [before, behind] = hidden.fold([span.start, end], |[before, behind], at| {
+                    if at <= t { [before.max(at), behind] } else { [before, behind.min(at)] }
+                });
+                (self.spans.len(), flight.stop_between([before, behind], t, medium))
+            });
         }
         self.spans.push(*span);
         self.stop.is_some() && flight.extent == Extent::ToStop

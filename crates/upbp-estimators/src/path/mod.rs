@@ -1,7 +1,6 @@
 //! Sub-paths as data: edges, the vertices at their ends, what lies between two vertices.
 
 mod arrival;
-mod body_check;
 mod context;
 mod crossing;
 mod edge;
@@ -10,7 +9,6 @@ mod vertex;
 mod visibility;
 
 pub(crate) use arrival::{Arrival, Arrived, arrive, scatter};
-pub(crate) use body_check::BodyCheck;
 pub use context::{Context, Scratch};
 pub use edge::{EdgeTrace, Extent, MediumSpan};
 pub(crate) use interaction::MIN_COSINE;

@@ -141,7 +141,7 @@ pub trait Scene: Sync {
         false
     }
 
-    /// The bodies that `point` lies in. Walks ask for it where they start, and now and then in media.
+    /// The bodies that `point` lies in.
     ///
     /// The default follows a ray to infinity: a body is around the point if the ray leaves it more often than
     /// it enters. Beyond [`MAX_CROSSINGS`] it has found none.

@@ -10,8 +10,7 @@ use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, BodyCheck, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, ray_origin,
-    scatter,
+    Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, ray_origin, scatter,
 };
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
@@ -62,14 +61,14 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         depth: 1,
     };
 
-    let mut body_check = BodyCheck::default();
+    let mut stops = 0;
     let mut travelled = 0.0;
     let mut survival = Survival::of_camera(plan.roulette, prepared.surroundings());
     let hero = L::draw(&plan.mis.lanes, || stream.uniform());
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
         edge.depth = depth;
-        let extent = context.extent(needs_all, &stack);
+        let extent = context.extent(needs_all, stops, &stack);
         scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, hero, &mut stream);
         out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
         if depth == 1 {
@@ -190,9 +189,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         origin = ray_origin(&vertex.interaction, vertex.position, scattered.direction);
         direction = scattered.direction;
         stack.clone_from(sides.towards(scattered.transmitted));
-        let corrected =
-            body_check.at_vertex(scene, (vertex.position, in_medium), edge_trace.has_crossed(), &mut stack);
-        out.counters.boundary_conflicts += u64::from(corrected);
+        stops += u32::from(in_medium);
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
             mis: scatter(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),

@@ -8,8 +8,8 @@ use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, BodyCheck, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE,
-    MediumSpan, PhotonBeam, Scratch, arrive, ray_origin, scatter,
+    Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE, MediumSpan,
+    PhotonBeam, Scratch, arrive, ray_origin, scatter,
 };
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
@@ -45,7 +45,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Some(mut flight) = emit(context, index, &mut stream, counters, observer) else { return };
     let scene = prepared.scene;
     let mut survival = Survival::of_light(plan.roulette, prepared.surroundings());
-    let mut body_check = BodyCheck::default();
+    let mut stops = 0;
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
     let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
@@ -55,7 +55,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         out.counters.light_edges += 1;
         let edge_trace = &mut scratch.edge_trace;
         let start = if flight.infinite { f32::NEG_INFINITY } else { 0.0 };
-        let extent = context.extent(long_beams, &flight.stack);
+        let extent = context.extent(long_beams, stops, &flight.stack);
         edge_trace.trace(
             scene,
             flight.origin,
@@ -159,9 +159,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             infinite: false,
             hero,
         };
-        let corrected =
-            body_check.at_vertex(scene, (position, in_medium), edge_trace.has_crossed(), &mut flight.stack);
-        out.counters.boundary_conflicts += u64::from(corrected);
+        stops += u32::from(in_medium);
     }
 }
 

@@ -8,7 +8,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::infinite::{Environment, Parallel, disc_area, environment};
+use super::infinite::{Environment, Parallel, disc_area, environment, place};
 use crate::sampling;
 
 /// A constant environment.
@@ -34,8 +34,8 @@ impl Environment for ConstantEnvironment {
         self.along(sampling::sphere(u))
     }
 
-    fn coordinates(&self, direction: Vec3) -> [f32; 2] {
-        sampling::sphere_inverse(direction)
+    fn coordinates(&self, direction: Vec3) -> Option<[f32; 2]> {
+        Some(sampling::sphere_inverse(direction))
     }
 }
 

@@ -6,7 +6,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::infinite::{Parallel, disc_area};
+use super::infinite::{Parallel, disc_area, place};
 
 /// A directional light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +51,7 @@ impl Emitter for DirectionalLight {
         _: Vec3,
         on_ray: Vec3,
     ) -> Option<EmissionCoordinates> {
-        let position = self.parallel().place(bounds, on_ray)?;
+        let position = place(bounds, self.parallel().direction, on_ray)?;
         Some(EmissionCoordinates { position: Some(position), direction: None })
     }
 }

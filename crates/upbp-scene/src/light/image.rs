@@ -19,7 +19,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::infinite::{Environment, Parallel, disc_area, environment};
+use super::infinite::{Environment, Parallel, disc_area, environment, place};
 use crate::description::Fnv1a;
 
 /// The most pixels that an environment may have: 16384 × 8192.
@@ -93,6 +93,8 @@ pub struct EnvironmentImage {
     rows: Vec<f32>,
     /// `∫ luminance dω` within each row up to the end of each column, relative to the row.
     columns: Vec<f32>,
+    /// One minus the cosine of the angle between the edges of rows and the top, and the bottom.
+    edges: Vec<[f64; 2]>,
     /// `∫ luminance dω` over all directions.
     total_luminance: f64,
     /// `∫ mean of the channels dω` over all directions.
@@ -138,8 +140,20 @@ impl EnvironmentImage {
             return Err(EnvironmentImageError::Black);
         }
         let rows = rows.into_iter().map(|sum| (sum / total_luminance) as f32).collect();
-        let infinite_pixels = 0;
-        Ok(Self { width, height, pixels, rows, columns, total_luminance, total_mean, infinite_pixels })
+        let versine = |angle: f64| 2.0 * (0.5 * angle).sin().powi(2);
+        let edges = (0..=height).map(|y| polar_angle(height, y));
+        let edges = edges.map(|angle| [angle, std::f64::consts::PI - angle].map(versine)).collect();
+        Ok(Self {
+            width,
+            height,
+            pixels,
+            rows,
+            columns,
+            edges,
+            total_luminance,
+            total_mean,
+            infinite_pixels: 0,
+        })
     }
 
     /// Reads an `OpenEXR` file: the first layer with channels R, G and B. Values below zero count as zero,
@@ -241,14 +255,8 @@ impl EnvironmentImage {
         let (y, v) = invert(&self.rows, u[0]);
         let (x, u) = invert(&self.columns[y * self.width..(y + 1) * self.width], u[1]);
         // Uniform by solid angle: the versine is linear in it. From the nearer pole, for its digits.
-        let (top, bottom) = (polar_angle(self.height, y), polar_angle(self.height, y + 1));
-        let versine = |angle: f64| 2.0 * (0.5 * angle).sin().powi(2);
-        let (below, above) = (
-            versine(top) + (versine(bottom) - versine(top)) * f64::from(v),
-            versine(std::f64::consts::PI - top)
-                + (versine(std::f64::consts::PI - bottom) - versine(std::f64::consts::PI - top))
-                    * f64::from(v),
-        );
+        let (top, bottom) = (self.edges[y], self.edges[y + 1]);
+        let [below, above] = [0, 1].map(|pole| top[pole] + (bottom[pole] - top[pole]) * f64::from(v));
         let sine = (below * above).max(0.0).sqrt();
         let cosine = 0.5 * (above - below);
         let longitude = ((x as f64 + f64::from(u)) / self.width as f64 - 0.5) * std::f64::consts::TAU;
@@ -400,8 +408,8 @@ impl Environment for ImageEnvironment {
         Some(Parallel { direction, radiance, pdf })
     }
 
-    fn coordinates(&self, direction: Vec3) -> [f32; 2] {
-        self.image.coordinates(self.to_image(-direction))
+    fn coordinates(&self, direction: Vec3) -> Option<[f32; 2]> {
+        Some(self.image.coordinates(self.to_image(-direction)))
     }
 
     fn power_through(&self, area: f32) -> f32 {

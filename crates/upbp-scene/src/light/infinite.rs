@@ -44,13 +44,6 @@ impl Parallel {
         }
     }
 
-    /// The random numbers that start the ray of this light through a point; `None` beside the disc.
-    pub(super) fn place(&self, bounds: &BoundingSphere, on_ray: Vec3) -> Option<[f32; 2]> {
-        let (tangent, bitangent) = orthonormal_basis(self.direction);
-        let offset = on_ray - bounds.centre;
-        sampling::disc_inverse(Vec2::new(offset.dot(tangent), offset.dot(bitangent)) / bounds.radius)
-    }
-
     pub(super) fn hit(&self, bounds: &BoundingSphere) -> HitDensities {
         HitDensities {
             radiance: self.radiance,
@@ -72,8 +65,8 @@ pub(super) trait Environment {
     /// Draws a direction; none in the rare case that rounding moves it to where no light comes from.
     fn sample(&self, u: [f32; 2]) -> Option<Parallel>;
 
-    /// The random numbers that a direction is drawn by.
-    fn coordinates(&self, direction: Vec3) -> [f32; 2];
+    /// The random numbers that a direction is drawn by; `None` beside all that are drawn.
+    fn coordinates(&self, direction: Vec3) -> Option<[f32; 2]>;
 }
 
 /// Implements [`Emitter`](upbp_estimators::scene::Emitter) for an [`Environment`].
@@ -123,14 +116,21 @@ macro_rules! environment {
                 direction: Vec3,
                 on_ray: Vec3,
             ) -> Option<EmissionCoordinates> {
-                let position = self.along(direction)?.place(bounds, on_ray)?;
-                let direction = self.coordinates(direction);
+                let position = place(bounds, direction, on_ray)?;
+                let direction = self.coordinates(direction)?;
                 Some(EmissionCoordinates { position: Some(position), direction: Some(direction) })
             }
         }
     };
 }
 pub(super) use environment;
+
+/// The random numbers that start the ray of light in `direction` through a point; `None` beside the disc.
+pub(super) fn place(bounds: &BoundingSphere, direction: Vec3, on_ray: Vec3) -> Option<[f32; 2]> {
+    let (tangent, bitangent) = orthonormal_basis(direction);
+    let offset = on_ray - bounds.centre;
+    sampling::disc_inverse(Vec2::new(offset.dot(tangent), offset.dot(bitangent)) / bounds.radius)
+}
 
 /// Area of the disc that parallel light starts from, square scene units.
 pub(super) fn disc_area(bounds: &BoundingSphere) -> f32 {

@@ -8,7 +8,7 @@ use upbp_estimators::scene::{
 };
 use upbp_media::Spectrum;
 
-use super::infinite::{Environment, Parallel, disc_area, environment};
+use super::infinite::{Environment, Parallel, disc_area, environment, place};
 use crate::sampling;
 
 /// A disc of the sky of even radiance. Other than a [directional light](super::DirectionalLight) it is seen:
@@ -42,11 +42,8 @@ impl Environment for SunLight {
 
     fn along(&self, direction: Vec3) -> Option<Parallel> {
         let pdf = 1.0 / (TAU * self.height);
-        (self.coordinates(direction)[0] <= 1.0).then_some(Parallel {
-            direction,
-            radiance: self.radiance,
-            pdf,
-        })
+        let is_in_disc = sampling::is_in_cone(self.direction, self.height, direction);
+        is_in_disc.then_some(Parallel { direction, radiance: self.radiance, pdf })
     }
 
     fn sample(&self, u: [f32; 2]) -> Option<Parallel> {
@@ -54,9 +51,9 @@ impl Environment for SunLight {
         self.along(sampling::fine::cone(axis, height, u.map(f64::from)).as_vec3().normalize())
     }
 
-    /// The first number is above 1 beside the disc.
-    fn coordinates(&self, direction: Vec3) -> [f32; 2] {
-        sampling::cone_inverse(self.direction, self.height, direction)
+    fn coordinates(&self, direction: Vec3) -> Option<[f32; 2]> {
+        let coordinates = sampling::cone_inverse(self.direction, self.height, direction);
+        (coordinates[0] <= 1.0).then_some(coordinates)
     }
 }
 
