@@ -112,8 +112,8 @@ fn a_walk_in_fog_finds_out_that_there_is_none() {
     assert!((mean - 1.0).abs() < 1e-6, "{mean}");
 }
 
-/// A box of white fog, two thirds of a mean free path wide and 100 units from the origin: one vertex in some
-/// hundred thousand comes out beyond its boundary.
+/// A box of white fog, two thirds of a mean free path wide and 100 units from the origin: of some hundred
+/// thousand vertices one would come out beyond its boundary.
 #[test]
 fn no_walk_scatters_for_ever_beyond_a_boundary_that_rounding_took_it_across() {
     let scene = scene(
@@ -145,7 +145,7 @@ fn no_walk_scatters_for_ever_beyond_a_boundary_that_rounding_took_it_across() {
 }
 
 /// A room of black walls without thickness, 300 units from the origin and full of white fog, with a lamp
-/// in it or a sky around it: of some ten thousand walks one comes out behind a wall.
+/// in it or a sky around it: of some fifty thousand walks one would be seen to come out behind a wall.
 #[test]
 fn fog_does_not_carry_light_through_walls() {
     let mean = |techniques: &str, eye: &str, light: &str| {

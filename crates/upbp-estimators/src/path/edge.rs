@@ -75,8 +75,8 @@ pub(crate) fn medium_of<S: Scene>(scene: &S, stack: &MediumStack) -> Option<Medi
     stack.medium().filter(|medium| (medium.0 as usize) < scene.media().len())
 }
 
-/// Roundings of the largest coordinate that walks stop at before a boundary or a surface, lest they come out
-/// beyond it. What coincides is nearer than this.
+/// Distance that stops of walks keep from boundaries and surfaces, lest they come out beyond them, in
+/// roundings of the largest coordinate. What coincides is nearer to each other than this.
 const ROUNDINGS: f32 = 64.0;
 /// The part of a mean free path that a stop is moved by at most.
 const MOST_OF_FREE_PATH: f32 = 1.0 / 128.0;
@@ -96,13 +96,13 @@ struct Flight<L: Lanes> {
 }
 
 impl<L: Lanes> Flight<L> {
-    /// Distance to which the ray has to be followed if the current medium goes on: as far as whatever may
-    /// move the stop.
+    /// Distance to which the ray has to be followed if the current medium goes on: to all that the stop has
+    /// to keep off.
     fn max_distance(&self) -> f32 {
         self.stop + 2.0 * self.inset(self.stop)
     }
 
-    /// How far from boundaries a stop at distance `t` has to be.
+    /// Distance that a stop at distance `t` keeps from boundaries.
     fn inset(&self, t: f32) -> f32 {
         ROUNDINGS * f32::EPSILON * (self.origin + t)
     }

@@ -3,7 +3,7 @@
 use upbp_estimators::scene::{EmitterId, PathEnd};
 use upbp_media::BodyId;
 
-/// What is known of bodies that no line goes into or out of without meeting a surface: enclosed ones.
+/// Knowledge of bodies that no line goes into or out of without meeting a surface: enclosed ones.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Enclosures {
     /// By the number of the body: the ends that may be where it counts, if it is enclosed.
