@@ -32,11 +32,27 @@ pub(crate) struct Pixel {
     /// The part of the light that the camera sees directly, by mirrors or through glass: then it is no sign
     /// of an error that a pixel is much brighter than its neighbours.
     pub(crate) seen: Spectrum,
+    /// What the sum of splats has too much by rounding.
+    excess: Spectrum,
 }
 
 impl Pixel {
     /// No light.
-    pub(crate) const BLACK: Self = Self { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO };
+    pub(crate) const BLACK: Self =
+        Self { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO, excess: Spectrum::ZERO };
+
+    /// Adds a splat of light tracing, before anything else is added to the layer.
+    ///
+    /// A pixel with all the light of a caustic may get millions, and a sum in single precision would be off
+    /// by their roundings, which are alike in each iteration: so it is compensated (Kahan 1965).
+    #[inline]
+    pub(crate) fn add_splat(&mut self, value: Spectrum) {
+        let sum = &mut self.layers[Layer::Bpt as usize];
+        let value = value - self.excess;
+        let next = *sum + value;
+        self.excess = (next - *sum) - value;
+        *sum = next;
+    }
 }
 
 /// Sums over a set of iterations, to the last bit the same in whatever order they were added. A mean is too

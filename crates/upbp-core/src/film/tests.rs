@@ -147,6 +147,21 @@ fn small_additions_do_not_stall() {
     assert_eq!(film.image().pixels[0][0], 0.1);
 }
 
+/// A sum in single precision is 3 % below this one.
+#[test]
+fn millions_of_splats_in_one_pixel_lose_nothing() {
+    let (count, value) = (4_000_000, 2.3e-7_f32);
+    let mut pixel = Pixel::BLACK;
+    for _ in 0..count {
+        pixel.add_splat(Spectrum::splat(value));
+    }
+    let sum = f64::from(pixel.layers[Layer::Bpt as usize][0]);
+    let expected = f64::from(count) * f64::from(value);
+    assert!((sum / expected - 1.0).abs() < 1e-6, "{sum}, {expected}");
+    let plain = (0..count).fold(0.0_f32, |sum, _| sum + value);
+    assert!((f64::from(plain) / expected - 1.0).abs() > 0.01, "{plain}");
+}
+
 #[test]
 fn what_is_no_radiance_is_left_out_and_counted() {
     let mut film = Film::new(RECT, TechniqueSet::STANDARD);

@@ -12,7 +12,7 @@ use upbp_estimators::observer::NoObserver;
 use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
-use upbp_estimators::{Counters, Features, Layer, LightMap, StreamKind, pixel_index};
+use upbp_estimators::{Counters, Features, LightMap, StreamKind, pixel_index};
 use upbp_media::Lanes;
 
 use crate::auto::memory_limit::LightCounts;
@@ -172,6 +172,6 @@ pub(crate) fn add_splats(rect: PixelRect, splats: &[Splat], pixels: &mut [Pixel]
     for splat in splats {
         let [x, y] = [splat.pixel[0] - rect.x, splat.pixel[1] - rect.y];
         let pixel = &mut pixels[y as usize * rect.width as usize + x as usize];
-        pixel.layers[Layer::Bpt as usize] += splat.value;
+        pixel.add_splat(splat.value);
     }
 }
