@@ -64,9 +64,17 @@ impl Boxed {
     /// A triangle. Its box holds what the exact test accepts: projected corners are rounded as their
     /// distances are, so that a ray that just passes a long edge may meet the triangle.
     pub(super) fn triangle([a, b, c]: [Vec3; 3]) -> Self {
-        let (min, max) = (a.min(b).min(c), a.max(b).max(c));
+        Self::around(a.min(b).min(c), a.max(b).max(c), Kind::Triangle)
+    }
+
+    /// A copy of a mesh, by the bounds of its corners. Its box holds those of its triangles.
+    pub(super) fn copy((min, max): (Vec3, Vec3)) -> Self {
+        Self::around(min, max, Kind::Box)
+    }
+
+    fn around(min: Vec3, max: Vec3, kind: Kind) -> Self {
         let margin = EDGE_ROUNDING * (max - min).max_element();
-        Self { min: min - margin, max: max + margin, kind: Kind::Triangle }
+        Self { min: min - margin, max: max + margin, kind }
     }
 }
 

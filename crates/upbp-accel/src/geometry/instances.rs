@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 
 use super::build::{Boxed, Leaves, build};
 use super::error::GeometryError;
-use super::hierarchy::{BlockRef, Child, Hierarchy, Kind, MAX_INDEX, Visitor};
+use super::hierarchy::{BlockRef, Child, Hierarchy, MAX_INDEX, Visitor};
 use super::hit::{Candidate, ShapeId, Visit};
 use super::lane_ray::{LaneRay, ROUNDING, SLAB_ROUNDING, SlabRay, Widened};
 use super::model::Model;
@@ -67,11 +67,7 @@ impl Instances {
         if copies.len() > MAX_INDEX {
             return Err(GeometryError::TooManyPrimitives { count: copies.len() });
         }
-        let boxed = |instance: &Instance| {
-            let (min, max) = instance.bounds;
-            Boxed { min, max, kind: Kind::Box }
-        };
-        let boxes: Vec<_> = copies.iter().map(boxed).collect();
+        let boxes: Vec<_> = copies.iter().map(|copy| Boxed::copy(copy.bounds)).collect();
         let hierarchy =
             build(&boxes, Leaves::BOXES, &mut |kind, members| Child::block(kind, members[0] as usize, 1));
         Ok(Self { hierarchy, copies })

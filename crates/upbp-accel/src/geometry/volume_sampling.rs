@@ -106,7 +106,7 @@ struct Cells {
     /// Number of cells of the grid along each axis.
     counts: UVec3,
     /// The cells that count, as places in the grid: x first.
-    indices: Vec<u32>,
+    indices: Box<[u32]>,
 }
 
 impl Cells {
@@ -119,7 +119,7 @@ impl Cells {
             .ceil()
             .clamp(DVec3::ONE, DVec3::splat(f64::from(CELLS)));
         let size = extent / counts;
-        let mut cells = Self { min, size, counts: counts.as_uvec3(), indices: Vec::new() };
+        let mut cells = Self { min, size, counts: counts.as_uvec3(), indices: Box::default() };
         let mut state = vec![State::Unknown; cells.counts.element_product() as usize];
         for triangle in 0..mesh.triangle_count() {
             cells.mark(mesh.corners(triangle).map(|corner| corner.as_dvec3() - min), &mut state);

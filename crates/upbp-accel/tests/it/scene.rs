@@ -1,7 +1,7 @@
 //! Scenes of shapes: hits lie on surfaces, meshes have no gaps, distances are accurate.
 
 use crate::support::{Random, any_direction, visit_hits};
-use glam::{DVec3, Vec3};
+use glam::{Affine3A, DVec3, Vec3};
 use upbp_accel::{AxisBox, Candidate, Quad, Ray, SceneGeometry, Shape, Sphere, TriangleMesh, Visit};
 
 /// A closed surface that is not convex: a sphere with dents.
@@ -339,6 +339,25 @@ fn long_edges_of_a_thin_rod_have_no_gaps() {
         let target = corner(random.below(64) as u32, along) + 2e-8 * random.cube();
         let ray = Ray::new(origin, (target - origin).normalize());
         lost += usize::from(scene.closest(ray).is_none());
+    }
+    assert_eq!(lost, 0);
+}
+
+/// Rays along the seam of two tiles, some of which only meet one by rounding.
+#[test]
+fn seams_between_copies_have_no_gaps() {
+    const SIZE: f32 = 1000.0;
+    let corners = [[0.0, -1.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
+    let positions = corners.map(|[x, z]| SIZE * Vec3::new(x, 0.0, z)).to_vec();
+    let tile = TriangleMesh::new(positions, vec![[0, 1, 2], [0, 2, 3]], None).unwrap();
+    let at = |x: f32| tile.placed(&Affine3A::from_translation(Vec3::new(x, 0.0, 0.0))).unwrap();
+    let scene = SceneGeometry::build(vec![at(-SIZE).into(), at(0.0).into()]).unwrap();
+    let mut random = Random::new(8);
+    let mut lost = 0;
+    for _ in 0..50_000 {
+        let origin = Vec3::new(random.unit() - 0.5, 0.1 + 0.9 * random.unit(), 0.0);
+        let target = Vec3::new(1e-4 * (random.unit() - 0.5), 0.0, 1.0 + 3.0 * random.unit());
+        lost += usize::from(scene.closest(Ray::new(origin, (target - origin).normalize())).is_none());
     }
     assert_eq!(lost, 0);
 }
