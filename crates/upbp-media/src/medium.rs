@@ -1,5 +1,7 @@
 //! The contract of a participating medium.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
@@ -121,6 +123,8 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 /// assert!(density.stop_at_start > density.stop_at_end);
 /// ```
 ///
+/// `Box<dyn Medium>` and `Arc<dyn Medium>` are media, too, for scenes with media of several types.
+///
 /// Source: `docs/theory.md`, sections 1.3 and 1.4.
 pub trait Medium: Send + Sync {
     /// Whether the medium scatters light. If not, no walk ever stops in it.
@@ -240,3 +244,38 @@ pub trait Medium: Send + Sync {
     /// near to a boundary walks stop.
     fn mean_free_path(&self) -> f32;
 }
+
+/// Media behind a pointer, so that a scene may have media of several types: all methods are passed on.
+macro_rules! passed_on {
+    ($($pointer:ty),*) => {$(
+        impl<M: Medium + ?Sized> Medium for $pointer {
+            passed_on! { methods:
+                scatters() -> bool;
+                segment(segment: &RaySegment) -> SegmentDensity;
+                sample_distance(segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32>;
+                lane_extinctions() -> Option<Spectrum>;
+                mixture_growth() -> f64;
+                segment_lanes(segment: &RaySegment) -> SegmentDensity<[f64; 3]>;
+                sample_lane(segment: &RaySegment, lane: usize, u: [f32; 2]) -> Option<f32>;
+                sigma_s(position: Vec3) -> Spectrum;
+                sigma_t(position: Vec3) -> Spectrum;
+                phase() -> &PhaseFunction;
+                emits() -> bool;
+                emitted(segment: &RaySegment) -> Spectrum;
+                source(position: Vec3) -> Spectrum;
+                sample_emitted(segment: &RaySegment, u: f32) -> Option<f32>;
+                pdf_emitted(segment: &RaySegment, distance: f32) -> f64;
+                continuation(position: Vec3) -> f32;
+                mean_free_path() -> f32;
+            }
+        }
+    )*};
+    (methods: $($name:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {$(
+        #[inline]
+        fn $name(&self, $($argument: $type),*) -> $result {
+            (**self).$name($($argument),*)
+        }
+    )*};
+}
+
+passed_on!(&M, Box<M>, Arc<M>);

@@ -1,5 +1,7 @@
 //! The public interface as a host uses it that brings a medium of its own, or boxes one of this crate.
 
+use std::sync::Arc;
+
 use upbp_media::glam::Vec3;
 use upbp_media::{
     EdgeDensity, Homogeneous, MediaError, Medium, MediumStack, PhaseFunction, RaySegment, SegmentDensity,
@@ -62,6 +64,38 @@ fn media_mix_behind_a_trait_object_and_across_threads() -> Result<(), MediaError
         scope.spawn(walk).join().expect("a walk does not panic")
     });
     assert_eq!(pass_probability, 0.0);
+    Ok(())
+}
+
+/// All that a medium answers, for one stretch.
+fn answers<M: Medium>(medium: &M) -> String {
+    let (stretch, place) = (segment(), Vec3::ONE);
+    format!(
+        "{:?}",
+        (
+            (medium.scatters(), medium.segment(&stretch), medium.sample_distance(&stretch, 0.4, 0.1)),
+            (medium.lane_extinctions(), medium.mixture_growth(), medium.segment_lanes(&stretch)),
+            (medium.sample_lane(&stretch, 2, [0.3, 0.1]), medium.sigma_s(place), medium.sigma_t(place)),
+            (medium.phase(), medium.emits(), medium.emitted(&stretch), medium.source(place)),
+            (medium.sample_emitted(&stretch, 0.3), medium.pdf_emitted(&stretch, 1.2)),
+            (medium.continuation(place), medium.mean_free_path()),
+        )
+    )
+}
+
+#[test]
+fn media_behind_pointers_answer_as_they_do_by_themselves() -> Result<(), MediaError> {
+    let [sigma_a, sigma_s] = [Spectrum::new(0.1, 0.2, 0.3), Spectrum::new(0.5, 1.0, 4.0)];
+    let phase = PhaseFunction::henyey_greenstein(0.4)?;
+    let medium = Homogeneous::new(sigma_a, sigma_s, phase)?.with_emission(Spectrum::new(1.0, 2.0, 3.0))?;
+    let expected = answers(&medium);
+    let boxed: Box<dyn Medium> = Box::new(medium.clone());
+    let shared: Arc<dyn Medium> = Arc::new(medium.clone());
+    assert_eq!(answers::<Box<dyn Medium>>(&boxed), expected);
+    assert_eq!(answers::<Arc<dyn Medium>>(&shared), expected);
+    assert_eq!(answers::<&Homogeneous>(&&medium), expected);
+    // None of them is what a medium answers that does not say.
+    assert_ne!(format!("{:?}", medium.lane_extinctions()), "None");
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 //! Source: `docs/theory.md`, section 7. Oracle: `tests` of the parent module.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use super::deflection::Deflection;
 use crate::MediaError;
@@ -22,7 +23,8 @@ pub struct Tabulated {
 /// Half of a table, by `x = 1 − |cos θ|`: a peak at its pole keeps all digits.
 #[derive(Clone, Debug, PartialEq)]
 struct Hemisphere {
-    nodes: Box<[Node]>,
+    /// Shared by clones: a scene may name a long table many times.
+    nodes: Arc<[Node]>,
 }
 
 #[derive(Copy, Clone, Debug, PartialEq)]
@@ -111,9 +113,8 @@ impl Hemisphere {
     }
 
     /// The half with probabilities that make up for the rounding of densities.
-    fn scaled(mut self, scale: f64) -> Self {
-        self.nodes.iter_mut().for_each(|node| node.below *= scale);
-        self
+    fn scaled(self, scale: f64) -> Self {
+        Self { nodes: self.nodes.iter().map(|node| Node { below: node.below * scale, ..*node }).collect() }
     }
 
     /// Probability of a direction in this half.

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use upbp_accel::{BoxTree, SceneGeometry, Shape, ShapeId};
-use upbp_media::{Homogeneous, Medium as _};
+use upbp_media::{Homogeneous, Medium};
 
 use super::bodies::shapes_around;
 use super::builder::Builder;
@@ -73,7 +73,7 @@ impl Builder<'_> {
         let shapes = places.drafts.iter().enumerate().filter(|(_, draft)| shines(draft));
         let sources: Vec<Source> = (points.map(Source::Point))
             .chain(shapes.map(|(index, _)| Source::Shape(index)))
-            .chain(outside.filter(|medium| medium.emits()).map(|_| Source::Outside))
+            .chain(outside.filter(Medium::emits).map(|_| Source::Outside))
             .collect();
         // A shape is taken to be in a room if it may be.
         let is_in = |source: &Source, room: usize| match source {
