@@ -119,7 +119,8 @@ impl Report {
         }
         if c.lost_walks > 0 {
             warnings.push(format!(
-                "{} walks were lost: they left the scene inside of a body (is a mesh not closed?)",
+                "{} walks were lost: they left the scene inside of a body (is a mesh not closed?), or a ray of the \
+                 camera or a hit was not finite or not ahead",
                 c.lost_walks
             ));
         }

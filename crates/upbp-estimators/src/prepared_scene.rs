@@ -82,7 +82,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             }
             let reaches = !(closed && emitter.kind().is_infinite());
             powers.push(if reaches { f64::from(power) } else { 0.0 });
-            if reaches && power > 0.0 && emitter.kind() == EmitterKind::Environment {
+            if reaches && emitter.kind() == EmitterKind::Environment {
                 environments.push(EmitterId(index as u32));
             }
             if power > 0.0

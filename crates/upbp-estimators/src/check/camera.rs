@@ -20,12 +20,15 @@ pub fn check_camera(camera: &impl Camera) -> Check {
     require(inside, "the crop is a part of the film", crop)?;
     let size = Vec2::new(width as f32, height as f32);
     let mut random = Random(3);
+    let mut seen = 0;
     for _ in 0..2000 {
         let film = Vec2::from(random.pair()) * (size * 0.999);
         let u_lens = random.pair();
         let distance = 0.1 + 10.0 * random.next();
         let Some(ray) = camera.ray(film, u_lens) else { continue };
+        seen += 1;
         let case = (film, u_lens, ray);
+        require(ray.origin.is_finite(), "a ray starts at a finite point", case)?;
         require(is_unit(ray.direction), "a ray's direction is a unit vector", case)?;
         require(is_density(ray.pdf) && ray.pdf > 0.0, "a ray has a density", case)?;
         if camera.is_pinhole() {
@@ -44,6 +47,7 @@ pub fn check_camera(camera: &impl Camera) -> Check {
         require(same_lens, "the same numbers give the same lens point", (case, connection))?;
         require(same(connection.pdf, ray.pdf), "connect gives the density of ray", (case, connection))?;
     }
+    require(seen > 0, "some place of the film has a ray", (width, height))?;
     for _ in 0..20 {
         let corner = (Vec2::from(random.pair()) * (size - Vec2::ONE)).floor();
         check_pixel(camera, corner, random.pair())?;

@@ -58,7 +58,7 @@ fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut 
     require(densities.iter().all(|&p| is_density(p) && p > 0.0), "what is emitted has densities", emission)?;
     if kind.is_infinite() {
         let offset = emission.point.position - bounds.centre;
-        let outside = offset.dot(emission.direction) <= -bounds.radius;
+        let outside = offset.dot(emission.direction) <= -bounds.radius * 0.999;
         require(outside, "light from infinity starts before the scene", emission)?;
         let across = offset.reject_from_normalized(emission.direction).length();
         require(across <= bounds.radius * 1.001, "light from infinity starts on the disc", emission)?;

@@ -1,20 +1,21 @@
 //! [`check_scene`]: hits, crossings and bodies of a scene agree.
 
-use glam::Vec3;
-use upbp_media::{Medium as _, RaySegment};
+use glam::{Vec2, Vec3};
+use upbp_media::{Medium as _, MediumId, RaySegment};
 
 use super::normals::Normals;
 use super::{Check, ContractViolation, Random, is_unit, require};
 use crate::scene::{
-    Boundary, BoundingSphere, Bsdf, Crossing, Emitter, EmitterId, EmitterKind, Interface, Scene, Walk,
+    Boundary, BoundingSphere, Bsdf, Camera as _, Crossing, Emitter, EmitterId, EmitterKind, Interface,
+    PathEnd, Scene, Walk,
 };
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
 /// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside
 /// with an index of refraction, surfaces scatter as the scene says of all of them, `trace` and `is_clear`
 /// find what `intersect` does, the bodies around a point follow from the boundaries on the way to it, rays
-/// meet every light that has an area, unless it is all hidden, and all light from infinity passes what is
-/// around everything alike.
+/// meet every light that has an area, unless it is all hidden, nothing is seen from where the scene says that
+/// it is [hidden](Scene::hides), and all light from infinity passes what is around everything alike.
 ///
 /// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the
 /// normals of a body one in ten.
@@ -25,6 +26,8 @@ pub fn check_scene(scene: &impl Scene) -> Check {
     let mut random = Random(11);
     check_lights(scene, &bounds, &mut random)?;
     check_outside(scene, &bounds, &mut random)?;
+    check_extents(scene)?;
+    check_hidden(scene, &bounds, &mut random)?;
     let mut violations = Vec::new();
     let mut normals = Normals::default();
     let rays = 2000;
@@ -76,9 +79,11 @@ fn check_lights(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random
             let before = 1e-4 * bounds.radius;
             let (origin, direction) = (position + emission.direction * before, -emission.direction);
             let ray = crate::Ray { origin, direction, t_min: 0.0, t_max: 2.0 * before };
-            let hit = scene.intersect(&ray).and_then(|hit| hit.emitter);
+            let hit = scene.intersect(&ray).filter(|hit| hit.emitter == Some(EmitterId(index as u32)));
+            let passes = hit.as_ref().is_some_and(|hit| hit.boundary.is_null());
+            require(!passes, "no surface that light passes straight is a light", (index, ray))?;
             starts += 1;
-            met += u32::from(hit == Some(EmitterId(index as u32)));
+            met += u32::from(hit.is_some());
         }
         let hidden = starts == 0 || emitter.kind() != EmitterKind::Area;
         require(hidden || met > 0, "rays meet lights that have an area", (index, starts))?;
@@ -115,6 +120,51 @@ fn check_outside(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Rando
         )?;
     }
     Ok(())
+}
+
+fn check_extents(scene: &impl Scene) -> Check {
+    (0..scene.media().len() as u32).try_for_each(|medium| {
+        let extent = scene.medium_extent(MediumId(medium));
+        let is_extent = extent.is_finite() && extent > 0.0;
+        require(is_extent, "the extent of a medium is positive and finite", (medium, extent))
+    })
+}
+
+/// Lights that are asked for hidden places.
+const LIGHTS: usize = 64;
+
+/// Checks that no light and no part of the lens is seen from where a scene says that it is hidden.
+fn check_hidden(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random) -> Check {
+    let (width, height) = scene.camera().resolution();
+    let size = Vec2::new(width as f32, height as f32);
+    for _ in 0..256 {
+        let place = bounds.centre + random.direction() * (bounds.radius * random.next());
+        let body = scene.stack_at(place).top().map(|top| top.body);
+        for (index, emitter) in scene.emitters().iter().enumerate().take(LIGHTS) {
+            let ends = [PathEnd::Lights, PathEnd::Light(EmitterId(index as u32))];
+            let Some(end) = ends.into_iter().find(|end| scene.hides(body, *end)) else { continue };
+            let Some(incident) = emitter.sample_incident(bounds, place, random.pair()) else { continue };
+            let is_seen = is_seen(scene, place, incident.towards_light, incident.distance);
+            require(!is_seen, "what is hidden is not seen", (place, body, end, incident))?;
+        }
+        if scene.hides(body, PathEnd::Lens)
+            && let Some(seen) = scene.camera().ray(Vec2::from(random.pair()) * size, random.pair())
+            && let Some(direction) = (seen.origin - place).try_normalize()
+        {
+            let is_seen = is_seen(scene, place, direction, place.distance(seen.origin));
+            require(!is_seen, "what is hidden is not seen", (place, body, PathEnd::Lens, seen.origin))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether no surface that scatters is on a line, whatever body counts there, but for one within roundings of
+/// its end.
+fn is_seen(scene: &impl Scene, origin: Vec3, direction: Vec3, distance: f32) -> bool {
+    let roundings = 32.0 * f32::EPSILON * (1.0 + origin.length() / distance);
+    let ray = crate::Ray { origin, direction, t_min: 0.0, t_max: distance * (1.0 - roundings) };
+    let mut crossings = Vec::new();
+    scene.is_clear(&ray, &mut crossings) && !crossings.iter().any(|crossing| crossing.scatters)
 }
 
 /// Rays through each place where there is little else.

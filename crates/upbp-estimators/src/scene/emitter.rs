@@ -197,7 +197,8 @@ pub trait Emitter: Send + Sync {
 
     /// Power in W (any common factor may be left out): how often the emitter is chosen. For infinite
     /// emitters the power that falls on the disc `π radius²` of the bounds of the scene. Finite, not
-    /// negative; zero is never chosen.
+    /// negative. Zero is never chosen: then its light is only found where camera sub-paths hit the emitter,
+    /// or pass through its volume.
     fn power(&self, scene: &BoundingSphere) -> f32;
 
     /// Place of the emitter, and which way it shines. The default is an emitter of which that is unknown, or

@@ -1,15 +1,19 @@
 //! The contract checkers find what they are there to find: each fault below would bias an image.
 
 use glam::{Vec2, Vec3};
-use upbp_estimators::check::{check_bsdf, check_camera, check_emitter, check_medium};
+use upbp_estimators::check::{check_bsdf, check_camera, check_emitter, check_medium, check_scene};
 use upbp_estimators::scene::{
-    BoundingSphere, Bsdf, BsdfEvaluation, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter,
-    EmitterKind, EmitterPoint, HitDensities, Incident, Interface, LensConnection, PixelRect, Walk,
+    Boundary, BoundingSphere, Bsdf, BsdfEvaluation, BsdfSample, Camera, CameraConnection, CameraRay,
+    Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface,
+    LensConnection, PathEnd, PixelRect, Scene, Walk,
 };
-use upbp_media::{Homogeneous, Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
-use upbp_scene::light::ConstantEnvironment;
-use upbp_scene::material::{Lambert, Phong};
-use upbp_scene::{PerspectiveCamera, PerspectiveView};
+use upbp_estimators::{PreparedScene, Ray};
+use upbp_media::{
+    BodyId, Homogeneous, Interior, Medium, MediumId, PhaseFunction, RaySegment, SegmentDensity, Spectrum,
+};
+use upbp_scene::light::{ConstantEnvironment, Light};
+use upbp_scene::material::{Lambert, Material, Phong};
+use upbp_scene::{PerspectiveCamera, PerspectiveView, ReadyScene};
 
 #[derive(Clone, Copy, PartialEq)]
 enum Fault {
@@ -174,7 +178,8 @@ fn a_light_with_a_wrong_density_is_found() {
     assert_eq!(violation.what, "hit agrees with sample_emission");
 }
 
-/// A camera whose densities are off by factors, or whose connections are by a shift.
+/// A camera whose densities are off by factors, an infinite one for no rays, or whose connections are by a
+/// shift.
 struct WrongCamera {
     camera: PerspectiveCamera,
     pdf: f32,
@@ -187,7 +192,7 @@ impl Camera for WrongCamera {
         self.camera.resolution()
     }
     fn ray(&self, film: Vec2, u_lens: [f32; 2]) -> Option<CameraRay> {
-        let ray = self.camera.ray(film, u_lens)?;
+        let ray = self.camera.ray(film, u_lens).filter(|_| self.pdf.is_finite())?;
         Some(CameraRay { pdf: ray.pdf * self.pdf, ..ray })
     }
     fn connect(&self, point: Vec3, u_lens: [f32; 2]) -> Option<CameraConnection> {
@@ -221,6 +226,7 @@ fn faults_of_a_camera_are_found() {
     assert_eq!(fault(1.02, 1.0, Vec2::ZERO), "a pixel's density is one over its solid angle");
     assert_eq!(fault(1.0, 1.0, Vec2::splat(0.5)), "connect inverts ray");
     assert_eq!(fault(1.0, 1.1, Vec2::ZERO), "images of a point have the density of connect_at");
+    assert_eq!(fault(f32::INFINITY, 1.0, Vec2::ZERO), "some place of the film has a ray");
 }
 
 /// A medium that errs in what `.1` says.
@@ -322,5 +328,123 @@ fn faults_of_a_medium_are_found() {
         ("source", "points of light bring what is emitted"),
     ] {
         assert_eq!(check_medium(&WrongMedium(chromatic.clone(), fault), &bounds).unwrap_err().what, expected);
+    }
+}
+
+/// A light without power, if that is the fault.
+struct Quiet(Light, &'static str);
+
+impl Emitter for Quiet {
+    fn kind(&self) -> EmitterKind {
+        self.0.kind()
+    }
+    fn power(&self, bounds: &BoundingSphere) -> f32 {
+        if self.1 == "power" { 0.0 } else { self.0.power(bounds) }
+    }
+    fn sample_emission(&self, bounds: &BoundingSphere, a: [f32; 2], b: [f32; 2]) -> Option<Emission> {
+        self.0.sample_emission(bounds, a, b)
+    }
+    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
+        self.0.sample_incident(bounds, receiver, u)
+    }
+    fn hit(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        to: Vec3,
+    ) -> Option<HitDensities> {
+        self.0.hit(bounds, point, direction, to)
+    }
+}
+
+/// A scene with a fault.
+struct WrongScene {
+    scene: ReadyScene,
+    lights: Vec<Quiet>,
+    fault: &'static str,
+}
+
+impl WrongScene {
+    /// A lamp and a body of milk under a sky.
+    fn new(fault: &'static str) -> Self {
+        let scene = ReadyScene::from_ron_str(
+            "(version: 1, camera: Perspective(origin: (0, 1, 4), target: (0, 0, 0), fov_degrees: 40),
+            film: (width: 8, height: 8), media: { \"milk\": Homogeneous(sigma_s: 4) },
+            materials: { \"black\": Lambert(0), \"glass\": Dielectric(1.5) },
+            shapes: [
+                (geometry: Sphere(centre: (0, 1, 0), radius: 0.05), material: \"black\", emission: 300),
+                (geometry: Sphere(centre: (0, -0.5, 0), radius: 0.8), material: \"glass\", interior: \"milk\"),
+            ],
+            lights: [Constant(1)])",
+            "",
+        )
+        .unwrap();
+        let lights = scene.emitters().iter().map(|light| Quiet(light.clone(), fault)).collect();
+        Self { scene, lights, fault }
+    }
+}
+
+impl Scene for WrongScene {
+    type Bsdf = Material;
+    type Emitter = Quiet;
+    type Medium = Homogeneous;
+    type Camera = PerspectiveCamera;
+
+    fn intersect(&self, ray: &Ray) -> Option<Hit<Material>> {
+        let mut hit = self.scene.intersect(ray)?;
+        if self.fault == "lamp" && hit.emitter.is_some() {
+            let interior = Interior { body: BodyId(7), medium: None, priority: 7, ior: 1.0 };
+            hit.boundary = Boundary::Null(interior);
+        }
+        Some(hit)
+    }
+    fn bounds(&self) -> BoundingSphere {
+        self.scene.bounds()
+    }
+    fn emitters(&self) -> &[Quiet] {
+        &self.lights
+    }
+    fn media(&self) -> &[Homogeneous] {
+        self.scene.media()
+    }
+    fn camera(&self) -> &PerspectiveCamera {
+        self.scene.camera()
+    }
+    fn medium_extent(&self, medium: MediumId) -> f32 {
+        if self.fault == "extent" { f32::NAN } else { self.scene.medium_extent(medium) }
+    }
+    fn hides(&self, body: Option<BodyId>, end: PathEnd) -> bool {
+        match (self.fault, end) {
+            ("lights", PathEnd::Lights)
+            | ("light", PathEnd::Light(EmitterId(0)))
+            | ("lens", PathEnd::Lens) => body.is_none(),
+            _ => self.scene.hides(body, end),
+        }
+    }
+}
+
+#[test]
+fn faults_of_a_scene_are_found() {
+    check_scene(&WrongScene::new("nothing")).unwrap();
+    for (fault, expected) in [
+        ("lamp", "no surface that light passes straight is a light"),
+        ("extent", "the extent of a medium is positive and finite"),
+        ("lights", "what is hidden is not seen"),
+        ("light", "what is hidden is not seen"),
+        ("lens", "what is hidden is not seen"),
+    ] {
+        assert_eq!(check_scene(&WrongScene::new(fault)).unwrap_err().what, expected, "{fault}");
+    }
+}
+
+/// It is never chosen, but seen by who hits it.
+#[test]
+fn a_sky_without_power_is_there() {
+    for fault in ["nothing", "power"] {
+        let scene = WrongScene::new(fault);
+        let sky = scene.lights.iter().position(|light| light.kind() == EmitterKind::Environment);
+        let sky = EmitterId(sky.unwrap() as u32);
+        assert_eq!(PreparedScene::new(&scene).unwrap().environments(), [sky], "{fault}");
     }
 }
