@@ -128,7 +128,8 @@ impl ObjFile {
         Self::read(text.as_bytes())
     }
 
-    /// Reads an OBJ file line by line, of at most 1 MiB each. A byte order mark at its start is left out.
+    /// Reads an OBJ file line by line, of at most 1 MiB each; one that ends in a backslash goes on in the
+    /// next. A byte order mark at the start of the file is left out.
     ///
     /// # Errors
     ///
@@ -136,22 +137,40 @@ impl ObjFile {
     pub fn read(mut file: impl BufRead) -> Result<Self, ObjError> {
         let mut parsed = Self::default();
         let mut bytes = Vec::new();
-        let mut line = 0;
+        // Of the first line of a statement, and of the last one that was read.
+        let (mut first, mut line) = (1, 0);
+        let mut has_comment = false;
+        let fail = |line, message| ObjError { line, message };
         loop {
-            let fail = |line, message| ObjError { line, message };
-            bytes.clear();
-            let count = (&mut file).take(MAX_LINE + 1).read_until(b'\n', &mut bytes);
-            if count.map_err(|error| fail(line + 1, error.to_string()))? == 0 {
+            let known = bytes.len();
+            let room = MAX_LINE + 1 - known as u64;
+            let count = (&mut file).take(room).read_until(b'\n', &mut bytes);
+            let is_end = count.map_err(|error| fail(line + 1, error.to_string()))? == 0;
+            if is_end && bytes.is_empty() {
                 break;
             }
-            line += 1;
+            line += usize::from(!is_end);
             if bytes.len() as u64 > MAX_LINE {
-                return Err(fail(line, format!("is longer than {MAX_LINE} bytes")));
+                return Err(fail(first, format!("is longer than {MAX_LINE} bytes")));
             }
+            // Statements with numbers go on after a backslash. Names and comments may end in one, as the path
+            // of a folder, or as a letter of another encoding.
+            has_comment |= bytes[known..].contains(&b'#');
+            let text = bytes.trim_ascii_end();
+            let has_numbers = matches!(text.trim_ascii_start().first(), Some(b'v' | b'f' | b'l' | b'p'));
+            if !is_end && text.last() == Some(&b'\\') && has_numbers && !has_comment {
+                let end = text.len() - 1;
+                bytes.truncate(end);
+                bytes.push(b' ');
+                continue;
+            }
+            has_comment = false;
             // Comments in other encodings do not matter.
             let text = String::from_utf8_lossy(&bytes);
-            let marked = if line == 1 { text.strip_prefix('\u{feff}') } else { None };
-            parsed.line(marked.unwrap_or(&text)).map_err(|message| fail(line, message))?;
+            let marked = if first == 1 { text.strip_prefix('\u{feff}') } else { None };
+            parsed.line(marked.unwrap_or(&text)).map_err(|message| fail(first, message))?;
+            bytes.clear();
+            first = line + 1;
         }
         if parsed.triangles.is_empty() {
             return Err(ObjError { line: line.max(1), message: "the file ends without a face (`f`)".into() });
@@ -406,6 +425,18 @@ mod tests {
         let ObjMesh { positions, indices, normals } = whole(text);
         let mesh = upbp_accel::TriangleMesh::new(positions, indices, normals).unwrap();
         assert_eq!((mesh.triangle_count(), mesh.area()), (4, 3.0));
+    }
+
+    #[test]
+    fn statements_go_on_after_a_backslash() {
+        let text = "# made in C:\\rooms\\\no C:\\rooms\\\nv 0 0 0\nv 1 0 \\\r\n0\nv 1 1 0\nv 0 1 0\nvt 0 \\\n1\nf 1 2 \\ \n3 \\\n4\n";
+        assert_eq!(whole(text).indices, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(whole("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3 \\").indices, [[0, 1, 2]]);
+        let error = ObjFile::parse(&text.replace('4', "x")).unwrap_err();
+        // By its first line.
+        assert_eq!(error.line, 10, "{error}");
+        let long = format!("v 0 0 \\\n{}0", " \\\n".repeat(MAX_LINE as usize / 2));
+        assert_eq!(ObjFile::parse(&long).unwrap_err().line, 1);
     }
 
     #[test]

@@ -167,12 +167,34 @@ fn points_on(shape: &Shape) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
     (0..16_u8).map(|i| shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]))
 }
 
-/// Whether a surface is all inside of another closed shape and does not touch it, as far as points on it
-/// tell.
+/// Whether a surface is all inside of another closed shape and does not touch it, as far as its corners and
+/// points on it tell.
 fn is_buried(shape: &Shape, other: ShapeId, geometry: &SceneGeometry) -> bool {
     let [(min, max), (outer_min, outer_max)] = [shape, geometry.shape(other)].map(Shape::aabb);
     let boxed = outer_min.cmplt(min).all() && max.cmplt(outer_max).all();
-    boxed && points_on(shape).all(|(point, _)| geometry.contains(other, point) == Some(true))
+    let is_inside = |point| geometry.contains(other, point) == Some(true);
+    boxed && points_on(shape).all(|(point, _)| is_inside(point)) && are_corners(shape, is_inside)
+}
+
+/// Whether something is true of all corners of a shape.
+fn are_corners(shape: &Shape, is_so: impl Fn(Vec3) -> bool) -> bool {
+    let corners = |origin: Vec3, edges: [Vec3; 3]| {
+        (0..8_u8).map(move |corner| {
+            let along = |axis: u8| if corner >> axis & 1 == 1 { edges[axis as usize] } else { Vec3::ZERO };
+            origin + along(0) + along(1) + along(2)
+        })
+    };
+    match shape {
+        Shape::Sphere(_) => true,
+        Shape::Box(shape) => {
+            let size = shape.max() - shape.min();
+            corners(shape.min(), [size * Vec3::X, size * Vec3::Y, size * Vec3::Z]).all(is_so)
+        }
+        Shape::Quad(quad) => corners(quad.origin(), [quad.edge_u(), quad.edge_v(), Vec3::ZERO]).all(is_so),
+        Shape::Mesh(mesh) => {
+            (0..mesh.triangle_count()).all(|triangle| mesh.corners(triangle).into_iter().all(&is_so))
+        }
+    }
 }
 
 /// Whether a body contains points all over the surface of an index-matched one, which has the index of
@@ -239,8 +261,10 @@ mod tests {
             };
             for shape in &shapes {
                 for (outer, id) in shapes.iter().zip((0..).map(ShapeId)) {
+                    let is_inside = |point| outer.contains(point) == Some(true);
                     let expected = boxed(shape, outer, |a, b| a.cmplt(b).all())
-                        && points_on(shape).all(|(point, _)| outer.contains(point) == Some(true));
+                        && points_on(shape).all(|(point, _)| is_inside(point))
+                        && are_corners(shape, is_inside);
                     prop_assert_eq!(is_buried(shape, id, &geometry), expected);
                     let below = |(point, normal): (Vec3, Vec3)| offset_origin(point, normal, -normal);
                     let expected = boxed(shape, outer, |a, b| a.cmple(b).all())

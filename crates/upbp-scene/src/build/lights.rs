@@ -154,7 +154,7 @@ impl Builder<'_> {
             if is_infinitely_bright(medium) {
                 self.problem(
                     "scene, outside",
-                    format!("the medium `{outside}` glows in a channel that it does not absorb: without an end it is infinitely bright"),
+                    format!("the medium `{outside}` glows in a channel whose absorption is nothing beside its scattering: without an end it is infinitely bright"),
                 );
             }
         }
@@ -178,7 +178,8 @@ fn is_closed(medium: &Homogeneous) -> bool {
     medium.extinction().to_array().iter().all(|sigma| *sigma > 0.0)
 }
 
-/// Whether a medium without an end shows infinite radiance: what it emits is never absorbed.
+/// Whether a medium without an end shows infinite radiance: what it emits is never absorbed, as far as single
+/// precision tells.
 fn is_infinitely_bright(medium: &Homogeneous) -> bool {
     let (source, sigma_s) = (medium.source(Vec3::ZERO), medium.sigma_s(Vec3::ZERO));
     let sigma_t = medium.extinction();

@@ -151,7 +151,7 @@ fn scenes_without_light_are_refused() {
     );
     assert_eq!(
         problem("media: { \"fog\": Homogeneous(sigma_a: (1, 0, 1), glow: 1) }, outside: \"fog\""),
-        "scene, outside: the medium `fog` glows in a channel that it does not absorb: without an end it is infinitely bright"
+        "scene, outside: the medium `fog` glows in a channel whose absorption is nothing beside its scattering: without an end it is infinitely bright"
     );
 }
 
@@ -218,6 +218,34 @@ fn problems_of_shapes_name_the_shape() {
             .replace("QUAD", "Quad(origin: (0, 0, 0), edge_u: (1, 0, 0), edge_v: (0, 1, 0))")
             .replace("BALL", "Sphere(centre: (0, 0, 0), radius: 1)");
         assert_eq!(problem(&format!("{MATERIALS} {LIGHT} shapes: [({shape})]")), expected);
+    }
+}
+
+/// The corners of a quad come out of the ball, and the point of a needle.
+#[test]
+fn lamps_that_come_out_of_an_opaque_shape_are_seen() {
+    let loads = |lamp: &str| {
+        let text = format!(
+            "(version: 1, {CAMERA} {MATERIALS} shapes: [
+               (name: \"ball\", geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"white\"),
+               (geometry: {lamp}, material: \"white\", emission: 5)])"
+        );
+        ReadyScene::from_ron_str(&text, "").is_ok()
+    };
+    let quad = |half: f32| {
+        let side = 2.0 * half;
+        format!("Quad(origin: (-{half}, -{half}, 0), edge_u: ({side}, 0, 0), edge_v: (0, {side}, 0))")
+    };
+    assert!(loads(&quad(0.9)));
+    assert!(!loads(&quad(0.7)));
+    let needle = |length: f32| {
+        format!("Mesh(positions: [(0, 0, 0), (0.1, 0, 0), ({length}, {length}, 0)], indices: [(0, 1, 2)])")
+    };
+    assert!(loads(&needle(0.8)));
+    assert!(!loads(&needle(0.7)));
+    // Its box comes out of the ball, the lamp does not.
+    for radius in [0.7, 0.99] {
+        assert!(!loads(&format!("Sphere(centre: (0, 0, 0), radius: {radius})")));
     }
 }
 
