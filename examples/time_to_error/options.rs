@@ -65,7 +65,7 @@ pub(crate) struct Options {
     /// Folder for the CSV file and the plots; it is made if it is not there
     #[arg(long, value_name = "FOLDER", default_value = "out/errors")]
     pub(crate) out: PathBuf,
-    /// Threads [default: one per core; at most 16 per core]
+    /// Threads [default: one per core]
     #[arg(long, value_name = "T")]
     pub(crate) threads: Option<NonZeroUsize>,
 }

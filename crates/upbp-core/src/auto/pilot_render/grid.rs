@@ -16,7 +16,10 @@ impl Grid {
     /// A grid of about this number of cells, or of one per pixel.
     pub(crate) fn new(rect: PixelRect, cells: u32) -> Self {
         let [width, height] = [rect.width, rect.height].map(f64::from);
-        let side = (width * height / f64::from(cells)).sqrt().max(1.0);
+        let even = (width * height / f64::from(cells)).sqrt();
+        // A strip that is narrower than such a cell has one row of them.
+        let side =
+            if even > width.min(height) { width.max(height) / f64::from(cells) } else { even }.max(1.0);
         let [columns, rows] = [width, height].map(|length| (length / side).ceil() as u32);
         Self { rect, side, columns, rows }
     }
@@ -36,8 +39,11 @@ impl Grid {
 
     /// The pixel that stands for a cell.
     pub(super) fn pixel(&self, cell: u32) -> [u32; 2] {
-        let place =
-            |index: u32, size: u32| ((f64::from(index) + 0.5) * self.side).min(f64::from(size - 1)) as u32;
+        // The middle of what the picture has of the cell.
+        let place = |index: u32, size: u32| {
+            let [start, end] = [index, index + 1].map(|i| (f64::from(i) * self.side).min(f64::from(size)));
+            (0.5 * (start + end)).min(f64::from(size - 1)) as u32
+        };
         let (column, row) = (cell % self.columns, cell / self.columns);
         [self.rect.x + place(column, self.rect.width), self.rect.y + place(row, self.rect.height)]
     }
@@ -63,5 +69,24 @@ impl Grid {
     pub(super) fn cell(&self, [x, y]: [u32; 2]) -> u32 {
         let index = |offset: u32, count: u32| ((f64::from(offset) / self.side) as u32).min(count - 1);
         index(y - self.rect.y, self.rows) * self.columns + index(x - self.rect.x, self.columns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_strip_has_no_more_than_twice_as_many_cells_as_are_asked_for() {
+        for (width, height) in
+            [(3840, 2160), (3840, 154), (3840, 40), (3840, 1), (1, 3840), (16384, 3), (7, 5)]
+        {
+            for asked in [1, 25, 400, 20_000] {
+                let grid = Grid::new(PixelRect { x: 3, y: 4, width, height }, asked);
+                let most = (2.0 * f64::from(asked) + 7.0).min(f64::from(width * height));
+                let cells = grid.cells();
+                assert!(f64::from(cells) <= most, "{width} x {height}, {asked}: {cells}");
+            }
+        }
     }
 }
