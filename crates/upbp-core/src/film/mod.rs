@@ -32,7 +32,7 @@ pub(crate) struct Pixel {
     /// The part of the light that the camera sees directly, by mirrors or through glass: then it is no sign
     /// of an error that a pixel is much brighter than its neighbours.
     pub(crate) seen: Spectrum,
-    /// What the sum of splats has too much by rounding.
+    /// The sum of splats so far, less what it would be without rounding.
     excess: Spectrum,
 }
 

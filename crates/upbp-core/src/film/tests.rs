@@ -147,7 +147,7 @@ fn small_additions_do_not_stall() {
     assert_eq!(film.image().pixels[0][0], 0.1);
 }
 
-/// A sum in single precision is 3 % below this one.
+/// A plain sum in single precision is off by 2 %.
 #[test]
 fn millions_of_splats_in_one_pixel_lose_nothing() {
     let (count, value) = (4_000_000, 2.3e-7_f32);

@@ -6,9 +6,10 @@ use super::{Check, Random, is_density, is_unit, require, same};
 use crate::scene::Camera;
 
 /// Checks the contract of [`Camera`]: that `connect` inverts `ray`, and that the density of a pixel's
-/// directions is one over its solid angle on average; that the rays of a pinhole start in one point; and,
-/// where there is a [`connect_at`](Camera::connect_at), that it inverts `ray` and knows how densely the lens
-/// puts images of a point.
+/// directions is one over its solid angle on average; that some place of the film has a ray, and that all
+/// start at finite points, those of a pinhole in one; and, where there is a
+/// [`connect_at`](Camera::connect_at), that it inverts `ray` and knows how densely the lens puts images of a
+/// point.
 pub fn check_camera(camera: &impl Camera) -> Check {
     let (width, height) = camera.resolution();
     require(width > 0 && height > 0, "the film is not empty", (width, height))?;

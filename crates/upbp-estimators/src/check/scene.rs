@@ -13,9 +13,11 @@ use crate::scene::{
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
 /// lie on their ray, normals belong to their surface and point out of bodies, what refracts has an inside
 /// with an index of refraction, surfaces scatter as the scene says of all of them, `trace` and `is_clear`
-/// find what `intersect` does, the bodies around a point follow from the boundaries on the way to it, rays
-/// meet every light that has an area, unless it is all hidden, nothing is seen from where the scene says that
-/// it is [hidden](Scene::hides), and all light from infinity passes what is around everything alike.
+/// find what `intersect` does, and the bodies around a point follow from the boundaries on the way to it.
+///
+/// Rays meet every light that has an area, unless it is all hidden, and not on a surface that light passes
+/// straight; all light from infinity passes what is around everything alike; nothing is seen from where it
+/// is said to be [hidden](Scene::hides); media have [extents](Scene::medium_extent).
 ///
 /// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the
 /// normals of a body one in ten.

@@ -142,15 +142,15 @@ fn a_density_above_one_is_found() {
     assert_eq!(violation.what, "pdf integrates to at most one");
 }
 
-/// An environment that tells a wrong density when it is hit.
-struct WrongHit(ConstantEnvironment);
+/// A light that errs in what `.1` says.
+struct WrongLight(Light, &'static str);
 
-impl Emitter for WrongHit {
+impl Emitter for WrongLight {
     fn kind(&self) -> EmitterKind {
         self.0.kind()
     }
     fn power(&self, bounds: &BoundingSphere) -> f32 {
-        self.0.power(bounds)
+        if self.1 == "power" { 0.0 } else { self.0.power(bounds) }
     }
     fn sample_emission(&self, bounds: &BoundingSphere, a: [f32; 2], b: [f32; 2]) -> Option<Emission> {
         self.0.sample_emission(bounds, a, b)
@@ -166,14 +166,16 @@ impl Emitter for WrongHit {
         to: Vec3,
     ) -> Option<HitDensities> {
         let hit = self.0.hit(bounds, point, direction, to)?;
-        Some(HitDensities { pdf_position: hit.pdf_position * 2.0, ..hit })
+        let factor = if self.1 == "density of a hit" { 2.0 } else { 1.0 };
+        Some(HitDensities { pdf_position: hit.pdf_position * factor, ..hit })
     }
 }
 
 #[test]
 fn a_light_with_a_wrong_density_is_found() {
     let bounds = BoundingSphere { centre: Vec3::ZERO, radius: 2.0 };
-    let light = WrongHit(ConstantEnvironment { radiance: Spectrum::ONE });
+    let sky = Light::Constant(ConstantEnvironment { radiance: Spectrum::ONE });
+    let light = WrongLight(sky, "density of a hit");
     let violation = check_emitter(&light, &bounds, &[Vec3::ZERO]).unwrap_err();
     assert_eq!(violation.what, "hit agrees with sample_emission");
 }
@@ -331,37 +333,10 @@ fn faults_of_a_medium_are_found() {
     }
 }
 
-/// A light without power, if that is the fault.
-struct Quiet(Light, &'static str);
-
-impl Emitter for Quiet {
-    fn kind(&self) -> EmitterKind {
-        self.0.kind()
-    }
-    fn power(&self, bounds: &BoundingSphere) -> f32 {
-        if self.1 == "power" { 0.0 } else { self.0.power(bounds) }
-    }
-    fn sample_emission(&self, bounds: &BoundingSphere, a: [f32; 2], b: [f32; 2]) -> Option<Emission> {
-        self.0.sample_emission(bounds, a, b)
-    }
-    fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
-        self.0.sample_incident(bounds, receiver, u)
-    }
-    fn hit(
-        &self,
-        bounds: &BoundingSphere,
-        point: &EmitterPoint,
-        direction: Vec3,
-        to: Vec3,
-    ) -> Option<HitDensities> {
-        self.0.hit(bounds, point, direction, to)
-    }
-}
-
 /// A scene with a fault.
 struct WrongScene {
     scene: ReadyScene,
-    lights: Vec<Quiet>,
+    lights: Vec<WrongLight>,
     fault: &'static str,
 }
 
@@ -380,14 +355,14 @@ impl WrongScene {
             "",
         )
         .unwrap();
-        let lights = scene.emitters().iter().map(|light| Quiet(light.clone(), fault)).collect();
+        let lights = scene.emitters().iter().map(|light| WrongLight(light.clone(), fault)).collect();
         Self { scene, lights, fault }
     }
 }
 
 impl Scene for WrongScene {
     type Bsdf = Material;
-    type Emitter = Quiet;
+    type Emitter = WrongLight;
     type Medium = Homogeneous;
     type Camera = PerspectiveCamera;
 
@@ -402,7 +377,7 @@ impl Scene for WrongScene {
     fn bounds(&self) -> BoundingSphere {
         self.scene.bounds()
     }
-    fn emitters(&self) -> &[Quiet] {
+    fn emitters(&self) -> &[WrongLight] {
         &self.lights
     }
     fn media(&self) -> &[Homogeneous] {

@@ -18,8 +18,9 @@ impl Grid {
         let [width, height] = [rect.width, rect.height].map(f64::from);
         let even = (width * height / f64::from(cells)).sqrt();
         // A strip that is narrower than such a cell has one row of them.
-        let side =
-            if even > width.min(height) { width.max(height) / f64::from(cells) } else { even }.max(1.0);
+        let is_strip = even > width.min(height);
+        let side = if is_strip { width.max(height) / f64::from(cells) } else { even };
+        let side = side.max(1.0);
         let [columns, rows] = [width, height].map(|length| (length / side).ceil() as u32);
         Self { rect, side, columns, rows }
     }
