@@ -8,6 +8,7 @@ use crate::kernel::Kernel;
 use crate::merge_periods::{MergePeriods, rank};
 use crate::mis::{BeamExtent, Heuristic, MergeKind, MisPlan, VolumeMerges};
 use crate::path::Interaction;
+use crate::prepared_scene::arrives_in_part;
 use crate::radius_field::RadiusField;
 use crate::roulette::Roulette;
 use crate::scene::Scene;
@@ -146,7 +147,7 @@ pub struct IterationChoices {
     pub periods: MergePeriods,
     /// Heuristic of the weights.
     pub heuristic: Heuristic,
-    /// Extent of photon beams.
+    /// Extent of photon beams. Where light from infinity arrives in some channels only they are short.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,
@@ -251,6 +252,9 @@ impl IterationPlan {
             0.0
         };
         let merges = techniques.iter().any(Technique::merges);
+        // Long ones would have to be divided by the probability that the light arrives at all
+        // (docs/theory.md, section 2.6).
+        let photon_beams = if arrives_in_part(scene) { BeamExtent::Short } else { choices.photon_beams };
         let camera_factor = f64::from(choices.camera_factor);
         let mis = MisPlan {
             heuristic: choices.heuristic,
@@ -262,7 +266,7 @@ impl IterationPlan {
             volume: scene.media().iter().map(in_medium).collect(),
             width: scene.media().iter().map(widths).collect(),
             greatest_scales: (0..).zip(scene.media()).map(greatest_scales).collect(),
-            photon_beams: choices.photon_beams,
+            photon_beams,
             query_beams: choices.query_beams,
             lanes: choices.lanes.unwrap_or_default(),
         };

@@ -488,6 +488,12 @@ fn from_infinity<S: Scene, L: Lanes>(scene: &S, bounds: &BoundingSphere) -> Segm
     medium.map_or(SegmentDensity::VACUUM, |medium| L::segment(medium, &everything))
 }
 
+/// Whether light from infinity gets through the medium around everything in some channels and not in others.
+pub(crate) fn arrives_in_part<S: Scene>(scene: &S) -> bool {
+    let passes = from_infinity::<S, f64>(scene, &scene.bounds()).pass_probability;
+    0.0 < passes && passes < 1.0 && scene.emitters().iter().any(|emitter| emitter.kind().is_infinite())
+}
+
 /// The bodies in which a pinhole camera is, if its ray through the middle of the film can be had.
 fn stack_of_pinhole<S: Scene>(scene: &S) -> Option<MediumStack> {
     let ray = ray_through_centre(scene)?;

@@ -155,6 +155,35 @@ fn light_from_infinity_arrives_in_the_channels_that_let_it_through() {
     }
 }
 
+/// A walk from infinity arrives with some probability, which a long beam would have to know of.
+#[test]
+fn beams_of_light_that_arrives_in_part_lose_none() {
+    let sun = "Directional(direction: (1, -2, -1), irradiance: 2)";
+    let ball =
+        "(geometry: Sphere(centre: (0, 0.6, 1.2), radius: 0.3), material: \"null\", interior: \"milk\")";
+    let [without, within] = ["", RED_PASSES].map(|outside| sky(outside, sun, ball));
+    for (techniques, extent) in
+        [("bb1d", BeamExtent::Short), ("bb1d", BeamExtent::Long), ("bp2d", BeamExtent::Long)]
+    {
+        let settings = Settings {
+            photon_beams: extent,
+            radii: fixed_radii(0.03),
+            progressive: false,
+            light_paths: LightPaths::Count(10_000),
+            beams: Some(10_000),
+            ..sky_settings(techniques)
+        };
+        let [[expected, ..], [found, ..]] =
+            [&without, &within].map(|scene| render_channels(scene, &settings, 200));
+        let sigmas = found.sigmas(&expected);
+        println!("{techniques}, {extent:?}: {found:?}, expected {expected:?}, {sigmas:+.2} sigma");
+        assert!(
+            found.error < 0.1 * found.mean && sigmas.abs() < 4.0,
+            "{techniques}, {extent:?}: {found:?}, {expected:?}"
+        );
+    }
+}
+
 #[test]
 fn and_there_is_as_if_there_were_no_medium() {
     let sun = "Directional(direction: (1, -2, -1), irradiance: 2)";

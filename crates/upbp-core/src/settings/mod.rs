@@ -54,7 +54,7 @@ pub struct Settings {
     pub roulette: Option<Roulette>,
     /// Balance or power heuristic.
     pub heuristic: Heuristic,
-    /// Extent of photon beams.
+    /// Extent of photon beams. Where light from infinity arrives in some channels only they are short.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,
