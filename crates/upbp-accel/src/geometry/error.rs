@@ -15,7 +15,7 @@ pub enum GeometryError {
     NonFiniteElement {
         /// The kind of element.
         what: &'static str,
-        /// Index of the shape in the list.
+        /// Its place in the list.
         index: usize,
     },
     /// A shape encloses no volume or has no area.
@@ -42,7 +42,7 @@ pub enum GeometryError {
         /// The number of normals.
         normals: usize,
     },
-    /// A scene has more primitives than 32-bit indices can address.
+    /// A scene or a mesh has more primitives than 32-bit indices can address.
     #[error("{count} primitives are more than can be indexed")]
     TooManyPrimitives {
         /// The number of primitives.

@@ -54,6 +54,11 @@ impl TriangleMesh {
             }
         }
         let vertices = positions.len();
+        for (count, most) in [(indices.len(), MAX_INDEX), (vertices, u32::MAX as usize)] {
+            if count > most {
+                return Err(GeometryError::TooManyPrimitives { count });
+            }
+        }
         for (triangle, corners) in indices.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&vertex| vertex as usize >= vertices) {
                 return Err(GeometryError::IndexOutOfRange { triangle, vertex, vertices });
@@ -87,10 +92,6 @@ impl TriangleMesh {
     /// without a look at each triangle; rays take somewhat longer to find their way than to triangles of a
     /// mesh of its own, and meet the same.
     pub fn placed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
-        let count = self.triangle_count() as usize;
-        if count > MAX_INDEX {
-            return Err(GeometryError::TooManyPrimitives { count });
-        }
         let placement = self.placement_by(to_scene)?;
         let bounds = self.surface.model().bounds_of_copy(&placement);
         let (surface, placement) = (self.surface.clone(), Some(placement));

@@ -51,6 +51,12 @@ impl IterationSet {
         (next < range.end).then_some(next)
     }
 
+    /// Whether the set has this index.
+    #[must_use]
+    pub fn contains(&self, index: u64) -> bool {
+        self.ranges.get(self.following(index)).is_some_and(|own| own.start <= index)
+    }
+
     /// Number of indices of `range` in the set.
     #[must_use]
     pub fn count_in(&self, range: &Range<u64>) -> u64 {
@@ -69,10 +75,10 @@ impl IterationSet {
 
     /// Adds an index below [`MAX_ITERATIONS`].
     pub(crate) fn insert(&mut self, index: u64) {
-        let at = self.following(index);
-        if self.ranges.get(at).is_some_and(|own| own.start <= index) {
+        if self.contains(index) {
             return;
         }
+        let at = self.following(index);
         let extends = at > 0 && self.ranges[at - 1].end == index;
         let precedes = self.ranges.get(at).is_some_and(|own| own.start == index + 1);
         match (extends, precedes) {
@@ -181,6 +187,7 @@ mod tests {
             prop_assert_eq!(own.is_empty(), a.is_empty());
             prop_assert_eq!(own.last(), a.last().copied());
             prop_assert_eq!(own.ranges().iter().cloned().flatten().collect::<BTreeSet<_>>(), a.clone());
+            prop_assert_eq!(own.contains(start), a.contains(&start));
             let range = start..start + length;
             prop_assert_eq!(own.first_missing(&range), range.clone().find(|i| !a.contains(i)));
             prop_assert_eq!(own.count_in(&range), range.filter(|i| a.contains(i)).count() as u64);

@@ -36,6 +36,9 @@ pub(crate) struct Pixel {
     excess: Spectrum,
 }
 
+// As docs/design.md says.
+const _: () = assert!(size_of::<Pixel>() == 96);
+
 impl Pixel {
     /// No light.
     pub(crate) const BLACK: Self =
@@ -194,8 +197,11 @@ impl Film {
 
     /// The sets of pixels of an iteration that are missing.
     pub(crate) fn missing(&self, iteration: u64) -> Range<u32> {
-        let whole = self.iterations.count_in(&(iteration..iteration + 1)) > 0;
-        let done = if whole { SETS } else { self.parts.get(&iteration).copied().unwrap_or(0) };
+        let done = if self.iterations.contains(iteration) {
+            SETS
+        } else {
+            self.parts.get(&iteration).copied().unwrap_or(0)
+        };
         done..SETS
     }
 
