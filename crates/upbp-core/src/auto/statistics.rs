@@ -103,7 +103,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
         let camera_paths = (part * f64::from(CAMERA_PATHS)).ceil() as u32;
         let plan = |paths| nominal_plan(scene, settings, techniques, lanes, paths);
         let most_vertices = room.items::<LightVertex<S::Bsdf, f64, L>>().min(MOST_VERTICES);
-        let light = LightPaths::trace::<_, L>(scene, plan, light_paths, most_vertices as f64, halt)?;
+        let light = TracedPaths::trace::<_, L>(scene, plan, light_paths, most_vertices as f64, halt)?;
         let plan = plan(light.paths);
         let queries = Queries::trace::<_, L>(&Context { prepared: scene, plan: &plan }, camera_paths, halt)?
             .within(&scene.bounds_with_camera());
@@ -166,7 +166,7 @@ struct Photon {
 
 /// Light sub-paths with the places of all that they store. Without the types of scenes, so that what follows
 /// from them is compiled once.
-struct LightPaths {
+struct TracedPaths {
     paths: u32,
     photons: Vec<Photon>,
     beams: Vec<Segment>,
@@ -174,7 +174,7 @@ struct LightPaths {
     seconds: f64,
 }
 
-impl LightPaths {
+impl TracedPaths {
     /// Traces one, then a few, then at most `most` if their vertices are not [enough](ENOUGH_VERTICES).
     fn trace<S: Scene, L: Lanes>(
         scene: &PreparedScene<'_, S>,

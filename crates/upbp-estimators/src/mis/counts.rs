@@ -30,16 +30,17 @@ pub enum BeamExtent {
     Long,
 }
 
-/// Samples times kernel volume of the merges in one medium; zero for what is off there.
+/// A value for each kind of merge in one medium, such as samples times kernel volume; zero for what is off
+/// there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VolumeMerges {
-    /// `n V_3`, photon points around points.
+    /// Photon points around points; their count is `n V_3`.
     pub pp3d: f64,
-    /// `n V_2`, photon points around query beams.
+    /// Photon points around query beams; `n V_2`.
     pub pb2d: f64,
-    /// `n V_2`, photon beams around points.
+    /// Photon beams around points; `n V_2`.
     pub bp2d: f64,
-    /// `n V_1`, photon beams around query beams.
+    /// Photon beams around query beams; `n V_1`.
     pub bb1d: f64,
 }
 
@@ -118,7 +119,7 @@ pub struct MisPlan {
     pub light_tracing: f64,
     /// `n V_2` of surface merging, where the scale of radii is one.
     pub surf: f64,
-    /// Merges in each medium, by [`MediumId`], where the scale of radii is one.
+    /// Counts of merges in each medium, by [`MediumId`], where the scale of radii is one.
     pub volume: Vec<VolumeMerges>,
     /// `(r/ℓ)⁴` of the merges in each medium (section 6.5), where the scale of radii is one; zero for media
     /// that are left out.

@@ -83,9 +83,9 @@ pub fn clear_edge<S: Scene, L: Lanes>(
     let mut corrections = 0;
     while may_correct(corrections) {
         match accumulate(scene, stack.clone(), &ray, length, crossings, corrections) {
-            Edge::Clear(density) => return Some(density),
-            Edge::Blocked => return None,
-            Edge::Corrected(correction) => crossings.insert(corrections, correction),
+            Followed::Clear(density) => return Some(density),
+            Followed::Blocked => return None,
+            Followed::Corrected(correction) => crossings.insert(corrections, correction),
         }
         corrections += 1;
     }
@@ -93,7 +93,7 @@ pub fn clear_edge<S: Scene, L: Lanes>(
 }
 
 /// The result of following an edge.
-enum Edge<L> {
+enum Followed<L> {
     Clear(EdgeDensity<L>),
     Blocked,
     /// The edge is another one, with this crossing at its start.
@@ -126,7 +126,7 @@ fn accumulate<S: Scene, L: Lanes>(
     length: f32,
     crossings: &[Crossing],
     corrections: usize,
-) -> Edge<L> {
+) -> Followed<L> {
     let mut density = EdgeDensity::<L>::EMPTY;
     let mut start = 0.0;
     let mut started = false;
@@ -135,11 +135,11 @@ fn accumulate<S: Scene, L: Lanes>(
         if crossed >= corrections
             && let Some(correction) = correction(&stack, place, &crossings[..crossed])
         {
-            return Edge::Corrected(correction);
+            return Followed::Corrected(correction);
         }
         crossed += place.len();
         if has_surface(&stack, place) {
-            return Edge::Blocked;
+            return Followed::Blocked;
         }
         let medium = medium_of(scene, &stack);
         cross_all(&mut stack, place);
@@ -156,10 +156,10 @@ fn accumulate<S: Scene, L: Lanes>(
     if length == f32::INFINITY
         && let Some(correction) = correction_of_escape(&stack, crossings)
     {
-        return Edge::Corrected(correction);
+        return Followed::Corrected(correction);
     }
     if length > start || !started {
         push(scene, &mut density, ray, medium_of(scene, &stack), start, length);
     }
-    Edge::Clear(density)
+    Followed::Clear(density)
 }
