@@ -25,7 +25,7 @@ fn ball_nonscattering() {
                 case.input("sigma_a"),
                 case.input("Le"),
             ));
-            let (result, _) = render(&scene, &settings("bpt", None), 30);
+            let (result, _) = render(&scene, &settings("bpt", None), 16);
             let name = format!("{} b = {b}", case.id);
             // Near the rim the small field of view shows.
             let slack = case.accuracy + 1e-4 * expected;

@@ -71,7 +71,7 @@ fn white_furnace() {
         for techniques in ["hit", "pt", "bpt", "bpt+surf+pp3d+pb2d+bb1d", "hit+surf+pb2d"] {
             let settings = settings(techniques, None);
             let merges = techniques.contains("surf");
-            let (result, _) = render(&scene, &settings, 24);
+            let (result, _) = render(&scene, &settings, 12);
             let slack = if merges { BOUNDARY_LOSS } else { 0.0 };
             table.check(&format!("{} {techniques}", case.id), result, 1.0, slack);
         }

@@ -134,8 +134,8 @@ fn lost_walks_end_without_bias() {
         });
         (sums.estimate(), edges as f64 / f64::from(paths))
     };
-    let (all, of_all) = returning(Roulette::Off, 40_000);
-    let (some, of_some) = returning(Roulette::Below(1.0), 200_000);
+    let (all, of_all) = returning(Roulette::Off, 25_000);
+    let (some, of_some) = returning(Roulette::Below(1.0), 120_000);
     let z = (all.mean - some.mean) / all.error.hypot(some.error);
     println!("{} +- {}, {} +- {}, {of_all} and {of_some} edges", all.mean, all.error, some.mean, some.error);
     assert!(z.abs() < 4.0, "{z} standard errors");

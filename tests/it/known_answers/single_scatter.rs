@@ -54,7 +54,7 @@ fn point_light_seen_through_fog() {
         let target = <[f64; 3]>::try_from(case.inputs("ray_direction")).expect("three numbers");
         let origin = <[f64; 3]>::try_from(case.inputs("ray_origin")).expect("three numbers");
         let many = scene(&point_light(&case, &narrow_camera(origin, target, 64)));
-        let (result, _) = render(&many, &once("nee", None), 60);
+        let (result, _) = render(&many, &once("nee", None), 10);
         table.check(&format!("{} nee", case.id), result, expected, case.accuracy);
 
         if !MERGED.contains(&case.id.as_str()) {
