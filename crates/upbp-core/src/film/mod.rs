@@ -36,7 +36,7 @@ pub(crate) struct Pixel {
     excess: Spectrum,
 }
 
-// As docs/design.md says.
+// What the design says of memory.
 const _: () = assert!(size_of::<Pixel>() == 96);
 
 impl Pixel {
