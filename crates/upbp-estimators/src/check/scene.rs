@@ -5,6 +5,7 @@ use upbp_media::{Medium as _, MediumId, RaySegment};
 
 use super::normals::Normals;
 use super::{Check, ContractViolation, Random, is_unit, require};
+use crate::path::has_surface;
 use crate::scene::{
     Boundary, BoundingSphere, Bsdf, Camera as _, Crossing, Emitter, EmitterId, EmitterKind, Interface,
     PathEnd, Scene, Walk,
@@ -15,9 +16,9 @@ use crate::scene::{
 /// with an index of refraction, surfaces scatter as the scene says of all of them, `trace` and `is_clear`
 /// find what `intersect` does, and the bodies around a point follow from the boundaries on the way to it.
 ///
-/// Rays meet every light that has an area, unless it is all hidden, and not on a surface that light passes
-/// straight; all light from infinity passes what is around everything alike; nothing is seen from where it
-/// is said to be [hidden](Scene::hides); media have [extents](Scene::medium_extent).
+/// Rays meet every light that has an area, unless it is all hidden, and on surfaces where walks stop; all
+/// light from infinity passes what is around everything alike; nothing is seen from where it is said to be
+/// [hidden](Scene::hides); media have [extents](Scene::medium_extent).
 ///
 /// Rays that graze an edge can be answered either way, so that one ray in a hundred may disagree, and of the
 /// normals of a body one in ten.
@@ -84,6 +85,11 @@ fn check_lights(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random
             let hit = scene.intersect(&ray).filter(|hit| hit.emitter == Some(EmitterId(index as u32)));
             let passes = hit.as_ref().is_some_and(|hit| hit.boundary.is_null());
             require(!passes, "no surface that light passes straight is a light", (index, ray))?;
+            let is_hidden = hit
+                .as_ref()
+                .and_then(|hit| hit.crossing(direction))
+                .is_some_and(|crossing| !has_surface(&scene.stack_at(origin), &[crossing]));
+            require(!is_hidden, "no light is on a surface that another body hides", (index, ray))?;
             starts += 1;
             met += u32::from(hit.is_some());
         }

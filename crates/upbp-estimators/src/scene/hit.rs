@@ -62,8 +62,8 @@ pub struct Hit<B> {
     pub shading_normal: Vec3,
     /// Scattering of the surface, and the body that it encloses.
     pub boundary: Boundary<B>,
-    /// The light that the surface carries. One that light passes straight carries none: walks do not stop
-    /// there.
+    /// The light that the surface carries, if walks stop there: one that light passes straight carries none,
+    /// nor one that refracts and is hidden, if only in part, in a body of higher priority.
     pub emitter: Option<EmitterId>,
 }
 

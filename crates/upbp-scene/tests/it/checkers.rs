@@ -12,7 +12,7 @@ use upbp_media::{
     BodyId, Homogeneous, Interior, Medium, MediumId, PhaseFunction, RaySegment, SegmentDensity, Spectrum,
 };
 use upbp_scene::light::{ConstantEnvironment, Light};
-use upbp_scene::material::{Lambert, Material, Phong};
+use upbp_scene::material::{Dielectric, Lambert, Material, Phong};
 use upbp_scene::{PerspectiveCamera, PerspectiveView, ReadyScene};
 
 #[derive(Clone, Copy, PartialEq)]
@@ -341,14 +341,15 @@ struct WrongScene {
 }
 
 impl WrongScene {
-    /// A lamp and a body of milk under a sky.
+    /// A lamp in a small body of milk, and a large one, under a sky.
     fn new(fault: &'static str) -> Self {
         let scene = ReadyScene::from_ron_str(
             "(version: 1, camera: Perspective(origin: (0, 1, 4), target: (0, 0, 0), fov_degrees: 40),
             film: (width: 8, height: 8), media: { \"milk\": Homogeneous(sigma_s: 4) },
-            materials: { \"black\": Lambert(0), \"glass\": Dielectric(1.5) },
+            materials: { \"black\": Lambert(0), \"glass\": Dielectric(1.5), \"null\": Null },
             shapes: [
                 (geometry: Sphere(centre: (0, 1, 0), radius: 0.05), material: \"black\", emission: 300),
+                (geometry: Sphere(centre: (0, 1, 0), radius: 0.1), material: \"null\", interior: \"milk\", priority: 1),
                 (geometry: Sphere(centre: (0, -0.5, 0), radius: 0.8), material: \"glass\", interior: \"milk\"),
             ],
             lights: [Constant(1)])",
@@ -371,6 +372,10 @@ impl Scene for WrongScene {
         if self.fault == "lamp" && hit.emitter.is_some() {
             let interior = Interior { body: BodyId(7), medium: None, priority: 7, ior: 1.0 };
             hit.boundary = Boundary::Null(interior);
+        }
+        if self.fault == "hidden lamp" && hit.emitter.is_some() {
+            let interior = Interior { body: BodyId(7), medium: None, priority: 0, ior: 1.5 };
+            hit.boundary = Boundary::Refracting(Material::Dielectric(Dielectric), interior);
         }
         Some(hit)
     }
@@ -404,6 +409,7 @@ fn faults_of_a_scene_are_found() {
     check_scene(&WrongScene::new("nothing")).unwrap();
     for (fault, expected) in [
         ("lamp", "no surface that light passes straight is a light"),
+        ("hidden lamp", "no light is on a surface that another body hides"),
         ("extent", "the extent of a medium is positive and finite"),
         ("lights", "what is hidden is not seen"),
         ("light", "what is hidden is not seen"),
