@@ -147,7 +147,8 @@ pub struct IterationChoices {
     pub periods: MergePeriods,
     /// Heuristic of the weights.
     pub heuristic: Heuristic,
-    /// Extent of photon beams. Where light from infinity arrives in some channels only they are short.
+    /// Extent of photon beams. All are short if light from infinity arrives in some channels and not in
+    /// others.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,

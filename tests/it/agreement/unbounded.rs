@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use upbp_core::{BeamExtent, LightPaths, Radii, Radius, Settings};
+use upbp_core::{BeamExtent, Heuristic, LightPaths, Radii, Radius, Settings};
 use upbp_scene::ReadyScene;
 use upbp_testing::{Estimate, assert_same, render_channels};
 
@@ -162,11 +162,17 @@ fn beams_of_light_that_arrives_in_part_lose_none() {
     let ball =
         "(geometry: Sphere(centre: (0, 0.6, 1.2), radius: 0.3), material: \"null\", interior: \"milk\")";
     let [without, within] = ["", RED_PASSES].map(|outside| sky(outside, sun, ball));
-    for (techniques, extent) in
-        [("bb1d", BeamExtent::Short), ("bb1d", BeamExtent::Long), ("bp2d", BeamExtent::Long)]
-    {
+    let (short, long) = (BeamExtent::Short, BeamExtent::Long);
+    // The power heuristic has no lanes.
+    for (techniques, extent, heuristic) in [
+        ("bb1d", short, Heuristic::Balance),
+        ("bb1d", long, Heuristic::Balance),
+        ("bp2d", long, Heuristic::Balance),
+        ("bb1d", long, Heuristic::Power),
+    ] {
         let settings = Settings {
             photon_beams: extent,
+            heuristic,
             radii: fixed_radii(0.03),
             progressive: false,
             light_paths: LightPaths::Count(10_000),
@@ -174,13 +180,11 @@ fn beams_of_light_that_arrives_in_part_lose_none() {
             ..sky_settings(techniques)
         };
         let [[expected, ..], [found, ..]] =
-            [&without, &within].map(|scene| render_channels(scene, &settings, 200));
+            [&without, &within].map(|scene| render_channels(scene, &settings, 300));
         let sigmas = found.sigmas(&expected);
-        println!("{techniques}, {extent:?}: {found:?}, expected {expected:?}, {sigmas:+.2} sigma");
-        assert!(
-            found.error < 0.1 * found.mean && sigmas.abs() < 4.0,
-            "{techniques}, {extent:?}: {found:?}, {expected:?}"
-        );
+        let case = format!("{techniques}, {extent:?}, {heuristic:?}: {found:?}, expected {expected:?}");
+        println!("{case}, {sigmas:+.2} sigma");
+        assert!(found.error.max(expected.error) < 0.1 * expected.mean && sigmas.abs() < 4.0, "{case}");
     }
 }
 

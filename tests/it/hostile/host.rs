@@ -14,7 +14,7 @@ use super::faulty_host::{Fault, Fault as F, GEOMETRY, Hostile, faults};
 /// Renders a little; what was dropped, or the reason not to start.
 fn render(fault: Fault, techniques: &str) -> Result<Counters, String> {
     let scene = Hostile::new(fault);
-    // Seconds: every ray meets as many boundaries as are followed at all.
+    // Takes long, since every ray meets as many boundaries as are followed at all.
     let is_slow = matches!(fault, F::Endless | F::EndlessBodies);
     let settings = Settings {
         techniques: techniques.parse().expect("technique names"),
@@ -41,6 +41,7 @@ fn nothing_bad_reaches_the_film_and_nothing_panics() {
         let good = render(F::None, techniques).expect("a good scene");
         assert_eq!((good.dropped, good.lost_walks), (0, 0));
         let mut faults = if techniques == "all" { faults() } else { GEOMETRY.to_vec() };
+        // These take long, and the other two sets have them.
         if techniques == "bpt" {
             faults.retain(|fault| !matches!(fault, F::Endless | F::EndlessBodies));
         }

@@ -48,7 +48,7 @@ fn views() {
 
 #[test]
 fn kernels() {
-    part("kernel", 23);
+    part("kernel", 37);
 }
 
 #[test]

@@ -30,7 +30,8 @@ fn ball_nonscattering() {
             // Near the rim the small field of view shows.
             let slack = case.accuracy + 1e-4 * expected;
             table.check(&name, result, expected, slack);
-            assert!(!null || result.error < 1e-4, "{name}: without refraction nothing is random");
+            let most = if null { 1e-4 } else { 5e-3 };
+            assert!(result.error < most, "{name}: too noisy; without refraction nothing is random");
         }
     }
     table.finish();

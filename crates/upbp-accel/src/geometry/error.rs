@@ -42,7 +42,7 @@ pub enum GeometryError {
         /// The number of normals.
         normals: usize,
     },
-    /// A scene or a mesh has more primitives than 32-bit indices can address.
+    /// A scene or a mesh has more than 2²⁶ primitives, or a mesh 2³² positions or more.
     #[error("{count} primitives are more than can be indexed")]
     TooManyPrimitives {
         /// The number of primitives.

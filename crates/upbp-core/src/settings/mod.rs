@@ -54,7 +54,8 @@ pub struct Settings {
     pub roulette: Option<Roulette>,
     /// Balance or power heuristic.
     pub heuristic: Heuristic,
-    /// Extent of photon beams. Where light from infinity arrives in some channels only they are short.
+    /// Extent of photon beams. All are short if light from infinity arrives in some channels and not in
+    /// others.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
     pub query_beams: BeamExtent,

@@ -10,7 +10,7 @@ mod visibility;
 
 pub(crate) use arrival::{Arrival, Arrived, arrive, scatter};
 pub use context::{Context, Scratch};
-pub(crate) use crossing::has_surface;
+pub(crate) use crossing::{cross_all, has_surface};
 pub use edge::{EdgeTrace, Extent, MediumSpan};
 pub(crate) use interaction::MIN_COSINE;
 pub use interaction::{Evaluation, Interaction, MediumInterface, Scattered, SurfaceInteraction};

@@ -62,8 +62,8 @@ pub struct Hit<B> {
     pub shading_normal: Vec3,
     /// Scattering of the surface, and the body that it encloses.
     pub boundary: Boundary<B>,
-    /// The light that the surface carries, if walks stop there: one that light passes straight carries none,
-    /// nor one that refracts and is hidden, if only in part, in a body of higher priority.
+    /// The light that the surface carries. Walks must stop there: a null boundary carries none, and neither
+    /// does a refracting surface of which any part lies in a body that counts above its own.
     pub emitter: Option<EmitterId>,
 }
 

@@ -25,8 +25,9 @@ pub struct SunLight {
 
 impl SunLight {
     /// A disc by its irradiance on a plane perpendicular to `direction`, W m⁻², and by its angular diameter,
-    /// radians, in `[1e-4, π]`: half a per cent of the directions to a disc of 2e-5 come out beside it, by
-    /// rounding. The radiance is `E / (π sin² α)`, with α half of the diameter.
+    /// radians, in `[1.7e-4, π]`. The radiance is `E / (π sin² α)`, with α half of the diameter.
+    ///
+    /// Directions to a narrower disc miss it by rounding: half a per cent of them at 2e-5.
     #[must_use]
     pub fn new(direction: Vec3, irradiance: Spectrum, diameter: f32) -> Self {
         let sine = |angle: f32| f64::from(angle).sin();

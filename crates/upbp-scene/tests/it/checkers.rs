@@ -373,8 +373,9 @@ impl Scene for WrongScene {
             let interior = Interior { body: BodyId(7), medium: None, priority: 7, ior: 1.0 };
             hit.boundary = Boundary::Null(interior);
         }
-        if self.fault == "hidden lamp" && hit.emitter.is_some() {
-            let interior = Interior { body: BodyId(7), medium: None, priority: 0, ior: 1.5 };
+        let priority = if self.fault == "lamp of glass" { 2 } else { 0 };
+        if ["lamp of glass", "hidden lamp"].contains(&self.fault) && hit.emitter.is_some() {
+            let interior = Interior { body: BodyId(7), medium: None, priority, ior: 1.5 };
             hit.boundary = Boundary::Refracting(Material::Dielectric(Dielectric), interior);
         }
         Some(hit)
@@ -407,6 +408,7 @@ impl Scene for WrongScene {
 #[test]
 fn faults_of_a_scene_are_found() {
     check_scene(&WrongScene::new("nothing")).unwrap();
+    check_scene(&WrongScene::new("lamp of glass")).unwrap();
     for (fault, expected) in [
         ("lamp", "no surface that light passes straight is a light"),
         ("hidden lamp", "no light is on a surface that another body hides"),
