@@ -120,7 +120,7 @@ fn agree(camera: Vec3, powers: [f32; 5], lengths: PathLengths, sets: &[&str]) {
     agree_in(&scene, lengths, sets);
 }
 
-/// How far apart means of these sets may be: four standard errors, and half a per cent where there are
+/// The most that means of these sets may differ: four standard errors, and half a per cent where there are
 /// merges, which is more than kernels of this size blur.
 fn tolerance(sets: [&str; 2], expected: f64, sigma: f64) -> f64 {
     let merges = TechniqueSet::ALL.without(TechniqueSet::BPT);

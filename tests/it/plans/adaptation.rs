@@ -117,8 +117,8 @@ fn surface_photons_blur_what_a_pixel_blurs() {
 
 /// Mean over 20 seeds, each of which chooses for itself, with its standard error, against the reference.
 ///
-/// Kernels have a fifth of their usual width: at first they blur 0.2 % of the light out of the medium,
-/// whoever chose them, and this is about what choosing does.
+/// Kernels have a fifth of their usual width: wider ones blur light, whoever chose them, and this is about
+/// what choosing does.
 #[test]
 fn no_bias_in_fog() {
     const SEEDS: u64 = 20;
