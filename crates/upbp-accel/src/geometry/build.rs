@@ -2,18 +2,20 @@
 //!
 //! The collapse has the least cost by the surface area heuristic that the binary hierarchy allows (Ylitie,
 //! Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017).
-//! The builder degenerates to a list when many boxes share a centre, so such boxes are grouped before.
+//! The builder degenerates to a list when many boxes share a centre, so such boxes are grouped before; and it
+//! joins one pair at a time in a row of boxes that are all as good as each other, so it does not see them as
+//! they are.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
 use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::SortPrecision;
-use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 
 use super::hierarchy::{Child, Hierarchy, Kind, Node};
@@ -41,12 +43,6 @@ const BLOCK_COST: f32 = 1.0;
 struct Group {
     bounds: Aabb,
     members: Range<usize>,
-}
-
-impl Boundable for Group {
-    fn aabb(&self) -> Aabb {
-        self.bounds
-    }
 }
 
 /// Distance from a triangle at which rays may meet it by rounding, relative to its longest extent.
@@ -97,12 +93,36 @@ pub(super) fn build(boxes: &[Boxed], leaves: Leaves, pack: Pack<'_>) -> Hierarch
         sort_precision: SortPrecision::U128,
         ..BvhBuildParams::medium_build()
     };
-    let tree = build_bvh2(&groups, params, &mut Duration::default());
+    let mut tree = build_bvh2(&seen_by_builder(&groups), params, &mut Duration::default());
+    for node in tree.nodes.iter_mut().filter(|node| node.is_leaf()) {
+        node.set_aabb(groups[tree.primitive_indices[node.first_index as usize] as usize].bounds);
+    }
+    tree.refit_all();
     let binary = Binary { boxes, leaves, members, groups, tree };
     let choices = binary.choices();
     let mut collapse = Collapse { binary, choices, nodes: Vec::new(), pack };
     let roots = vec![collapse.emit()];
     Hierarchy { nodes: collapse.nodes, roots }
+}
+
+/// The boxes of groups, wider by a thousandth and some roundings, no two by the same amount, so that no pair is
+/// as good as another, and in units in which no area is too large or too small for a number.
+fn seen_by_builder(groups: &[Group]) -> Vec<Aabb> {
+    /// The most that a box grows, relative to its extent and to its coordinates.
+    const GROWTH: [f32; 2] = [1.0 / 1024.0, 16.0 * f32::EPSILON];
+    let coordinates = |group: &Group| group.bounds.min.abs().max(group.bounds.max.abs()).max_element();
+    let largest = groups.iter().map(coordinates).fold(f32::MIN_POSITIVE, f32::max);
+    let scale = (-largest.log2().floor()).clamp(-126.0, 126.0).exp2();
+    let seen = |(index, group): (usize, &Group)| {
+        let (min, max) = (group.bounds.min * scale, group.bounds.max * scale);
+        // The finaliser of MurmurHash3, but for its last step.
+        let mut hash = (index as u32 ^ index as u32 >> 16).wrapping_mul(0x85eb_ca6b);
+        hash = (hash ^ hash >> 13).wrapping_mul(0xc2b2_ae35);
+        let part = (hash >> 8) as f32 / (1 << 24) as f32;
+        let growth = |corner: Vec3A| part * (GROWTH[0] * (max - min) + GROWTH[1] * corner.abs());
+        Aabb::new(min - growth(min), max + growth(max))
+    };
+    groups.par_iter().enumerate().map(seen).collect()
 }
 
 /// Calls `run` with the primitives of each block.

@@ -160,7 +160,8 @@ fn entry(ray: &Ray, (min, max): (Vec3, Vec3), margin: f32, t_max: f32) -> Option
     for axis in 0..3 {
         let inverse = 1.0 / direction[axis];
         let (a, b) = ((min[axis] - origin[axis]) * inverse, (max[axis] - origin[axis]) * inverse);
-        // The second operand remains if the other is no number: for rays in a plane of the box.
+        // No number for rays in a plane of the box, which count as beside it: the margin is outside of all
+        // that is to be found.
         near = a.min(b).max(near);
         far = a.max(b).min(far);
     }

@@ -2,7 +2,7 @@
 
 use crate::support::{Random, any_direction, visit_hits};
 use glam::{Affine3A, DVec3, Vec3};
-use upbp_accel::{AxisBox, Candidate, Quad, Ray, SceneGeometry, Shape, Sphere, TriangleMesh, Visit};
+use upbp_accel::{AxisBox, Candidate, Quad, Ray, SceneGeometry, Shape, ShapeId, Sphere, TriangleMesh, Visit};
 
 /// A closed surface that is not convex: a sphere with dents.
 fn dented_ball(rings: u32, centre: Vec3, radius: f32) -> TriangleMesh {
@@ -209,6 +209,22 @@ fn a_thousand_coincident_shapes_stay_usable() {
     assert_eq!(all_hits(&scene, ray).len(), 40_000);
     assert_eq!(scene.closest(ray).map(|hit| hit.t), Some(3.5));
     assert!(!scene.any(Ray::new(Vec3::ZERO, Vec3::X)));
+}
+
+/// Where all neighbours are as good as each other, a builder may join one pair at a time.
+#[test]
+fn rows_of_equal_shapes_are_built_at_once() {
+    for (count, step, radius) in [(100_000, 1.0, 0.4), (100_000, 1e20, 1e19), (10_000, 1e-30, 4e-31)] {
+        let at = |i: u32| Vec3::new(i as f32 * step, 0.0, 0.0);
+        let ball = |i| Sphere::new(at(i), radius).unwrap().into();
+        let scene = SceneGeometry::build((0..count).map(ball).collect()).unwrap();
+        if step == 1.0 {
+            for i in [0, 1, 77_777, count - 1] {
+                let hit = scene.closest(Ray::new(at(i) + 3.0 * Vec3::Z, Vec3::NEG_Z));
+                assert_eq!(hit.map(|hit| hit.shape), Some(ShapeId(i)));
+            }
+        }
+    }
 }
 
 #[test]
