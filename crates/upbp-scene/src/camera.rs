@@ -161,7 +161,8 @@ impl Camera for PerspectiveCamera {
         let chief = self.forward + across.x * self.right + across.y * self.up;
         let offset = self.lens_offset(u_lens);
         // Relative to the centre of the lens: far from the origin of the scene, absolute points lose digits.
-        let direction = (chief * self.focus_distance - offset).try_normalize()?;
+        let through = if self.lens_radius > 0.0 { chief * self.focus_distance - offset } else { chief };
+        let direction = through.try_normalize()?;
         Some(CameraRay { origin: self.origin + offset, direction, pdf: self.pdf(direction) })
     }
 
@@ -275,6 +276,16 @@ mod tests {
         };
         for u in [[0.1, 0.9], [0.7, 0.2], [0.99, 0.01]] {
             assert!(meet(u).distance(meet([0.5, 0.5])) < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_pinhole_is_in_focus_everywhere() {
+        let film = Vec2::new(20.3, 50.7);
+        let ray = |focus_distance| camera(&PerspectiveView { focus_distance, ..view() }).ray(film, [0.5; 2]);
+        let usual = ray(1.0).unwrap();
+        for focus_distance in [f32::MIN_POSITIVE, 1e-21, 0.3, 1e30] {
+            assert_eq!(ray(focus_distance).map(|ray| ray.direction), Some(usual.direction));
         }
     }
 

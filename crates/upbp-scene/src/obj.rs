@@ -141,7 +141,7 @@ impl ObjFile {
         let mut bytes = Vec::new();
         // Numbers of the first line of a statement, and of the last line that was read.
         let (mut first, mut line) = (1, 0);
-        let mut has_comment = false;
+        let (mut has_numbers, mut has_comment) = (false, false);
         let fail = |line, message| ObjError { line, message };
         loop {
             let known = bytes.len();
@@ -159,7 +159,9 @@ impl ObjFile {
             // of a folder, or as a letter of another encoding.
             has_comment |= bytes[known..].contains(&b'#');
             let text = bytes.trim_ascii_end();
-            let has_numbers = matches!(text.trim_ascii_start().first(), Some(b'v' | b'f' | b'l' | b'p'));
+            if known == 0 {
+                has_numbers = matches!(text.trim_ascii_start().first(), Some(b'v' | b'f' | b'l' | b'p'));
+            }
             if !is_end && text.last() == Some(&b'\\') && has_numbers && !has_comment {
                 let end = text.len() - 1;
                 bytes.truncate(end);

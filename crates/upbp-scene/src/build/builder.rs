@@ -1,7 +1,7 @@
 //! The state that all steps of a build share.
 
 use std::collections::BTreeMap;
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::light::EnvironmentImage;
 pub(super) struct Builder<'a> {
     pub(super) description: &'a SceneDescription,
     pub(super) base_dir: &'a Path,
-    pub(super) problems: Vec<Problem>,
+    pub(super) problems: Problems,
     pub(super) notes: Vec<Problem>,
     /// Fingerprint of the description and of the files that were read.
     pub(super) hash: Fnv1a,
@@ -34,13 +34,13 @@ pub(super) struct Builder<'a> {
 impl Builder<'_> {
     /// Notes a problem of a part of the scene.
     pub(super) fn problem(&mut self, item: impl Into<String>, message: impl Display) {
-        self.problems.push(Problem { item: item.into(), message: message.to_string() });
+        self.problems.add(item.into(), message);
     }
 
     /// The name of a shape in messages: its own, or its place from 1.
     pub(super) fn shape_item(&self, index: usize) -> String {
         match self.description.shapes.get(index).and_then(|shape| shape.name.as_deref()) {
-            Some(name) => format!("shape `{name}`"),
+            Some(name) => format!("shape `{}`", Shortened(name)),
             None => format!("shape {}", index + 1),
         }
     }
@@ -67,9 +67,54 @@ impl Builder<'_> {
     ) -> Option<MediumId> {
         let id = ids.get(name).copied();
         if id.is_none() {
-            self.problem(item, unknown("medium", name, self.description.media.names()));
+            let known: Vec<_> = self.description.media.names().collect();
+            self.problem(item, unknown("medium", name, &known));
         }
         id
+    }
+}
+
+/// Problems, of which there may be as many as shapes: the first ones, and how many others there are.
+#[derive(Default)]
+pub(super) struct Problems {
+    first: Vec<Problem>,
+    others: usize,
+}
+
+impl Problems {
+    /// Problems that are told.
+    const MOST: usize = 1000;
+
+    fn add(&mut self, item: String, message: impl Display) {
+        if self.first.len() < Self::MOST {
+            self.first.push(Problem { item, message: message.to_string() });
+        } else {
+            self.others += 1;
+        }
+    }
+
+    pub(super) const fn is_empty(&self) -> bool {
+        self.first.is_empty()
+    }
+
+    /// All of them as a list.
+    pub(super) fn list(self) -> Vec<Problem> {
+        let others =
+            Problem { item: "scene".to_owned(), message: format!("has {} more problems", self.others) };
+        self.first.into_iter().chain((self.others > 0).then_some(others)).collect()
+    }
+}
+
+/// A name in a message, which is cut if it is long.
+struct Shortened<'n>(&'n str);
+
+impl Display for Shortened<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const MOST: usize = 200;
+        match self.0.char_indices().nth(MOST) {
+            Some((end, _)) => write!(f, "{}…", &self.0[..end]),
+            None => f.write_str(self.0),
+        }
     }
 }
 
@@ -88,12 +133,12 @@ impl<R: Read> Read for Hashed<'_, R> {
 }
 
 /// The message about a name that is not defined, with those that are, or some of them.
-pub(super) fn unknown<'n>(what: &str, name: &str, known: impl Iterator<Item = &'n str>) -> String {
-    /// Names in a message: there may be as many messages as shapes.
+pub(super) fn unknown(what: &str, name: &str, known: &[&str]) -> String {
+    /// Names in a message.
     const MOST: usize = 20;
-    let mut known = known.map(|name| format!("`{name}`"));
-    let some: Vec<String> = known.by_ref().take(MOST).collect();
-    let others = match known.count() {
+    let name = Shortened(name);
+    let some: Vec<_> = known.iter().take(MOST).map(|name| format!("`{}`", Shortened(name))).collect();
+    let others = match known.len() - some.len() {
         0 => String::new(),
         count => format!(" and {count} others"),
     };
@@ -106,14 +151,27 @@ pub(super) fn unknown<'n>(what: &str, name: &str, known: impl Iterator<Item = &'
 
 #[cfg(test)]
 mod tests {
-    use super::unknown;
+    use super::{Problems, unknown};
 
     #[test]
     fn messages_name_no_more_than_some() {
         let names: Vec<String> = (0..500).map(|i| format!("n{i}")).collect();
-        let message = |count| unknown("material", "x", names.iter().take(count).map(String::as_str));
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let message = |count| unknown("material", "x", &names[..count]);
         assert_eq!(message(0), "unknown material `x`; there are none");
         assert_eq!(message(2), "unknown material `x`, known: `n0`, `n1`");
         assert!(message(20).ends_with("`n19`") && message(500).ends_with("`n19` and 480 others"));
+    }
+
+    #[test]
+    fn neither_long_names_nor_many_problems_make_long_messages() {
+        let long = "ß".repeat(100_000);
+        let message = unknown("material", &long, &[long.as_str(); 30]);
+        assert!(message.len() < 10_000 && message.contains("ß…`, known: `ß"), "{}", message.len());
+        let mut problems = Problems::default();
+        (0..1002).for_each(|i| problems.add(format!("shape {i}"), "is wrong"));
+        let list = problems.list();
+        assert_eq!(list.len(), 1001);
+        assert_eq!(list[1000].to_string(), "scene: has 2 more problems");
     }
 }

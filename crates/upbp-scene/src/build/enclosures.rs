@@ -150,8 +150,8 @@ fn is_all_inside((min, max): Aabb, shape: &Shape) -> bool {
     }
 }
 
-/// Whether the surface of a shape meets a box, or almost. That of a plane does if it meets a diagonal of the
-/// box.
+/// Whether the surface of a shape meets a diagonal of a box, or almost: that of a plane does if it meets the
+/// box at all, unless it ends within.
 fn meets(geometry: &SceneGeometry, shape: ShapeId, (min, max): Aabb) -> bool {
     let (low, high) = geometry.shape(shape).aabb();
     let off = Vec3::splat(OFF * low.abs().max(high.abs()).max_element());

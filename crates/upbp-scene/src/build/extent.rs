@@ -11,15 +11,13 @@ use crate::light::Light;
 /// Moves a scene that is much farther from its origin than it is large near it, exactly; returns the point of
 /// the description that has become the origin.
 pub(super) fn move_near_origin(
-    shapes: &mut [Shape],
+    shapes: &mut Vec<Shape>,
     lights: &mut [Light],
     camera: &mut PerspectiveCamera,
 ) -> Vec3 {
     let origin = origin_near(&bounds(shapes, lights, camera));
     if origin != Vec3::ZERO {
-        for shape in shapes {
-            *shape = shape.clone().translated(-origin);
-        }
+        *shapes = std::mem::take(shapes).into_iter().map(|shape| shape.translated(-origin)).collect();
         for light in lights {
             light.translate(-origin);
         }

@@ -20,15 +20,15 @@ use std::path::Path;
 use std::sync::Arc;
 
 use upbp_accel::{BoxTree, SceneGeometry, Shape};
-use upbp_estimators::scene::{Boundary, EmitterId};
+use upbp_estimators::scene::{Boundary, Emitter, EmitterId};
 use upbp_media::Homogeneous;
 
-use self::builder::Builder;
+use self::builder::{Builder, Problems};
 use self::rooms::Places;
 use self::surfaces::{BoundaryDraft, MeshFiles};
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::SceneError;
-use crate::light::{AreaLight, Light, VolumeLight};
+use crate::light::{AreaLight, Light, VolumeLight, has_density_on_disc};
 use crate::material::Material;
 use crate::scene::{Body, ReadyScene, Surface};
 
@@ -82,7 +82,7 @@ impl ReadyScene {
         let mut builder = Builder {
             description,
             base_dir: base_dir.as_ref(),
-            problems: Vec::new(),
+            problems: Problems::default(),
             notes: Vec::new(),
             hash: Fnv1a(description.hash()),
             files: Vec::new(),
@@ -93,7 +93,7 @@ impl ReadyScene {
         let scene = builder.build();
         match scene {
             Some(scene) if builder.problems.is_empty() => Ok(scene),
-            _ => Err(SceneError::Invalid { path: None, problems: builder.problems }),
+            _ => Err(SceneError::Invalid { path: None, problems: builder.problems.list() }),
         }
     }
 }
@@ -119,6 +119,11 @@ impl Builder<'_> {
         let (mut shapes, drafts): (Vec<_>, Vec<_>) = drafts.into_iter().collect::<Option<_>>()?;
         let origin = extent::move_near_origin(&mut shapes, &mut lights, &mut camera);
         let bounds = extent::bounds(&shapes, &lights, &camera);
+        if lights.iter().any(|light| light.kind().is_infinite()) && !has_density_on_disc(&bounds) {
+            let message =
+                format!("has a radius of {:e}, too small or too large for light from infinity", bounds.radius);
+            self.problem("scene", message);
+        }
         let geometry = SceneGeometry::build(shapes).map_err(|error| self.problem("shapes", error)).ok()?;
         let boxes = BoxTree::new(geometry.shapes().iter().map(Shape::aabb));
         let boxes = boxes.map_err(|error| self.problem("shapes", error)).ok()?;

@@ -1,6 +1,6 @@
 //! Notes about parts of a scene that can be rendered, but may not be meant.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
 use upbp_accel::{Shape, ShapeId, offset_origin};
@@ -8,7 +8,7 @@ use upbp_accel::{Shape, ShapeId, offset_origin};
 use super::builder::Builder;
 use super::rooms::Places;
 use super::surfaces::{BoundaryDraft, SurfaceDraft};
-use crate::description::{Camera, Geometry, Medium};
+use crate::description::{Camera, Geometry, Medium, Positive};
 use crate::error::Problem;
 use crate::light::EnvironmentImage;
 use crate::scene::COINCIDENT;
@@ -55,17 +55,23 @@ impl Builder<'_> {
 
     /// Notes bodies both of whose faces are met as one, so that light passes as if there was nothing.
     pub(super) fn note_thin_bodies(&mut self, places: Places<'_>) {
-        let mut known = BTreeSet::new();
+        let mut known = BTreeMap::new();
         let is_thin = |index: usize| {
-            let is_body = matches!(places.drafts[index].boundary, BoundaryDraft::Refracting(..));
-            // The areas of a copy far away are its own.
-            if !is_body || is_known_mesh(&self.description.shapes[index].geometry, &mut known) {
+            if !matches!(places.drafts[index].boundary, BoundaryDraft::Refracting(..)) {
                 return None;
             }
             let shape = places.shape(index);
             let (min, max) = shape.aabb();
             let largest = min.abs().max(max.abs()).max_element();
-            let thickness = 2.0 * shape.volume() / shape.area();
+            let thickness = || 2.0 * shape.volume() / shape.area();
+            let thickness = match &self.description.shapes[index].geometry {
+                // Copies are alike but for their scale, and need no look at each triangle.
+                Geometry::Mesh { file: Some(file), part, scale, .. } => {
+                    let scale = scale.map_or(1.0, Positive::get);
+                    scale * *known.entry((file, part)).or_insert_with(|| thickness() / scale)
+                }
+                _ => thickness(),
+            };
             (thickness < COINCIDENT * largest).then_some((index, thickness, largest))
         };
         let thin: Vec<_> = (0..places.drafts.len()).filter_map(is_thin).collect();

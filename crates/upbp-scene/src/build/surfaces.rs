@@ -87,7 +87,8 @@ impl Builder<'_> {
         }
         let shapes = self.description.shapes.iter().enumerate();
         let surfaces = shapes.map(|(index, shape)| self.surface(index, shape, &materials, media)).collect();
-        self.meshes.files.clear();
+        // What shapes need of it they have.
+        self.meshes = MeshFiles::default();
         surfaces
     }
 
@@ -106,7 +107,8 @@ impl Builder<'_> {
         let medium = shape.interior.as_deref().map(|name| self.medium(&item, name, media));
         let name = shape.material.as_str();
         let Some(kind) = materials.get(name) else {
-            let message = unknown("material", name, self.description.materials.names());
+            let known: Vec<_> = self.description.materials.names().collect();
+            let message = unknown("material", name, &known);
             self.problem(&item, message);
             return None;
         };
@@ -277,7 +279,7 @@ impl Builder<'_> {
             }
             let mesh = match part {
                 Some(part) => read.part(part).map_err(|error| match error {
-                    PartError::Unknown => unknown("part", part, read.parts()),
+                    PartError::Unknown => unknown("part", part, &read.parts().collect::<Vec<_>>()),
                     error @ PartError::SeveralKinds(_) => error.to_string(),
                 }),
                 None => Ok(read.mesh()),

@@ -329,6 +329,26 @@ fn pixels_narrower_than_directions_are_refused() {
 }
 
 #[test]
+fn scenes_in_which_light_from_infinity_has_no_density_are_refused() {
+    let scene = |radius: &str, light: &str| {
+        let text = format!(
+            "(version: 1, {CAMERA} materials: {{\"white\": Lambert(0.5)}}, lights: [{light}],
+              shapes: [(material: \"white\", geometry: Sphere(centre: (0, 0, 0), radius: {radius}))])"
+        );
+        ReadyScene::from_ron_str(&text, "").map(|_| ()).map_err(|error| error.to_string())
+    };
+    for light in ["Constant(1)", "Directional(direction: (0, -1, 0), irradiance: 1)"] {
+        for radius in ["1e-20", "1e20"] {
+            let error = scene(radius, light).unwrap_err();
+            let message = "too small or too large for light from infinity";
+            assert!(error.contains("scene: has a radius of 1.0") && error.contains(message), "{error}");
+        }
+        assert_eq!(scene("1e-15", light), Ok(()));
+    }
+    assert_eq!(scene("1e-20", "Point(position: (0, 2, 0), intensity: 1)"), Ok(()));
+}
+
+#[test]
 fn a_body_that_another_hides_is_refused() {
     let outer = ["Box(min: (-1, -1, -1), max: (1, 1, 1))", "Sphere(centre: (0, 0, 0), radius: 1)"];
     let cases = [

@@ -1,5 +1,8 @@
 //! Notes about what is said of a scene and changes nothing in it.
 
+use std::fmt::Write as _;
+use std::fs;
+
 use upbp_scene::ReadyScene;
 
 /// The notes about a scene with a lens and shapes like these.
@@ -57,4 +60,35 @@ fn bodies_too_thin_to_be_seen_are_noted() {
         found[0].contains("coordinates up to 1001") && found[0].ends_with("(and so is 1 other)"),
         "{found:?}"
     );
+}
+
+#[test]
+fn copies_of_a_mesh_too_thin_to_be_seen_where_they_are_are_noted() {
+    let folder = std::env::temp_dir().join(format!("upbp-thin-copies-{}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let corner = |i: u32| [i & 1, i >> 1 & 1, i >> 2].map(f64::from);
+    let mut pane = String::new();
+    (0..8).map(corner).for_each(|[x, y, z]| writeln!(pane, "v {x} {y} {}", 0.004 * z).unwrap());
+    pane += "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+    fs::write(folder.join("pane.obj"), pane).unwrap();
+    let pane = |place: &str| {
+        format!("(name: \"{place}\", material: \"glass\", geometry: Mesh(file: \"pane.obj\", {place})),")
+    };
+    let with = |panes: &[&str]| {
+        let panes: String = panes.iter().map(|place| pane(place)).collect();
+        let text = format!(
+            "(version: 1, camera: Perspective(origin: (0, 0, 9), target: (0, 0, 0), fov_degrees: 30),
+              materials: {{ \"glass\": Dielectric(1.5) }}, shapes: [{panes}], lights: [Constant(1)])"
+        );
+        let scene = ReadyScene::from_ron_str(&text, &folder).unwrap_or_else(|error| panic!("{error}"));
+        scene.notes().iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let [near, far] = ["translate: (3, 0, 0)", "translate: (1000, 0, 0)"];
+    assert!(with(&[near, "scale: 3, translate: (1000, 0, 0)"]).is_empty());
+    for panes in [[near, far], [far, near]] {
+        let found = with(&panes);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].starts_with(&format!("shape `{far}`: is 0.00")), "{found:?}");
+    }
+    fs::remove_dir_all(folder).unwrap();
 }
