@@ -1,6 +1,6 @@
 //! Sums of features: albedo, normal and depth of what the camera sees first.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use rayon::prelude::*;
 use upbp_estimators::Features;
@@ -55,14 +55,13 @@ impl FeatureSums {
         let rows = sums.zip(distance.par_chunks_mut(width)).zip(features.par_chunks(width)).enumerate();
         rows.for_each(|(y, (((albedo, normal), distance), features))| {
             for (x, features) in features.iter().enumerate().filter(|(x, _)| sets.contains(&set_of(*x, y))) {
-                let plain = |values: [f32; 3], low: f32| {
-                    let usable = values.iter().all(|value| (low..=1.0).contains(value));
+                let plain = |values: [f32; 3], range: RangeInclusive<f32>| {
+                    let usable = values.iter().all(|value| range.contains(value));
                     values.map(|value| if usable { f64::from(value) } else { 0.0 })
                 };
-                exact_sum::add(&mut albedo[x], plain(features.albedo.to_array(), 0.0));
-                let towards =
-                    plain(features.normal.to_array(), -1.001).map(|n| 0.5 * (n + 1.0).clamp(0.0, 2.0));
-                exact_sum::add(&mut normal[x], towards);
+                exact_sum::add(&mut albedo[x], plain(features.albedo.to_array(), 0.0..=1.0));
+                let normals = plain(features.normal.to_array(), -1.001..=1.001);
+                exact_sum::add(&mut normal[x], normals.map(|n| 0.5 * (n + 1.0).clamp(0.0, 2.0)));
                 if let Some(seen) =
                     features.distance.filter(|distance| distance.is_finite() && *distance >= 0.0)
                 {

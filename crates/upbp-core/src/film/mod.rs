@@ -464,14 +464,17 @@ impl Film {
             let more = even(range.end) - even(range.start);
             [evens + more, odds + range.end - range.start - more]
         });
-        let count = |set| {
-            let mut counts = whole;
-            for (iteration, _) in self.parts.iter().filter(|(_, done)| set < **done) {
-                counts[half(*iteration).0] += 1;
-            }
-            counts.map(|count| count as f64)
-        };
-        (0..SETS).map(count).collect()
+        // Those of which just the first sets are done, by the last of these.
+        let mut counts = vec![[0; 2]; SETS as usize];
+        for (iteration, done) in self.parts.iter().filter(|(_, done)| **done > 0) {
+            counts[(*done).min(SETS) as usize - 1][half(*iteration).0] += 1;
+        }
+        let mut all = whole;
+        for counts in counts.iter_mut().rev() {
+            all = [0, 1].map(|half| all[half] + counts[half]);
+            *counts = all;
+        }
+        counts.into_iter().map(|counts| counts.map(|count| count as f64)).collect()
     }
 
     /// Picture of what `value` says of a pixel by its index and the counts of its halves; black while there
