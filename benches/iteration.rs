@@ -15,7 +15,7 @@ use upbp_core::{MediumId, Settings, TechniqueSet};
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy, VertexKind};
 use upbp_estimators::mis::{
     BeamExtent, DistanceDensity, Edge, EdgeMis, EdgeStart, Heuristic, MergeKind, MisPlan, VertexMis,
-    VolumeMerges, Weight,
+    VolumeMerge, VolumeMerges, Weight,
 };
 use upbp_estimators::scene::Walk;
 use upbp_scene::ReadyScene;
@@ -93,14 +93,15 @@ fn plan() -> MisPlan {
         connect: 1.0,
         light_tracing: 1e4,
         surf: 1e4 * PI * 1e-4,
-        volume: vec![VolumeMerges {
-            pp3d: 1e4 * 4.0 / 3.0 * PI * 1e-6,
-            pb2d: 1e4 * 0.5 * PI * 1e-4,
-            bp2d: 0.0,
-            bb1d: 200.0 * 1e-2,
-        }],
-        width: Vec::new(),
-        greatest_scales: Vec::new(),
+        volume: vec![
+            VolumeMerges {
+                pp3d: 1e4 * 4.0 / 3.0 * PI * 1e-6,
+                pb2d: 1e4 * 0.5 * PI * 1e-4,
+                bp2d: 0.0,
+                bb1d: 200.0 * 1e-2,
+            }
+            .map(|count| VolumeMerge { count, ..VolumeMerge::NONE }),
+        ],
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
         lanes: [0.0; 3],

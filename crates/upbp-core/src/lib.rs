@@ -34,7 +34,7 @@ pub use render::{Progress, Renderer, Start, StopReason};
 pub use report::Report;
 pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTechniques};
 pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};
-pub use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
+pub use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerge, VolumeMerges};
 pub use upbp_estimators::{
     BodyId, Counters, EmissionGuide, EmissionSample, EmitterChoice, FootprintField, Interior,
     IterationChoices, IterationPlan, Kernel, Kernels, Layer, MediumId, MediumStack, MergePeriods,

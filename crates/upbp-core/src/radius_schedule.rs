@@ -1,7 +1,8 @@
 //! Kernel radii: where they start and how they shrink (`docs/theory.md`, section 5).
 
 use serde::{Deserialize, Serialize};
-use upbp_estimators::{Kernel, Kernels, NO_LIMIT, PerMerge, RadiusField, Technique, TechniqueSet};
+use upbp_estimators::mis::VolumeMerges;
+use upbp_estimators::{Kernel, Kernels, NO_LIMIT, RadiusField, Technique, TechniqueSet};
 
 /// The largest radius of a kernel, scene units: single precision holds the values of all kernels.
 pub(crate) const LARGEST_RADIUS: f32 = 1e12;
@@ -132,9 +133,9 @@ impl RadiusSchedule {
     }
 
     /// Most mean free paths of a radius in a medium in an iteration.
-    pub(crate) fn mean_free_paths(&self, iteration: u64) -> PerMerge<f32> {
+    pub(crate) fn mean_free_paths(&self, iteration: u64) -> VolumeMerges<f32> {
         let Some(most) = self.most_mean_free_paths else { return NO_LIMIT };
-        PerMerge::from_fn(|technique| {
+        VolumeMerges::from_fn(|technique| {
             let (first, _) = self.first(technique);
             if first > 0.0 { most * (self.at(technique, iteration as f64) / first) } else { f32::INFINITY }
         })

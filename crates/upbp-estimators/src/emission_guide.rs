@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 /// Random numbers of a start: two for the place, two for the direction.
 pub(crate) const AXES: usize = 4;
-/// Part of the starts that stays with the emitter's own distribution: no contribution has more than twice the
-/// weight that it has without a guide.
+/// Part of the starts that stays with the emitter's own distribution: but for the rounding of shares, no
+/// contribution has more than twice the weight that it has without a guide.
 const DEFENSIVE: f64 = 0.5;
 /// Samples that a cell needs to be split.
 const SPLIT_SAMPLES: usize = 16;
@@ -34,8 +34,13 @@ const SPREAD: f64 = 0.5;
 const SPREAD_PLACES: usize = 3;
 /// Steps of a sequence that fills the unit hypercube evenly (Roberts 2018): powers of one over the root of
 /// `x⁵ = x + 1`.
-const SPREAD_STEPS: [f64; AXES] =
+const EVEN_STEPS: [f64; AXES] =
     [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_809, 0.538_597_257_223_610];
+
+/// The random numbers of a start in a sequence of which each first part fills the unit hypercube evenly.
+pub(crate) fn even_numbers(index: usize) -> [f32; 4] {
+    EVEN_STEPS.map(|step| (0.5 + index as f64 * step).fract() as f32).map(|u| u.min(1.0 - f32::EPSILON / 2.0))
+}
 
 /// A start of a light sub-path with the light that it brought to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,7 +109,7 @@ impl EmissionGuide {
                     if !axes[axis] {
                         return sample.at[axis];
                     }
-                    let offset = 2.0 * (number * SPREAD_STEPS[axis]).fract() - 1.0;
+                    let offset = 2.0 * (number * EVEN_STEPS[axis]).fract() - 1.0;
                     mirrored(f64::from(sample.at[axis]) + offset * f64::from(widths[axis]))
                 });
                 EmissionSample { at, light }
@@ -150,8 +155,8 @@ impl EmissionGuide {
         // Down to the multiples that random numbers are: digits beyond them, which emitters add, stay in the
         // cell, whose ends are such multiples.
         let at = std::array::from_fn(|axis| {
-            let place = low[axis] + width[axis] * within[axis].min(1.0 - f64::EPSILON);
-            ((place * STEPS).floor() / STEPS) as f32
+            let place = ((low[axis] + width[axis] * within[axis]) * STEPS).floor();
+            (place.min((low[axis] + width[axis]) * STEPS - 1.0) / STEPS) as f32
         });
         (at, density as f32)
     }
@@ -178,22 +183,24 @@ impl EmissionGuide {
         density as f32
     }
 
-    /// Whether this is a tree: what is read from a file may be anything.
-    pub(crate) fn is_valid(&self) -> bool {
-        // The subtree at an index, whose end it returns. Deeper than any tree that is built is no tree.
-        fn end(nodes: &[Node], index: usize, depth: usize) -> Option<usize> {
-            let node = *nodes.get(index)?;
-            if node.is_leaf() {
+    /// Whether this is a tree that splits only the `axes` that matter: what is read from a file may be
+    /// anything.
+    pub(crate) fn is_valid(&self, axes: [bool; 4]) -> bool {
+        // The subtree at an index, whose end it returns, below some splits along each axis.
+        fn end(nodes: &[Node], index: usize, axes: [bool; AXES], mut splits: [u8; AXES]) -> Option<usize> {
+            let &Node(axis, upper, share) = nodes.get(index)?;
+            if nodes[index].is_leaf() {
                 return Some(index + 1);
             }
-            let is_node = (node.0 as usize) < AXES && (LEAST_SHARE..=SHARES - LEAST_SHARE).contains(&node.2);
-            if !is_node || depth > AXES * MOST_SPLITS as usize {
-                return None;
-            }
-            let middle = end(nodes, index + 1, depth + 1)?;
-            (middle == node.1 as usize).then(|| end(nodes, middle, depth + 1)).flatten()
+            let splits_of_axis = splits.get_mut(axis as usize)?;
+            let is_node = axes[axis as usize]
+                && *splits_of_axis < MOST_SPLITS
+                && (LEAST_SHARE..=SHARES - LEAST_SHARE).contains(&share);
+            *splits_of_axis += 1;
+            let middle = is_node.then(|| end(nodes, index + 1, axes, splits)).flatten()?;
+            (middle == upper as usize).then(|| end(nodes, middle, axes, splits)).flatten()
         }
-        end(&self.nodes, 0, 0) == Some(self.nodes.len())
+        end(&self.nodes, 0, axes, [0; AXES]) == Some(self.nodes.len())
     }
 }
 
@@ -363,8 +370,7 @@ mod tests {
             axes in prop::array::uniform4(any::<bool>()),
         ) {
             let Some(guide) = EmissionGuide::fit(&spot(seed, centre, width, axes), axes) else { return Ok(()) };
-            prop_assert!(guide.is_valid());
-            prop_assert!(guide.nodes.iter().all(|node| node.is_leaf() || axes[node.0 as usize]));
+            prop_assert!(guide.is_valid(axes));
             let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
             // The mean of 1 / density over guided numbers is the volume: one.
             let (mut volume, mut squares, n) = (0.0, 0.0, 20_000);
@@ -485,7 +491,7 @@ mod tests {
 
     #[test]
     fn what_is_no_tree_is_refused() {
-        let is_valid = |nodes: &[Node]| EmissionGuide { nodes: nodes.to_vec() }.is_valid();
+        let is_valid = |nodes: &[Node]| EmissionGuide { nodes: nodes.to_vec() }.is_valid([true; AXES]);
         assert!(is_valid(&[LEAF]));
         assert!(is_valid(&[Node(1, 2, 2000), LEAF, LEAF]));
         assert!(!is_valid(&[]));
@@ -494,6 +500,16 @@ mod tests {
         assert!(!is_valid(&[Node(4, 2, 2000), LEAF, LEAF]), "no axis");
         assert!(!is_valid(&[Node(0, 2, 0), LEAF, LEAF]), "an impossible half");
         assert!(!is_valid(&[LEAF, LEAF]), "more than a tree");
+        let first = EmissionGuide { nodes: vec![Node(0, 2, 2000), LEAF, LEAF] };
+        assert!(first.is_valid([true, false, false, false]) && !first.is_valid([false, true, true, true]));
+        // Each node splits the lower half of the one before it.
+        let splits = |axis: fn(u32) -> u8, nodes: u32| {
+            let node = |i| Node(axis(i), 2 * nodes - i, 2000);
+            (0..nodes).map(node).chain(vec![LEAF; nodes as usize + 1]).collect::<Vec<_>>()
+        };
+        let most = u32::from(MOST_SPLITS);
+        assert!(is_valid(&splits(|_| 0, most)) && is_valid(&splits(|i| (i % 4) as u8, 4 * most)));
+        assert!(!is_valid(&splits(|_| 0, most + 1)), "narrower than random numbers");
         let deep: Vec<_> = (0..1000).map(|i| Node(0, 2000 - i, 2000)).chain([LEAF; 1001]).collect();
         assert!(!is_valid(&deep));
     }

@@ -85,8 +85,7 @@ impl ReceiverShares {
 
     /// Whether this is a tree of shares of so many clusters.
     pub(crate) fn fits(&self, clusters: usize) -> bool {
-        let end = self.end(0, 0, clusters);
-        end.is_some_and(|end| end == self.nodes.len())
+        self.nodes.len() < 2 * MOST_REGIONS && self.end(0, 0, clusters) == Some(self.nodes.len())
     }
 
     /// The index behind a valid subtree.

@@ -6,7 +6,7 @@ use upbp_media::{Medium, MediumId};
 
 use crate::kernel::Kernel;
 use crate::merge_periods::{MergePeriods, rank};
-use crate::mis::{BeamExtent, Heuristic, MergeKind, MisPlan, VolumeMerges};
+use crate::mis::{BeamExtent, Heuristic, MergeKind, MisPlan, VolumeMerge, VolumeMerges};
 use crate::path::Interaction;
 use crate::prepared_scene::arrives_in_part;
 use crate::radius_field::RadiusField;
@@ -142,7 +142,7 @@ pub struct IterationChoices {
     pub radius_field: RadiusField,
     /// Most mean free paths that a radius may be in a medium: positive; infinite for no limit. A radius that
     /// coordinates in the medium have digits for is always allowed.
-    pub mean_free_paths: PerMerge<f32>,
+    pub mean_free_paths: VolumeMerges<f32>,
     /// Periods of photon queries.
     pub periods: MergePeriods,
     /// Heuristic of the weights.
@@ -177,9 +177,9 @@ impl MediumKernels {
 }
 
 /// Kernels in media of any number of mean free paths.
-pub const NO_LIMIT: PerMerge<f32> = {
+pub const NO_LIMIT: VolumeMerges<f32> = {
     let none = f32::INFINITY;
-    PerMerge { surf: none, pp3d: none, pb2d: none, bp2d: none, bb1d: none }
+    VolumeMerges { pp3d: none, pb2d: none, bp2d: none, bb1d: none }
 };
 
 /// Least radius of a kernel, relative to the largest coordinate of its place: sixteen roundings. Positions
@@ -215,35 +215,19 @@ impl IterationPlan {
             let paths = if technique.uses_beams() { beams } else { paths };
             on(technique, paths * kernel.effective_volume())
         };
-        let in_medium = |medium: &S::Medium| {
-            if !medium.scatters() {
-                return VolumeMerges::default();
-            }
-            let trusted = |technique, kernel: &Kernel| {
-                merge(technique, kernel) / (1.0 + width(kernel, medium.mean_free_path()))
-            };
-            VolumeMerges {
-                pp3d: trusted(Technique::Pp3d, &kernels.pp3d),
-                pb2d: trusted(Technique::Pb2d, &kernels.pb2d),
-                bp2d: trusted(Technique::Bp2d, &kernels.bp2d),
-                bb1d: trusted(Technique::Bb1d, &kernels.bb1d),
-            }
-        };
-        let widths = |medium: &S::Medium| {
-            let width = |kernel| width(kernel, medium.mean_free_path());
-            let Kernels { pp3d, pb2d, bp2d, bb1d, .. } = &kernels;
-            VolumeMerges { pp3d: width(pp3d), pb2d: width(pb2d), bp2d: width(bp2d), bb1d: width(bb1d) }
-        };
-        let greatest_scales = |(id, medium): (u32, &S::Medium)| {
+        let in_medium = |(id, medium): (u32, &S::Medium)| {
             // Twice the least one, so that no rounding of the two makes it too narrow.
             let resolved = 2.0 * LEAST_RADIUS * scene.medium_extent(MediumId(id));
-            PerMerge::from_fn(|technique| {
-                let most = choices.mean_free_paths.get(technique).unwrap_or(&f32::INFINITY);
-                let radius = kernels.get(technique).map_or(0.0, Kernel::radius);
-                let scale = (most * medium.mean_free_path()).max(resolved) / radius;
+            let mean_free_path = medium.mean_free_path();
+            VolumeMerges::from_fn(|technique| {
+                let kernel = kernels.get(technique).unwrap_or(&Kernel::NONE);
+                let width = width(kernel, mean_free_path);
+                let count = if medium.scatters() { merge(technique, kernel) / (1.0 + width) } else { 0.0 };
+                let most = *choices.mean_free_paths.get(technique).unwrap_or(&f32::INFINITY);
+                let scale = (most * mean_free_path).max(resolved) / kernel.radius();
                 // A host may not know the mean free path.
-                let is_limited = most.is_finite() && medium.mean_free_path() >= 0.0 && scale > 0.0;
-                if is_limited { scale } else { f32::INFINITY }
+                let is_limited = most.is_finite() && mean_free_path >= 0.0 && scale > 0.0;
+                VolumeMerge { count, width, greatest_scale: if is_limited { scale } else { f32::INFINITY } }
             })
         };
         // Expected samples of one connection: draws per vertex over stored vertices per light path.
@@ -264,9 +248,7 @@ impl IterationPlan {
             connect: camera_factor * connect,
             light_tracing: on(Technique::LightTracing, paths),
             surf: merge(Technique::Surf, &kernels.surf),
-            volume: scene.media().iter().map(in_medium).collect(),
-            width: scene.media().iter().map(widths).collect(),
-            greatest_scales: (0..).zip(scene.media()).map(greatest_scales).collect(),
+            volume: (0..).zip(scene.media()).map(in_medium).collect(),
             photon_beams,
             query_beams: choices.query_beams,
             lanes: choices.lanes.unwrap_or_default(),
@@ -344,7 +326,7 @@ impl IterationPlan {
     pub fn merges_by(&self, technique: Technique) -> bool {
         match technique {
             Technique::Surf => self.mis.surf > 0.0,
-            _ => self.mis.volume.iter().any(|merges| merges.of(technique) > 0.0),
+            _ => self.mis.volume.iter().any(|merges| merges.get(technique).is_some_and(VolumeMerge::is_on)),
         }
     }
 
@@ -352,7 +334,7 @@ impl IterationPlan {
     #[inline]
     #[must_use]
     pub(crate) fn merges_in(&self, medium: MediumId, technique: Technique) -> bool {
-        self.mis.merges_in(medium).of(technique) > 0.0
+        self.mis.merges_in(medium).get(technique).is_some_and(VolumeMerge::is_on)
     }
 
     /// The techniques of a pixel's camera sub-path: all but those whose photon queries other pixels make.
@@ -382,7 +364,11 @@ impl IterationPlan {
     pub(crate) fn kernels_in(&self, medium: MediumId, technique: Technique) -> MediumKernels {
         MediumKernels {
             kernel: *self.kernels.get(technique).unwrap_or(&Kernel::NONE),
-            greatest_scale: *self.mis.greatest_scales_in(medium).get(technique).unwrap_or(&f32::INFINITY),
+            greatest_scale: self
+                .mis
+                .merges_in(medium)
+                .get(technique)
+                .map_or(f32::INFINITY, |merge| merge.greatest_scale),
         }
     }
 

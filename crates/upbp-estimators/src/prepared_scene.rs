@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec2;
 use upbp_media::{BodyId, Lanes, Medium, MediumId, MediumStack, RaySegment, SegmentDensity};
 
-use crate::emission_guide::EmissionGuide;
+use crate::emission_guide::{EmissionGuide, even_numbers};
 use crate::emitter_choice::EmitterChoice;
 use crate::emitter_selection::{EmitterSample, EmitterShares, Selection};
 use crate::emitter_tree::EmitterTree;
@@ -247,10 +247,13 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         self.leave_out_volumes(|emitter| choice.emission.probability(emitter) == 0.0);
         let is_of_these =
             [&choice.emission, &choice.next_event].iter().all(|selection| selection.fits(&self.power));
-        let guides = &choice.guides;
-        let can_be_followed = guides.len() <= self.scene.emitters().len()
-            && guides.iter().flatten().all(EmissionGuide::is_valid)
-            && choice.focus.is_none_or(glam::Vec3::is_finite);
+        let can_follow = |(emitter, guide): (u32, &Option<EmissionGuide>)| {
+            let axes = || self.emission_axes(EmitterId(emitter)).unwrap_or_default();
+            guide.as_ref().is_none_or(|guide| guide.is_valid(axes()))
+        };
+        let can_be_followed = choice.guides.len() <= self.scene.emitters().len()
+            && (0..).zip(&choice.guides).all(can_follow)
+            && choice.emission_bounds(&self.bounds).radius.is_finite();
         let clusters = self.tree.as_ref().map(EmitterTree::clusters);
         let is_by_these = choice
             .receivers
@@ -304,10 +307,29 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     ) -> f32 {
         let Some(guide) = self.choice.guide(emitter) else { return 1.0 };
         // What cannot be started at all is only compared with itself: any factor will do.
-        self.emission_coordinates(emitter, point, direction, on_ray).map_or(1.0, |(at, _)| guide.density(at))
+        self.emission_coordinates(emitter, point, direction, on_ray).map_or(1.0, |at| guide.density(at))
     }
 
-    /// The random numbers of a start ([`Emitter::emission_coordinates`]), and which of them are known.
+    /// Which of the random numbers of a start the emitter tells, thus which a guide may split. `None` if it
+    /// tells none, or if none of a few starts bring light.
+    #[must_use]
+    pub fn emission_axes(&self, emitter: EmitterId) -> Option<[bool; 4]> {
+        /// Starts that are tried.
+        const STARTS: usize = 16;
+        let light = self.scene.emitters().get(emitter.0 as usize)?;
+        let bounds = &self.emission_bounds;
+        (0..STARTS).find_map(|index| {
+            let [a, b, c, d] = even_numbers(index);
+            let start = light.sample_emission(bounds, [a, b], [c, d])?;
+            let position = start.point.position;
+            let found = light.emission_coordinates(bounds, &start.point, start.direction, position)?;
+            let [position, direction] = [found.position.is_some(), found.direction.is_some()];
+            Some([position, position, direction, direction])
+        })
+    }
+
+    /// The random numbers of a start ([`Emitter::emission_coordinates`]); those that are not known are one
+    /// half.
     #[must_use]
     pub fn emission_coordinates(
         &self,
@@ -315,14 +337,13 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         point: &EmitterPoint,
         direction: glam::Vec3,
         on_ray: glam::Vec3,
-    ) -> Option<([f32; 4], [bool; 4])> {
+    ) -> Option<[f32; 4]> {
         let light = self.scene.emitters().get(emitter.0 as usize)?;
         let found = light.emission_coordinates(&self.emission_bounds, point, direction, on_ray)?;
         let [a, b] = found.position.unwrap_or([0.5; 2]);
         let [c, d] = found.direction.unwrap_or([0.5; 2]);
-        let [position, direction] = [found.position.is_some(), found.direction.is_some()];
         let at = [a, b, c, d].map(|x| x.clamp(0.0, 1.0 - f32::EPSILON / 2.0));
-        (!at.iter().any(|x| x.is_nan())).then_some((at, [position, position, direction, direction]))
+        (!at.iter().any(|x| x.is_nan())).then_some(at)
     }
 
     /// Chooses the emitter of a next event at `receiver`; returns its probability. `None` without light.

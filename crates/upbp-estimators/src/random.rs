@@ -27,7 +27,8 @@ const SQUARE: u32 = 1 << LEVELS;
 const LEVELS: u32 = 4;
 /// Draws that camera sub-paths with one index have in common in a run of the preparation: the place on the
 /// film, that on the lens, the first distance in a medium, and the next event there, an emitter and a point
-/// on it. In lanes the channel takes the place of that point; without a medium, it is what is drawn next.
+/// on it, or the one at the lens if a light can be seen through it. In lanes the channel takes the place of
+/// that point; without a medium, it is what is drawn next.
 const COMMON_DRAWS: u32 = 5;
 
 /// The purpose of a stream.

@@ -14,8 +14,8 @@ use upbp_estimators::path::{Context, EdgeTrace, Extent};
 use upbp_estimators::scene::{EmitterId, Scene};
 use upbp_estimators::{
     EmissionGuide, EmissionSample, EmitterChoice, EmitterSample, FootprintField, IterationChoices,
-    IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PerMerge, PreparedScene,
-    RadiusField, Roulette, Stream, StreamKind, Technique, TechniqueSet,
+    IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PreparedScene, RadiusField,
+    Roulette, Stream, StreamKind, Technique, TechniqueSet,
 };
 use upbp_media::{Medium as _, MediumId};
 use upbp_testing::closed_form::fog::Fog;
@@ -120,18 +120,16 @@ fn guides(scene: &ClosedForm) -> Vec<Option<EmissionGuide>> {
     let world = PreparedScene::new(scene).expect("the scene is in order");
     let guide = |light: u32| {
         let mut stream = Stream::new(3, 0, StreamKind::Light, u64::from(light));
-        let mut axes = [false; 4];
         let samples: Vec<_> = (0..4096)
             .filter_map(|_| {
                 let start = world.sample_emission(EmitterId(light), [stream.pair(), stream.pair()])?;
                 let (point, direction) = (start.point, start.direction);
                 let at = world.emission_coordinates(EmitterId(light), &point, direction, point.position)?;
-                axes = at.1;
-                let light = at.0.iter().map(|u| (1.0 + (4.0 * u).sin()).powi(4)).product::<f32>();
-                Some(EmissionSample { at: at.0, light: f64::from(light) })
+                let light = at.iter().map(|u| (1.0 + (4.0 * u).sin()).powi(4)).product::<f32>();
+                Some(EmissionSample { at, light: f64::from(light) })
             })
             .collect();
-        EmissionGuide::fit(&samples, axes)
+        EmissionGuide::fit(&samples, world.emission_axes(EmitterId(light))?)
     };
     (0..scene.lights.len() as u32).map(guide).collect()
 }
@@ -162,7 +160,7 @@ fn radii_that_are_a_function_of_place() {
             let choices = IterationChoices { radius_field, query_beams, heuristic, ..choices() };
             audit("radii by place", camera, 64, &choices, 500);
             // Below and above the radii.
-            let mean_free_paths = PerMerge { surf: 0.1, pp3d: 0.05, pb2d: 0.03, bp2d: 0.5, bb1d: 0.01 };
+            let mean_free_paths = VolumeMerges { pp3d: 0.05, pb2d: 0.03, bp2d: 0.5, bb1d: 0.01 };
             audit("radii by medium", camera, 64, &IterationChoices { mean_free_paths, ..choices }, 500);
         }
     }
@@ -320,10 +318,10 @@ fn parts_of_techniques_are_what_counting_one_twice_shows() {
                 Technique::Connect => *connect *= 2.0,
                 Technique::LightTracing => *light_tracing *= 2.0,
                 Technique::Surf => *surf *= 2.0,
-                Technique::Pp3d => volume.iter_mut().for_each(|v| v.pp3d *= 2.0),
-                Technique::Pb2d => volume.iter_mut().for_each(|v| v.pb2d *= 2.0),
-                Technique::Bp2d => volume.iter_mut().for_each(|v| v.bp2d *= 2.0),
-                Technique::Bb1d => volume.iter_mut().for_each(|v| v.bb1d *= 2.0),
+                Technique::Pp3d => volume.iter_mut().for_each(|v| v.pp3d.count *= 2.0),
+                Technique::Pb2d => volume.iter_mut().for_each(|v| v.pb2d.count *= 2.0),
+                Technique::Bp2d => volume.iter_mut().for_each(|v| v.bp2d.count *= 2.0),
+                Technique::Bb1d => volume.iter_mut().for_each(|v| v.bb1d.count *= 2.0),
             }
             let found = weights::<f64>(&twice);
             assert_eq!(found.len(), parts.len());
@@ -356,7 +354,7 @@ fn weights_count_the_samples_that_are_asked_for() {
     let scene = ClosedForm::new(CAMERAS[0], 1);
     let counts = |choices: &IterationChoices| {
         let mis = IterationPlan::new(&scene, choices).mis;
-        let VolumeMerges { pp3d, pb2d, bp2d, bb1d } = mis.volume[0];
+        let VolumeMerges { pp3d, pb2d, bp2d, bb1d } = mis.volume[0].map(|merge| merge.count);
         [mis.hit, mis.nee, mis.connect, mis.light_tracing, mis.surf, pp3d, pb2d, bp2d, bb1d]
     };
     let usual = counts(&choices());
@@ -420,18 +418,18 @@ fn pilot_runs_have_fewer_paths_and_wider_kernels() {
 #[test]
 fn radii_in_a_medium_are_at_most_so_many_mean_free_paths() {
     let scene = ClosedForm::new(CAMERAS[0], 1);
-    let radii = |mean_free_paths: PerMerge<f32>| {
+    let radii = |mean_free_paths: VolumeMerges<f32>| {
         let plan = IterationPlan::new(&scene, &IterationChoices { mean_free_paths, ..choices() });
         let of = move |(id, medium): (u32, &Fog)| {
-            let scales = *plan.mis.greatest_scales_in(MediumId(id));
-            let radius = |technique| plan.kernels.get(technique).expect("it merges").radius();
-            PerMerge::from_fn(|technique| {
-                scales.get(technique).unwrap() * radius(technique) / medium.mean_free_path()
+            let merges = plan.mis.merges_in(MediumId(id));
+            VolumeMerges::from_fn(|technique| {
+                let radius = plan.kernels.get(technique).expect("it merges").radius();
+                merges.get(technique).unwrap().greatest_scale * radius / medium.mean_free_path()
             })
         };
         (0..).zip(scene.media()).map(of).collect::<Vec<_>>()
     };
-    let most = PerMerge { surf: 0.1, pp3d: 0.05, pb2d: 0.03, bp2d: 0.5, bb1d: 0.01 };
+    let most = VolumeMerges { pp3d: 0.05, pb2d: 0.03, bp2d: 0.5, bb1d: 0.01 };
     for found in radii(most) {
         for technique in [Technique::Pp3d, Technique::Pb2d, Technique::Bp2d, Technique::Bb1d] {
             let (found, most) = (found.get(technique).unwrap(), most.get(technique).unwrap());

@@ -1,12 +1,14 @@
 //! Small things in large places: light sub-paths are guided to them.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use upbp_core::{Settings, Start, Stop, TechniqueSet, Techniques};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::scene::{Emitter, EmitterId, Scene};
 use upbp_estimators::{
-    IterationChoices, IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PreparedScene,
-    RadiusField, Roulette,
+    EmissionGuide, EmissionSample, EmitterChoice, IterationChoices, IterationPlan, Kernel, Kernels,
+    MergePeriods, NO_LIMIT, PathLengths, PreparedScene, RadiusField, Roulette,
 };
 use upbp_scene::ReadyScene;
 use upbp_testing::{Estimate, assert_same, channels, renderer};
@@ -231,4 +233,43 @@ fn kernels_of_fewer_light_sub_paths_hold_as_many_photons() {
     // Not for ever wider.
     let widest = whole.blurred(10, 10).kernels;
     assert!((widest.surf.radius() / whole.kernels.surf.radius() - 10.0).abs() < 1e-5);
+}
+
+/// Own starts and those that other techniques ask for have one density only where an emitter tells the
+/// numbers of its starts: a plan that was made for another one is refused.
+#[test]
+fn guides_of_another_kind_of_emitter_are_refused() {
+    let scene = |light: &str| {
+        let text = format!(
+            r#"(version: 1, camera: Perspective(origin: (0, 1, 4), target: (0, 1, 0), fov_degrees: 40),
+              materials: {{ "white": Lambert(0.5) }},
+              shapes: [(material: "white", geometry: Box(min: (-1, 0, -1), max: (1, 1, 1))){light})"#
+        );
+        ReadyScene::from_ron_str(&text, "").expect("a valid scene")
+    };
+    let lamp =
+        |geometry: &str| scene(&format!(", (material: \"white\", emission: 1, geometry: {geometry})]"));
+    let quad = lamp("Quad(origin: (-1, 2, -1), edge_u: (2, 0, 0), edge_v: (0, 0, 2))");
+    let block = lamp("Box(min: (-1, 2, -1), max: (1, 3, 1))");
+    let point = scene("], lights: [Point(position: (0, 2, 0), intensity: 1)]");
+    let sky = scene("], lights: [Constant(1)]");
+    let scenes = [&quad, &block, &point, &sky];
+    let choice = |scene, axis: usize, focus: Vec3| {
+        let mut prepared = PreparedScene::new(scene).expect("a valid scene");
+        let place =
+            |i: u32| std::array::from_fn(|a| if a == axis { 0.1 } else { (i as f32 * 0.618).fract() });
+        let samples: Vec<_> = (0..1000).map(|i| EmissionSample { at: place(i), light: 1.0 }).collect();
+        let axes = std::array::from_fn(|a| a == axis);
+        prepared.guide_emission(vec![EmissionGuide::fit(&samples, axes)]);
+        prepared.focus_emission(focus);
+        prepared.emitter_choice().clone()
+    };
+    let accepts = |scene, choice: &Arc<EmitterChoice>| {
+        PreparedScene::new(scene).expect("a valid scene").set_emitter_choice(choice).is_ok()
+    };
+    let [place, direction] = [0, 3].map(|axis| choice(&quad, axis, Vec3::ZERO));
+    assert_eq!(scenes.map(|scene| accepts(scene, &place)), [true, false, false, true]);
+    assert_eq!(scenes.map(|scene| accepts(scene, &direction)), [true, true, true, true]);
+    // Light from infinity cannot start on a disc without an end.
+    assert!(accepts(&sky, &choice(&sky, 0, Vec3::X)) && !accepts(&sky, &choice(&sky, 0, 1e20 * Vec3::X)));
 }

@@ -9,18 +9,18 @@
 //! rounds learn where on the emitters light sub-paths should start ([`guides`]).
 
 use glam::Vec3;
-use upbp_estimators::mis::{ByTechnique, Densities, MisPlan};
+use upbp_estimators::mis::{ByTechnique, Densities, MisPlan, VolumeMerge, VolumeMerges};
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, LightChunk, LightVertex};
-use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
+use upbp_estimators::scene::{Camera, EmitterId, Scene};
 use upbp_estimators::{
     Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet,
     effective_samples,
 };
 use upbp_media::Lanes;
 
-use super::full_plan::{full_plan, iteration_plan, plan_with};
-use super::guides::{self, Evidence, Starts};
+use super::full_plan::{full_plan, pilot_plan, plan_with};
+use super::guides::{self, Evidence};
 use super::memory_limit::Room;
 use super::parallel_walks::{PilotRun, SampleRoom, camera_path, in_pieces, light_path, pixel};
 use super::statistics::{self, PATHS_PER_BEAM_PATH};
@@ -99,8 +99,10 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     // Light is weighted as with so many light sub-paths, for a plan may have far fewer than the full one.
     let few = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / PATHS_PER_BEAM_PATH]);
     let full = full_plan(scene, settings, techniques, &statistics, room, budget);
-    let [few, full] = [few, full].map(|plan| iteration_plan(scene, settings, &plan, 0));
-    let mis = MisPlan { greatest_scales: full.mis.greatest_scales.clone(), ..few.mis };
+    let [few, full] = [few, full].map(|plan| pilot_plan(scene, settings, &plan));
+    // Kernels are those of the full one, and so are the most that they may be in a medium.
+    let volume = few.mis.volume.iter().zip(&full.mis.volume).map(|(few, full)| with_scales_of(few, full));
+    let mis = MisPlan { volume: volume.collect(), ..few.mis };
     let plan = IterationPlan { mis, ..full };
     let most = (plan.light_paths / paths[0].max(1)).max(1);
     let mut first = Vec::new();
@@ -122,7 +124,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
                     scene.focus_emission(focus);
                 }
                 first = guides::first(scene, &plan, &seen.guides);
-                first.iter().map(Starts::fit).collect()
+                guides::to_all(scene, &first)
             } else {
                 guides::next(scene, &seen.guides, &first)
             };
@@ -134,6 +136,21 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         }
     }
     Ok(())
+}
+
+/// Merges in a medium as those of `few`, with the greatest scales of `full`.
+fn with_scales_of(
+    few: &VolumeMerges<VolumeMerge>,
+    full: &VolumeMerges<VolumeMerge>,
+) -> VolumeMerges<VolumeMerge> {
+    let merge =
+        |few: VolumeMerge, full: VolumeMerge| VolumeMerge { greatest_scale: full.greatest_scale, ..few };
+    VolumeMerges {
+        pp3d: merge(few.pp3d, full.pp3d),
+        pb2d: merge(few.pb2d, full.pb2d),
+        bp2d: merge(few.bp2d, full.bp2d),
+        bb1d: merge(few.bb1d, full.bb1d),
+    }
 }
 
 /// Light that small runs of light and camera sub-paths have seen, by emitter.
@@ -239,10 +256,8 @@ fn measure<S: Scene, L: Lanes>(
         _ => 1.0,
     };
     let context = Context { prepared: scene, plan };
-    // The whole film: a crop shows the same camera samples.
-    let (width, height) = scene.scene.camera().resolution();
-    let film = PixelRect { x: 0, y: 0, width, height };
-    let pixels = u64::from(width) * u64::from(height);
+    let crop = scene.scene.camera().crop();
+    let pixels = u64::from(crop.width) * u64::from(crop.height);
     let emitters = scene.scene.emitters().len();
     let emission_probability = |emitter| f64::from(scene.emission_probability(emitter));
     let mut emission = Vec::new();
@@ -261,7 +276,7 @@ fn measure<S: Scene, L: Lanes>(
         let (index, counters) = (u64::from(index), &mut Counters::default());
         let before = (seen.light, seen.emission.len(), seen.next_event.len(), seen.contributions);
         seen.most = before.3 + room.most();
-        camera_path(&context, &map, pixel(film, index), index, scratch, counters, seen);
+        camera_path(&context, &map, pixel(crop, index), index, scratch, counters, seen);
         let pixel = seen.light - before.0;
         let emission = seen.emission[before.1..].iter_mut().map(|(_, contribution)| contribution);
         let next_events = seen.next_event[before.2..].iter_mut().map(|(.., contribution)| contribution);
@@ -269,7 +284,7 @@ fn measure<S: Scene, L: Lanes>(
         // A run of single sub-paths has no smaller one.
         room.take(seen.contributions - before.3) || light_paths.max(camera_paths) == 1
     })?;
-    // Light tracing fills the whole picture, camera sub-paths a part of it.
+    // Light tracing fills all of the crop, camera sub-paths a part of it.
     let scale = pixels as f64 / f64::from(camera_paths);
     let mean = walks.iter().map(|seen| seen.light).sum::<f64>() / f64::from(camera_paths)
         + seen.light / pixels as f64;

@@ -1,5 +1,6 @@
 //! The full plan: all techniques, a light sub-path per pixel if memory and time allow, and first radii.
 
+use upbp_estimators::mis::Heuristic;
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{
     IterationChoices, IterationPlan, LEAST_RADIUS, MergePeriods, PathLengths, PreparedScene, Technique,
@@ -202,6 +203,17 @@ fn first_radii<S: Scene>(
         progressive: settings.progressive,
         floor,
     }
+}
+
+/// The first iteration of a plan, for runs that tell the densities of techniques from their parts in weights:
+/// with the heuristic whose weights do, whichever the render has.
+pub(super) fn pilot_plan<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    settings: &Settings,
+    plan: &Plan,
+) -> IterationPlan {
+    let settings = Settings { heuristic: Heuristic::Balance, ..settings.clone() };
+    iteration_plan(scene, &settings, plan, 0)
 }
 
 /// The plan of one iteration.

@@ -43,41 +43,41 @@ pub(super) struct Evidence {
     pub(super) specular: Vec<Vec3>,
 }
 
-/// Random numbers of starts at one emitter, and the axes that matter.
+/// Starts at one emitter.
 #[derive(Clone, Default)]
-pub(super) struct Starts {
-    axes: [bool; 4],
-    samples: Vec<EmissionSample>,
-}
+pub(super) struct Starts(Vec<EmissionSample>);
 
 impl Starts {
-    /// The guide to these starts.
-    pub(super) fn fit(&self) -> Option<EmissionGuide> {
-        EmissionGuide::fit(&self.samples, self.axes)
+    fn push(&mut self, at: [f32; 4], light: f64) {
+        self.0.push(EmissionSample { at, light });
+    }
+
+    /// The guide to these starts, which splits only the `axes` that matter.
+    fn fit(&self, axes: [bool; 4]) -> Option<EmissionGuide> {
+        EmissionGuide::fit(&self.0, axes)
     }
 
     fn light(&self) -> f64 {
-        self.samples.iter().map(|sample| sample.light).sum()
+        self.0.iter().map(|sample| sample.light).sum()
     }
 
     /// Two halves, of every other start.
     fn halves(&self) -> [Self; 2] {
-        let every_other = |first| self.samples.iter().copied().skip(first).step_by(2).collect();
-        [0, 1].map(|first| Self { axes: self.axes, samples: every_other(first) })
+        [0, 1].map(|first| Self(self.0.iter().copied().skip(first).step_by(2).collect()))
     }
 
     /// The factor by which a guide multiplies the starts that lead to this light, a geometric mean over the
     /// light; 1 without light.
     fn gain(&self, guide: &EmissionGuide) -> f64 {
         let logarithms: f64 =
-            self.samples.iter().map(|sample| sample.light * f64::from(guide.density(sample.at)).ln()).sum();
+            self.0.iter().map(|sample| sample.light * f64::from(guide.density(sample.at)).ln()).sum();
         (logarithms / self.light().max(f64::MIN_POSITIVE)).exp()
     }
 
     /// Lets no start count for more than a part of the light of all.
     fn clip(&mut self, part: f64) {
         let most = part * self.light();
-        self.samples.iter_mut().for_each(|sample| sample.light = sample.light.min(most));
+        self.0.iter_mut().for_each(|sample| sample.light = sample.light.min(most));
     }
 
     /// Adds other starts, if there are any, as a part of all light.
@@ -88,21 +88,15 @@ impl Starts {
         }
         let scale = part / (1.0 - part) * self.light() / others;
         let scaled = |sample: &EmissionSample| EmissionSample { light: scale * sample.light, ..*sample };
-        self.samples.extend(other.samples.iter().map(scaled));
+        self.0.extend(other.0.iter().map(scaled));
     }
 }
 
 /// Whether techniques start light sub-paths, at an emitter that tells its random numbers.
 pub(super) fn can_guide<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> bool {
-    let tells = |(index, emitter): (usize, &S::Emitter)| {
-        let [u_position, u_direction] = [[0.3, 0.6]; 2];
-        let start = emitter.sample_emission(scene.emission_bounds(), u_position, u_direction);
-        start.is_some_and(|start| {
-            let (id, position) = (EmitterId(index as u32), start.point.position);
-            scene.emission_coordinates(id, &start.point, start.direction, position).is_some()
-        })
-    };
-    !techniques.without(TechniqueSet::PT).is_empty() && scene.scene.emitters().iter().enumerate().any(tells)
+    let mut emitters = (0..scene.scene.emitters().len() as u32).map(EmitterId);
+    !techniques.without(TechniqueSet::PT).is_empty()
+        && emitters.any(|emitter| scene.emission_axes(emitter).is_some())
 }
 
 /// Point that guided starts should pass: amid the specular surfaces that camera sub-paths have met. `None`
@@ -133,9 +127,8 @@ pub(super) fn first<S: Scene>(
     }
     let mut add = |end: &LightEnd, on_ray: Vec3, light: f64| {
         let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, on_ray);
-        if let (Some((at, axes)), Some(starts)) = (at, starts.get_mut(end.emitter.0 as usize)) {
-            starts.axes = axes;
-            starts.samples.push(EmissionSample { at, light });
+        if let (Some(at), Some(starts)) = (at, starts.get_mut(end.emitter.0 as usize)) {
+            starts.push(at, light);
         }
     };
     for (end, receiver) in &seen.lit {
@@ -155,6 +148,15 @@ pub(super) fn first<S: Scene>(
     starts
 }
 
+/// Guides to all of these starts.
+pub(super) fn to_all<S: Scene>(
+    scene: &PreparedScene<'_, S>,
+    starts: &[Starts],
+) -> Vec<Option<EmissionGuide>> {
+    let guide = |(emitter, starts): (u32, &Starts)| starts.fit(scene.emission_axes(EmitterId(emitter))?);
+    (0..).zip(starts).map(guide).collect()
+}
+
 /// Guides to the starts that brought light to the picture, at emitters where they are worth it: where a guide
 /// that was made of one half of these starts leads to the other half. Logarithms are compared, for second
 /// moments of so few starts are those of the brightest. Where hardly any have brought light, the scene keeps
@@ -167,24 +169,25 @@ pub(super) fn next<S: Scene>(
     let mut starts = vec![Starts::default(); scene.scene.emitters().len()];
     for (end, light) in &seen.starts {
         let at = scene.emission_coordinates(end.emitter, &end.point, end.direction, end.point.position);
-        let Some((at, axes)) = at else { continue };
-        let starts = &mut starts[end.emitter.0 as usize];
-        starts.axes = axes;
-        starts.samples.push(EmissionSample { at, light: *light });
+        if let Some(at) = at {
+            starts[end.emitter.0 as usize].push(at, *light);
+        }
     }
-    let guide = |(emitter, (starts, first)): (usize, (Starts, &Starts))| {
-        if starts.samples.iter().filter(|start| start.light > 0.0).count() < FEW {
-            let guide = scene.emitter_choice().guide(EmitterId(emitter as u32));
+    let guide = |(emitter, (starts, first)): (u32, (Starts, &Starts))| {
+        let emitter = EmitterId(emitter);
+        if starts.0.iter().filter(|start| start.light > 0.0).count() < FEW {
+            let guide = scene.emitter_choice().guide(emitter);
             return guide.filter(|guide| starts.light() == 0.0 || starts.gain(guide) > WORTH).cloned();
         }
+        let axes = scene.emission_axes(emitter)?;
         let with_first = |mut starts: Starts| {
             starts.clip(BRIGHTEST);
             starts.add(first, FIRST);
-            starts.fit()
+            starts.fit(axes)
         };
         let [some, others] = starts.halves();
         let is_worth = with_first(some).is_some_and(|guide| others.gain(&guide) > WORTH);
         if is_worth { with_first(starts) } else { None }
     };
-    starts.into_iter().zip(first).enumerate().map(guide).collect()
+    (0..).zip(starts.into_iter().zip(first)).map(guide).collect()
 }

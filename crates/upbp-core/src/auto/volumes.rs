@@ -12,7 +12,7 @@ use upbp_estimators::path::Context;
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet};
 
-use super::full_plan::{iteration_plan, plan_with};
+use super::full_plan::{pilot_plan, plan_with};
 use super::parallel_walks::{PilotRun, camera_path, in_pieces, pixel};
 use super::statistics::Statistics;
 use crate::deadline::{Budget, Halt};
@@ -59,15 +59,14 @@ pub(crate) fn choose<S: Scene>(
         return Ok(());
     }
     let plan = plan_with(scene, settings, TechniqueSet::PT, &Statistics::default(), [0; 2]);
-    let plan = iteration_plan(scene, settings, &plan, 0);
+    let plan = pilot_plan(scene, settings, &plan);
     let run = |part: f64, halt: &Halt<'_>| {
         let paths = (part * f64::from(PATHS)).ceil() as u32;
         let passes = (0..PASSES).map(|pass| look(scene, &plan, pass, paths, halt));
         Some(Looks { paths, passes: passes.collect::<Option<_>>()? })
     };
     let looks = budget.part(PART).largest(run).ok_or(RenderError::Cancelled)?;
-    let (width, height) = scene.scene.camera().resolution();
-    let reductions = looks.relative_to(PixelRect { x: 0, y: 0, width, height });
+    let reductions = looks.relative_to(scene.scene.camera().crop());
     let least =
         if scene.scene.has_specular_surfaces() { SELDOM * f64::from(PASSES * looks.paths) } else { FEW };
     scene.leave_out_volumes(|emitter| looks.are_hits_enough(emitter, &reductions, least));
@@ -84,13 +83,12 @@ fn look<S: Scene>(
 ) -> Option<Vec<Seen>> {
     let plan = &IterationPlan { iteration: PilotRun::Volumes { pass }.iteration(), ..plan.clone() };
     let context = Context { prepared: scene, plan };
-    let (width, height) = scene.scene.camera().resolution();
-    let film = PixelRect { x: 0, y: 0, width, height };
+    let crop = scene.scene.camera().crop();
     let map = LightMap::<_, _, f64>::empty();
     let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut Vec<Seen>| {
         let mut seen = Seen::default();
         let (index, counters) = (u64::from(index), &mut Counters::default());
-        camera_path(&context, &map, pixel(film, index), index, scratch, counters, &mut seen);
+        camera_path(&context, &map, pixel(crop, index), index, scratch, counters, &mut seen);
         piece.push(seen);
         true
     })?;

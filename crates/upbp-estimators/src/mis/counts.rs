@@ -4,9 +4,8 @@ use serde::{Deserialize, Serialize};
 use upbp_media::{Lanes, MediumId};
 
 use super::density_sum::Densities;
-use crate::iteration::NO_LIMIT;
 use crate::scene::Walk;
-use crate::technique::{PerMerge, Technique};
+use crate::technique::Technique;
 
 /// Below this `sin²θ` two beams count as parallel: BB1D neither contributes nor counts in weights.
 pub const PARALLEL_SIN2: f64 = upbp_accel::PARALLEL_SIN2 as f64;
@@ -30,18 +29,50 @@ pub enum BeamExtent {
     Long,
 }
 
-/// A value for each kind of merge in one medium, such as samples times kernel volume; zero for what is off
-/// there.
+/// One value for each technique that merges in media.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct VolumeMerges {
-    /// Photon points around points; their count is `n V_3`.
-    pub pp3d: f64,
-    /// Photon points around query beams; `n V_2`.
-    pub pb2d: f64,
-    /// Photon beams around points; `n V_2`.
-    pub bp2d: f64,
-    /// Photon beams around query beams; `n V_1`.
-    pub bb1d: f64,
+pub struct VolumeMerges<T = f64> {
+    /// Photon points around points.
+    pub pp3d: T,
+    /// Photon points around query beams.
+    pub pb2d: T,
+    /// Photon beams around points.
+    pub bp2d: T,
+    /// Photon beams around query beams.
+    pub bb1d: T,
+}
+
+/// How a technique merges in one medium, where the scale of radii is one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VolumeMerge {
+    /// Samples times the volume of the kernel: `n V_d`, d its dimension; 0 if the technique is off there.
+    pub count: f64,
+    /// `(r/ℓ)⁴` (section 6.5): its radius in mean free paths.
+    pub width: f64,
+    /// The greatest scale of its radius, which holds where that of a vertex is greater.
+    pub greatest_scale: f32,
+}
+
+impl VolumeMerge {
+    /// No merges.
+    pub const NONE: Self = Self { count: 0.0, width: 0.0, greatest_scale: f32::INFINITY };
+
+    /// Whether the technique merges.
+    #[inline]
+    #[must_use]
+    pub fn is_on(&self) -> bool {
+        self.count > 0.0
+    }
+
+    /// The count where radii have some scale (section 5.4).
+    #[inline]
+    fn at(&self, scale: f64, dimension: i32) -> f64 {
+        let scale = scale.min(f64::from(self.greatest_scale));
+        if self.count == 0.0 || scale == 1.0 {
+            return self.count;
+        }
+        self.count * scale.powi(dimension) * ((1.0 + self.width) / (1.0 + self.width * scale.powi(4)))
+    }
 }
 
 /// The density of a walk's distance at a vertex, as one of its techniques sees it (section 1.3).
@@ -119,14 +150,8 @@ pub struct MisPlan {
     pub light_tracing: f64,
     /// `n V_2` of surface merging, where the scale of radii is one.
     pub surf: f64,
-    /// Counts of merges in each medium, by [`MediumId`], where the scale of radii is one.
-    pub volume: Vec<VolumeMerges>,
-    /// `(r/ℓ)⁴` of the merges in each medium (section 6.5), where the scale of radii is one; zero for media
-    /// that are left out.
-    pub width: Vec<VolumeMerges>,
-    /// The greatest scales of radii in each medium, which hold where that of a vertex is greater; none for
-    /// media that are left out.
-    pub greatest_scales: Vec<PerMerge<f32>>,
+    /// Merges in each medium, by [`MediumId`]; none in media that are left out.
+    pub volume: Vec<VolumeMerges<VolumeMerge>>,
     /// Extent of photon beams.
     pub photon_beams: BeamExtent,
     /// Extent of query beams.
@@ -148,11 +173,15 @@ impl MisPlan {
         }
     }
 
-    /// The merges in a medium, where the scale of radii is one; none in one that the plan does not know.
+    /// The merges in a medium; none in one that the plan does not know.
     #[inline]
     #[must_use]
-    pub fn merges_in(&self, medium: MediumId) -> VolumeMerges {
-        self.volume.get(medium.0 as usize).copied().unwrap_or_default()
+    pub fn merges_in(&self, medium: MediumId) -> &VolumeMerges<VolumeMerge> {
+        const NONE: VolumeMerges<VolumeMerge> = {
+            let none = VolumeMerge::NONE;
+            VolumeMerges { pp3d: none, pb2d: none, bp2d: none, bb1d: none }
+        };
+        self.volume.get(medium.0 as usize).unwrap_or(&NONE)
     }
 
     /// The count of connections, as the heuristic takes it.
@@ -217,34 +246,6 @@ impl MisPlan {
         self.pow(self.surf * scale * scale)
     }
 
-    /// The greatest scales of radii in a medium.
-    #[inline]
-    #[must_use]
-    pub fn greatest_scales_in(&self, medium: MediumId) -> &PerMerge<f32> {
-        self.greatest_scales.get(medium.0 as usize).unwrap_or(&NO_LIMIT)
-    }
-
-    /// The merges in a medium at a vertex with some scale of radii (section 5.4).
-    #[inline]
-    fn merges_at(&self, medium: MediumId, scale: f64) -> VolumeMerges {
-        let merges = self.merges_in(medium);
-        let width = self.width.get(medium.0 as usize).copied().unwrap_or_default();
-        let greatest = self.greatest_scales_in(medium);
-        let at = |merges: f64, dimension: i32, width: f64, greatest: f32| {
-            let scale = scale.min(f64::from(greatest));
-            if merges == 0.0 || scale == 1.0 {
-                return merges;
-            }
-            merges * scale.powi(dimension) * ((1.0 + width) / (1.0 + width * scale.powi(4)))
-        };
-        VolumeMerges {
-            pp3d: at(merges.pp3d, 3, width.pp3d, greatest.pp3d),
-            pb2d: at(merges.pb2d, 2, width.pb2d, greatest.pb2d),
-            bp2d: at(merges.bp2d, 2, width.bp2d, greatest.bp2d),
-            bb1d: at(merges.bb1d, 1, width.bb1d, greatest.bb1d),
-        }
-    }
-
     /// `f_v` of the four merges in a medium, as the heuristic takes them (section 2.1), times the densities
     /// of the two sub-paths' distances, at a vertex with some scale of radii.
     #[inline]
@@ -257,13 +258,13 @@ impl MisPlan {
         sin_theta: f64,
         scale: f64,
     ) -> VolumeMerges {
-        let v = self.merges_at(medium, scale);
+        let v = self.merges_in(medium);
         let sin_theta = if sin_theta * sin_theta < PARALLEL_SIN2 { 0.0 } else { sin_theta };
         VolumeMerges {
-            pp3d: self.pow(v.pp3d * light.point * camera.point),
-            pb2d: self.pow(v.pb2d * light.point * camera.beam),
-            bp2d: self.pow(v.bp2d * light.beam * camera.point),
-            bb1d: self.pow(v.bb1d * light.beam * camera.beam * sin_theta),
+            pp3d: self.pow(v.pp3d.at(scale, 3) * light.point * camera.point),
+            pb2d: self.pow(v.pb2d.at(scale, 2) * light.point * camera.beam),
+            bp2d: self.pow(v.bp2d.at(scale, 2) * light.beam * camera.point),
+            bb1d: self.pow(v.bb1d.at(scale, 1) * light.beam * camera.beam * sin_theta),
         }
     }
 
@@ -289,20 +290,44 @@ impl MisPlan {
     }
 }
 
-impl VolumeMerges {
-    /// The value of one technique; 0 if it merges nothing in media.
-    #[inline]
+impl<T> VolumeMerges<T> {
+    /// The values of a function of the technique.
     #[must_use]
-    pub const fn of(&self, technique: Technique) -> f64 {
-        match technique {
-            Technique::Pp3d => self.pp3d,
-            Technique::Pb2d => self.pb2d,
-            Technique::Bp2d => self.bp2d,
-            Technique::Bb1d => self.bb1d,
-            _ => 0.0,
+    pub fn from_fn(mut value: impl FnMut(Technique) -> T) -> Self {
+        Self {
+            pp3d: value(Technique::Pp3d),
+            pb2d: value(Technique::Pb2d),
+            bp2d: value(Technique::Bp2d),
+            bb1d: value(Technique::Bb1d),
         }
     }
 
+    /// Applies a function to each value.
+    #[must_use]
+    pub fn map<U>(self, mut function: impl FnMut(T) -> U) -> VolumeMerges<U> {
+        VolumeMerges {
+            pp3d: function(self.pp3d),
+            pb2d: function(self.pb2d),
+            bp2d: function(self.bp2d),
+            bb1d: function(self.bb1d),
+        }
+    }
+
+    /// The value of a technique; `None` if it merges nothing in media.
+    #[inline]
+    #[must_use]
+    pub const fn get(&self, technique: Technique) -> Option<&T> {
+        match technique {
+            Technique::Pp3d => Some(&self.pp3d),
+            Technique::Pb2d => Some(&self.pb2d),
+            Technique::Bp2d => Some(&self.bp2d),
+            Technique::Bb1d => Some(&self.bb1d),
+            _ => None,
+        }
+    }
+}
+
+impl VolumeMerges {
     /// The sum of all four.
     #[inline]
     #[must_use]

@@ -13,7 +13,8 @@ mod recursion;
 mod weights;
 
 pub use counts::{
-    BeamExtent, DistanceDensity, Heuristic, MergeKind, MisPlan, OtherWalk, PARALLEL_SIN2, VolumeMerges,
+    BeamExtent, DistanceDensity, Heuristic, MergeKind, MisPlan, OtherWalk, PARALLEL_SIN2, VolumeMerge,
+    VolumeMerges,
 };
 pub use density_sum::{ByTechnique, Densities, Weight};
 pub use recursion::{Edge, EdgeMis, EdgeStart, VertexMis};

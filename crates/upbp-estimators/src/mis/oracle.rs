@@ -8,8 +8,7 @@
 
 use upbp_media::{Lanes, MediumId};
 
-use super::counts::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2};
-use crate::technique::Technique;
+use super::counts::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2, VolumeMerge};
 
 /// The kind of a vertex of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -203,31 +202,16 @@ impl<L: Lanes> Path<L> {
                     ];
                     let sin = self.vertices[i].sin_theta;
                     let sin = if sin * sin < PARALLEL_SIN2 { 0.0 } else { sin };
-                    let width = plan.width.get(medium.0 as usize).copied().unwrap_or_default();
-                    let scale = self.vertices[i].scale;
                     // Effective volume by its dimension, and 6.5 with the radius here.
-                    let here = |technique, value: f64, dimension, width: f64| {
-                        let greatest = plan.greatest_scales_in(medium).get(technique).copied();
-                        let scale = scale.min(greatest.map_or(f64::INFINITY, f64::from));
-                        value * (1.0 + width) * scale.powi(dimension) / (1.0 + width * scale.powi(4))
+                    let here = |merge: VolumeMerge, dimension| {
+                        let VolumeMerge { count, width, greatest_scale } = merge;
+                        let scale = self.vertices[i].scale.min(f64::from(greatest_scale));
+                        count * (1.0 + width) * scale.powi(dimension) / (1.0 + width * scale.powi(4))
                     };
-                    push(
-                        Strategy::Pp3d(i),
-                        here(Technique::Pp3d, v.pp3d, 3, width.pp3d),
-                        both + point[0] + point[1],
-                    );
-                    push(
-                        Strategy::Pb2d(i),
-                        here(Technique::Pb2d, v.pb2d, 2, width.pb2d),
-                        both + point[0] + beam[1],
-                    );
-                    push(
-                        Strategy::Bp2d(i),
-                        here(Technique::Bp2d, v.bp2d, 2, width.bp2d),
-                        both + beam[0] + point[1],
-                    );
-                    let bb1d = both + beam[0] + beam[1] + log(sin);
-                    push(Strategy::Bb1d(i), here(Technique::Bb1d, v.bb1d, 1, width.bb1d), bb1d);
+                    push(Strategy::Pp3d(i), here(v.pp3d, 3), both + point[0] + point[1]);
+                    push(Strategy::Pb2d(i), here(v.pb2d, 2), both + point[0] + beam[1]);
+                    push(Strategy::Bp2d(i), here(v.bp2d, 2), both + beam[0] + point[1]);
+                    push(Strategy::Bb1d(i), here(v.bb1d, 1), both + beam[0] + beam[1] + log(sin));
                 }
                 VertexKind::End | VertexKind::Volume | VertexKind::Delta => {}
             }

@@ -43,7 +43,7 @@ pub(super) fn merge<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             let [own, other] =
                 [light.mis.distance_factor, camera.mis.distance_factor].map(DistanceDensity::at_stop);
             let factors = mis.volume_factors(medium, own, other, scattering.sin_theta, scale);
-            (factors.of(technique), factors.sum())
+            (factors.get(technique).copied().unwrap_or_default(), factors.sum())
         }
     };
     let before_light = light.mis.before(mis, scattering.rho_own, &camera.mis.shares);

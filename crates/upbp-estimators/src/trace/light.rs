@@ -266,7 +266,7 @@ fn store_beams<S: Scene, D: Densities, L: Lanes>(
     for (span, end) in edge_trace.beam_spans(plan.mis.photon_beams) {
         let Some(medium) = span.medium else { continue };
         let merges = plan.mis.merges_in(medium);
-        if !(merges.bb1d > 0.0 || merges.bp2d > 0.0) {
+        if !(merges.bb1d.is_on() || merges.bp2d.is_on()) {
             continue;
         }
         let Some(end) = beam_end(prepared, edge_trace, span, medium, end) else { continue };

@@ -10,19 +10,19 @@ pub(super) mod recorder;
 
 use std::ops::Range;
 
-use upbp_estimators::mis::{self, Heuristic};
+use upbp_estimators::mis;
 use upbp_estimators::path::{Context, LightChunk, LightVertex, Splat};
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet};
 use upbp_media::Lanes;
 
-use super::full_plan::iteration_plan;
+use super::full_plan::pilot_plan;
 use super::memory_limit;
 use super::parallel_walks::{PIECE, PilotRun, SampleRoom, camera_path, in_pieces, light_path};
 use super::roulette;
 use crate::deadline::Halt;
 use crate::plan::Plan;
-use crate::settings::{CheckedSettings, Settings};
+use crate::settings::CheckedSettings;
 use grid::Grid;
 use recorder::{ByRoulette, PerTechnique, Recorder, Sample, TECHNIQUES, add, passed};
 
@@ -180,9 +180,7 @@ impl PilotRender {
             more_light_paths: f64::from(most_paths) / f64::from(paths.max(1)),
             iterations: 1.0,
         };
-        // Parts in weights tell densities with this heuristic alone, whichever the render has.
-        let settings = Settings { heuristic: Heuristic::Balance, ..Settings::clone(settings) };
-        let mut thinned = iteration_plan(scene, &settings, plan, 0).thinned(paths, beam_paths);
+        let mut thinned = pilot_plan(scene, settings, plan).thinned(paths, beam_paths);
         let room = SampleRoom::new(limits.samples);
         let mut passes = (0..PASSES)
             .map(|pass| {

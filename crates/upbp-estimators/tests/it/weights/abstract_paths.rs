@@ -2,9 +2,9 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
+use upbp_estimators::MediumId;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, VertexKind};
-use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2, VolumeMerges};
-use upbp_estimators::{MediumId, PerMerge};
+use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, PARALLEL_SIN2, VolumeMerge, VolumeMerges};
 
 /// The number of techniques, in the order hit, nee, connect, light tracing, surf, pp3d, pb2d, bp2d, bb1d.
 pub(crate) const TECHNIQUES: u32 = 9;
@@ -130,21 +130,16 @@ pub(crate) fn path(longest: usize, spread: f64) -> impl Strategy<Value = Path> {
 
 /// A plan with all techniques and different merges in each medium.
 pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
-    let merges = |most: f64| {
-        vec((0.0..most, 0.0..most, 0.0..most, 0.0..most), MEDIA as usize).prop_map(|media| {
-            let merges = |(pp3d, pb2d, bp2d, bb1d)| VolumeMerges { pp3d, pb2d, bp2d, bb1d };
-            media.into_iter().map(merges).collect::<Vec<_>>()
-        })
+    let merge = || {
+        // Some of the scales at vertices are greater.
+        let greatest_scale = prop_oneof![Just(f32::INFINITY), 0.1_f32..3.0];
+        let merge = |(count, width, greatest_scale)| VolumeMerge { count, width, greatest_scale };
+        (0.0..1e3, 0.0..3.0, greatest_scale).prop_map(merge)
     };
-    // Some of the scales at vertices are greater.
-    let greatest = prop_oneof![Just(f32::INFINITY), 0.1_f32..3.0];
-    let greatest_scales = vec([0; 4].map(|_| greatest.clone()), MEDIA as usize).prop_map(|media| {
-        let scales =
-            |[pp3d, pb2d, bp2d, bb1d]: [f32; 4]| PerMerge { surf: f32::INFINITY, pp3d, pb2d, bp2d, bb1d };
-        media.into_iter().map(scales).collect::<Vec<_>>()
-    });
-    (1.0..4.0, 1e-3..10.0, 1.0..1e5, 1e-3..1e3, merges(1e3), merges(3.0), greatest_scales).prop_map(
-        |(nee, connect, light_tracing, surf, volume, width, greatest_scales)| MisPlan {
+    let medium = [(); 4].map(|()| merge());
+    let medium = medium.prop_map(|[pp3d, pb2d, bp2d, bb1d]| VolumeMerges { pp3d, pb2d, bp2d, bb1d });
+    (1.0..4.0, 1e-3..10.0, 1.0..1e5, 1e-3..1e3, vec(medium, MEDIA as usize)).prop_map(
+        |(nee, connect, light_tracing, surf, volume)| MisPlan {
             heuristic: Heuristic::Balance,
             hit: 1.0,
             nee,
@@ -152,8 +147,6 @@ pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
             light_tracing,
             surf,
             volume,
-            width,
-            greatest_scales,
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
             lanes: [0.0; 3],
@@ -164,22 +157,20 @@ pub(crate) fn plan() -> impl Strategy<Value = MisPlan> {
 /// The plan with only the techniques whose bits are set.
 pub(crate) fn masked(plan: &MisPlan, mask: u32) -> MisPlan {
     let on = |bit: u32, value: f64| if mask >> bit & 1 == 1 { value } else { 0.0 };
+    let merge = |bit, merge: VolumeMerge| VolumeMerge { count: on(bit, merge.count), ..merge };
+    let in_medium = |v: &VolumeMerges<VolumeMerge>| VolumeMerges {
+        pp3d: merge(5, v.pp3d),
+        pb2d: merge(6, v.pb2d),
+        bp2d: merge(7, v.bp2d),
+        bb1d: merge(8, v.bb1d),
+    };
     MisPlan {
         hit: on(0, plan.hit),
         nee: on(1, plan.nee),
         connect: on(2, plan.connect),
         light_tracing: on(3, plan.light_tracing),
         surf: on(4, plan.surf),
-        volume: plan
-            .volume
-            .iter()
-            .map(|v| VolumeMerges {
-                pp3d: on(5, v.pp3d),
-                pb2d: on(6, v.pb2d),
-                bp2d: on(7, v.bp2d),
-                bb1d: on(8, v.bb1d),
-            })
-            .collect(),
+        volume: plan.volume.iter().map(in_medium).collect(),
         ..plan.clone()
     }
 }

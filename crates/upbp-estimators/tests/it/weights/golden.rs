@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use upbp_estimators::MediumId;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
-use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerges};
+use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerge, VolumeMerges};
 
 use super::recursion::Recursion;
 
@@ -74,14 +74,15 @@ fn golden_plan(query_beams: BeamExtent) -> MisPlan {
         connect: 1.0,
         light_tracing: 1e4,
         surf: 1e4 * PI * 1e-4,
-        volume: vec![VolumeMerges {
-            pp3d: 1e4 * 4.0 / 3.0 * PI * 8e-6,
-            pb2d: 1e4 * 0.75 * PI * 1e-4,
-            bp2d: 0.0,
-            bb1d: 200.0 * 0.05 / 3.0,
-        }],
-        width: Vec::new(),
-        greatest_scales: Vec::new(),
+        volume: vec![
+            VolumeMerges {
+                pp3d: 1e4 * 4.0 / 3.0 * PI * 8e-6,
+                pb2d: 1e4 * 0.75 * PI * 1e-4,
+                bp2d: 0.0,
+                bb1d: 200.0 * 0.05 / 3.0,
+            }
+            .map(|count| VolumeMerge { count, ..VolumeMerge::NONE }),
+        ],
         photon_beams: BeamExtent::Short,
         query_beams,
         lanes: [0.0; 3],

@@ -9,7 +9,6 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use recursion::{Recursion, is_ok};
-use upbp_estimators::PerMerge;
 use upbp_estimators::mis::oracle::{Path, PathEdge, PathVertex, Strategy as Way, VertexKind};
 use upbp_estimators::mis::{ByTechnique, Densities, Heuristic, MisPlan, VolumeMerges};
 use upbp_media::Lanes;
@@ -321,14 +320,11 @@ proptest! {
         let k = path.length();
         for (heuristic, photon_beams, query_beams) in modes() {
             let plan = masked(&MisPlan { heuristic, photon_beams, query_beams, ..plan.clone() }, mask);
-            let swap = |v: &VolumeMerges| VolumeMerges { pb2d: v.bp2d, bp2d: v.pb2d, ..*v };
-            let swap_scales = |v: &PerMerge<f32>| PerMerge { pb2d: v.bp2d, bp2d: v.pb2d, ..*v };
+            let swap = |v: &VolumeMerges<_>| VolumeMerges { pb2d: v.bp2d, bp2d: v.pb2d, ..*v };
             let mirrored = MisPlan {
                 nee: plan.light_tracing,
                 light_tracing: plan.nee,
                 volume: plan.volume.iter().map(swap).collect(),
-                width: plan.width.iter().map(swap).collect(),
-                greatest_scales: plan.greatest_scales.iter().map(swap_scales).collect(),
                 photon_beams: query_beams,
                 query_beams: photon_beams,
                 ..plan.clone()
