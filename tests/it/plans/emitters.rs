@@ -1,6 +1,6 @@
 //! The choice of emitters for light sub-paths.
 
-use upbp_core::{FrozenPlan, LightPaths, Settings, Start};
+use upbp_core::{FrozenPlan, Heuristic, LightPaths, Settings, Start};
 use upbp_scene::ReadyScene;
 use upbp_testing::renderer;
 
@@ -140,4 +140,30 @@ fn light_sub_paths_are_shared_so_that_the_error_is_least() {
     assert!(found < 1.3 * least, "share {own}: {found}, others {others:?}");
     // In proportion to light it would be less than this.
     assert!(others[0].1 > 2.0 * least, "the share matters: {others:?}");
+}
+
+/// What emitters bring is told by weights, and those of the power heuristic do not tell it.
+#[test]
+fn emitters_are_chosen_alike_whichever_heuristic_a_render_has() {
+    let text = r#"(
+  version: 1,
+  camera: Perspective(origin: (0, 1.2, 4), target: (0, 0.4, 0), fov_degrees: 40),
+  film: (width: 64, height: 36),
+  media: { "flame": Homogeneous(glow: 20), "haze": Homogeneous(glow: 0.1) },
+  materials: { "stone": Lambert(0.6), "glass": Dielectric(1.5), "gas": Null },
+  shapes: [
+    (material: "stone", geometry: Quad(origin: (-5, 0, -5), edge_u: (0, 0, 10), edge_v: (10, 0, 0))),
+    (material: "glass", geometry: Sphere(centre: (0.5, 0.31, 0), radius: 0.3)),
+    (material: "gas", interior: "haze", geometry: Box(min: (-2, 0.001, -2), max: (-1, 0.5, 2))),
+    (material: "gas", interior: "flame", geometry: Sphere(centre: (-0.5, 0.5, 0), radius: 0.08)),
+    (material: "stone", emission: 5, geometry: Sphere(centre: (1.5, 1, -1), radius: 0.2)),
+  ],
+  lights: [Constant(0.1)],
+)"#;
+    let scene = ReadyScene::from_ron_str(text, ".").expect("a valid scene");
+    let emitters = |heuristic| {
+        let settings = Settings { heuristic, deterministic: true, ..by_photons() };
+        renderer(&scene, settings).state().identity().frozen_plan().emitters
+    };
+    assert_eq!(emitters(Heuristic::Power), emitters(Heuristic::Balance));
 }
