@@ -11,6 +11,7 @@ use super::placement::{Placement, unit};
 use super::surface::{Areas, Surface, cross, normal_cone};
 use super::topology::Border;
 use super::triangle::RayShear;
+use super::volume_sampling::Cells;
 use crate::ray::Ray;
 
 /// Triangles over shared vertices.
@@ -221,9 +222,7 @@ impl TriangleMesh {
     fn even_factor(&self) -> Option<f64> {
         let placement = self.placement.as_ref()?;
         let factor = placement.squared_scale()?;
-        let (min, max) = self.surface.bounds();
-        let rounding = f64::from(f32::EPSILON * placement.reach(min.abs().max(max.abs())));
-        self.surface.areas().allow(rounding / factor.sqrt()).then_some(factor)
+        self.surface.areas().allow(self.rounding(placement) / factor.sqrt()).then_some(factor)
     }
 
     /// The enclosed volume, cubic scene units: negative if the normals point inwards, and without meaning
@@ -265,6 +264,25 @@ impl TriangleMesh {
         let root = left.sqrt();
         let (b, c) = (root * (1.0 - f64::from(u[1])), root * f64::from(u[1]));
         (self.point(triangle as u32, b, c).as_vec3(), self.geometric_normal(triangle as u32))
+    }
+
+    /// The cells that cover the inside of a closed mesh; those that all copies share where their corners keep
+    /// enough digits, with the place of this one.
+    pub(super) fn cells(&self) -> (Arc<Cells>, Option<Placement>) {
+        let bounds = self.surface.bounds();
+        let unplaced =
+            || Self { surface: self.surface.clone(), placement: None, bounds, own_areas: OnceLock::new() };
+        let cells = || self.surface.cells(|| Cells::cover(&unplaced())).clone();
+        let Some(placement) = self.placement else { return (cells(), None) };
+        let error = placement.size_in_mesh(self.rounding(&placement));
+        let shared = Some(cells()).filter(|cells| cells.allow(error));
+        shared.map_or_else(|| (Arc::new(Cells::cover(self)), None), |shared| (shared, Some(placement)))
+    }
+
+    /// Error of the corners of a copy, scene units.
+    fn rounding(&self, placement: &Placement) -> f64 {
+        let (min, max) = self.surface.bounds();
+        f64::from(f32::EPSILON * placement.reach(min.abs().max(max.abs())))
     }
 
     /// Whether every edge joins exactly two triangles that are wound alike.

@@ -67,6 +67,11 @@ impl Placement {
         Vec3::from_array(std::array::from_fn(placed)) + self.moved
     }
 
+    /// A point in the scene in double precision, which no corner is.
+    pub(super) fn point_in_scene(&self, p: DVec3) -> DVec3 {
+        self.to_scene.as_dmat3() * p + self.translation.as_dvec3() + self.moved.as_dvec3()
+    }
+
     /// Eight points in the scene.
     #[inline(always)]
     pub(super) fn points<W: Wide>(&self, wide: W, p: [W::F; 3]) -> [W::F; 3] {

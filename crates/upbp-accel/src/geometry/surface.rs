@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::model::Model;
 use super::topology::{Border, parts};
+use super::volume_sampling::Cells;
 
 /// Triangles in coordinates of their own.
 #[derive(Clone, Debug)]
@@ -29,6 +30,7 @@ struct Measures {
     normal_cone: OnceLock<Option<(Vec3, f32)>>,
     parts: OnceLock<Vec<u32>>,
     model: OnceLock<Arc<Model>>,
+    cells: OnceLock<Arc<Cells>>,
 }
 
 /// Areas of the triangles of a surface.
@@ -144,6 +146,11 @@ impl Surface {
         // and would wait for itself.
         let built = Arc::new(Model::build(self));
         model.get_or_init(|| built)
+    }
+
+    /// The cells of its inside, which `cover` finds.
+    pub(super) fn cells(&self, cover: impl FnOnce() -> Cells) -> &Arc<Cells> {
+        self.measures.cells.get_or_init(|| Arc::new(cover()))
     }
 
     /// Adds a vector to all positions.

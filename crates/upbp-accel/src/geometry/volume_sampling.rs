@@ -4,11 +4,13 @@
 //! and points are uniform over these cells: some lie outside of the mesh, and the density is exact.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use glam::{DVec3, UVec3, Vec3};
 
 use super::axis_box::AxisBox;
 use super::mesh::TriangleMesh;
+use super::placement::Placement;
 use super::shape::Shape;
 use super::sphere::Sphere;
 
@@ -30,7 +32,8 @@ pub struct ShapeVolume {
 enum Cover {
     Sphere(Sphere),
     Box(AxisBox),
-    Cells(Cells),
+    /// Cells of the mesh, with the place of a copy.
+    Cells(Arc<Cells>, Option<Placement>),
 }
 
 impl ShapeVolume {
@@ -47,9 +50,9 @@ impl ShapeVolume {
                 (Cover::Box(*axis_box), volume, volume)
             }
             Shape::Mesh(mesh) if mesh.is_closed() => {
-                let cells = Cells::cover(mesh);
-                let covered = cells.size.element_product() * cells.indices.len() as f64;
-                (Cover::Cells(cells), f64::from(mesh.signed_volume()).abs().min(covered), covered)
+                let (cells, placement) = mesh.cells();
+                let covered = cells.volume() * placement.map_or(1.0, |placement| placement.volume_ratio());
+                (Cover::Cells(cells, placement), f64::from(mesh.signed_volume()).abs().min(covered), covered)
             }
             Shape::Mesh(_) | Shape::Quad(_) => return None,
         };
@@ -73,7 +76,7 @@ impl ShapeVolume {
     pub const fn as_sphere(&self) -> Option<&Sphere> {
         match &self.cover {
             Cover::Sphere(sphere) => Some(sphere),
-            Cover::Box(_) | Cover::Cells(_) => None,
+            Cover::Box(_) | Cover::Cells(..) => None,
         }
     }
 
@@ -92,14 +95,17 @@ impl ShapeVolume {
                 let min = axis_box.min().as_dvec3();
                 (min + (axis_box.max().as_dvec3() - min) * DVec3::from(u)).as_vec3()
             }
-            Cover::Cells(cells) => cells.sample(u),
+            Cover::Cells(cells, placement) => {
+                let point = cells.sample(u);
+                placement.map_or(point, |placement| placement.point_in_scene(point)).as_vec3()
+            }
         }
     }
 }
 
 /// Cells of a regular grid.
 #[derive(Clone, Debug)]
-struct Cells {
+pub(super) struct Cells {
     min: DVec3,
     /// Size of a cell.
     size: DVec3,
@@ -111,7 +117,7 @@ struct Cells {
 
 impl Cells {
     /// All cells with a part inside of a closed mesh.
-    fn cover(mesh: &TriangleMesh) -> Self {
+    pub(super) fn cover(mesh: &TriangleMesh) -> Self {
         let (min, max) = mesh.aabb();
         let (min, max) = (min.as_dvec3(), max.as_dvec3());
         let extent = max - min;
@@ -135,6 +141,15 @@ impl Cells {
         cells.indices =
             (0..state.len() as u32).filter(|&index| state[index as usize] == State::Covered).collect();
         cells
+    }
+
+    /// Whether corners of the mesh may be off by a vector and no point inside lies in another cell.
+    pub(super) fn allow(&self, error: DVec3) -> bool {
+        error.cmple(MARGIN * self.size).all()
+    }
+
+    fn volume(&self) -> f64 {
+        self.size.element_product() * self.indices.len() as f64
     }
 
     fn place(&self, index: u32) -> UVec3 {
@@ -191,12 +206,12 @@ impl Cells {
         }
     }
 
-    fn sample(&self, u: [f64; 3]) -> Vec3 {
+    fn sample(&self, u: [f64; 3]) -> DVec3 {
         let count = self.indices.len() as f64;
         // The rest of the random number inside the cell is uniform again.
         let cell = (u[0] * count).floor().min(count - 1.0);
         let inside = DVec3::new(u[0] * count - cell, u[1], u[2]).clamp(DVec3::ZERO, DVec3::ONE);
-        (self.min + self.corner(self.indices[cell as usize]) + inside * self.size).as_vec3()
+        self.min + self.corner(self.indices[cell as usize]) + inside * self.size
     }
 }
 
@@ -224,6 +239,8 @@ enum State {
 
 #[cfg(test)]
 mod tests {
+    use glam::{Affine3A, Mat3};
+
     use super::*;
 
     /// Points of a sequence that fills the cube evenly.
@@ -283,13 +300,25 @@ mod tests {
         }
     }
 
+    #[test]
+    fn copies_share_their_cells_where_corners_keep_their_digits() {
+        let mesh = ring(12);
+        let linear = Mat3::from_rotation_z(0.7) * Mat3::from_diagonal(Vec3::new(-0.4, 3.0, 1.0));
+        for (distance, is_shared) in [(1.0, true), (100.0, true), (1e4, false)] {
+            let to_scene = Affine3A::from_mat3_translation(linear, distance * Vec3::new(1.0, -0.7, 0.3));
+            let copy = mesh.placed(&to_scene).unwrap();
+            assert_eq!(Arc::ptr_eq(&copy.cells().0, &mesh.cells().0), is_shared, "{distance}");
+            check(&copy.into());
+        }
+    }
+
     /// One random number chooses the cell and the place along its first axis.
     #[test]
     fn the_place_within_a_cell_does_not_depend_on_the_cell() {
         let cells = Cells::cover(&ring(12));
         let mut sums = [[0.0; 2]; 4];
         for u in points(40_000) {
-            let place = (cells.sample(u).as_dvec3() - cells.min) / cells.size;
+            let place = (cells.sample(u) - cells.min) / cells.size;
             let quarter = &mut sums[(4.0 * u[0]) as usize];
             *quarter = [quarter[0] + place.x.fract(), quarter[1] + 1.0];
         }

@@ -28,8 +28,8 @@ const WORTH: f64 = 1.25;
 /// Starts that brought light from which on they tell whether a guide is worth it. Fewer say that there was no
 /// time to find out.
 const FEW: usize = 8;
-/// The most that one start may count of the light of all: one that is bright because it is rare would draw
-/// most of the guided starts to its own cell.
+/// The most that one start may count of the light of all, as it is before any counts less: one that is bright
+/// because it is rare would draw most of the guided starts to its own cell.
 const BRIGHTEST: f64 = 0.03;
 
 /// Starts of light sub-paths that a run has found useful, and points that others may lead to.
@@ -74,7 +74,7 @@ impl Starts {
         (logarithms / self.light().max(f64::MIN_POSITIVE)).exp()
     }
 
-    /// Lets no start count for more than a part of the light of all.
+    /// Lets no start count for more than a part of the light of all as it was.
     fn clip(&mut self, part: f64) {
         let most = part * self.light();
         self.0.iter_mut().for_each(|sample| sample.light = sample.light.min(most));

@@ -120,8 +120,10 @@ impl Builder<'_> {
         let origin = extent::move_near_origin(&mut shapes, &mut lights, &mut camera);
         let bounds = extent::bounds(&shapes, &lights, &camera);
         if lights.iter().any(|light| light.kind().is_infinite()) && !has_density_on_disc(&bounds) {
-            let message =
-                format!("has a radius of {:e}, too small or too large for light from infinity", bounds.radius);
+            let message = format!(
+                "has a radius of {:e}, too small or too large for light from infinity",
+                bounds.radius
+            );
             self.problem("scene", message);
         }
         let geometry = SceneGeometry::build(shapes).map_err(|error| self.problem("shapes", error)).ok()?;
