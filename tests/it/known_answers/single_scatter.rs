@@ -139,15 +139,11 @@ fn bias_falls_with_the_square_of_the_radius() {
     let mut table = Table::default();
     for technique in ["pp3d", "pb2d"] {
         let bias = |radius: f64| smoothed(technique, &case, radius) / expected - 1.0;
-        let exponent = |radius: f64| (bias(radius) / bias(0.5 * radius)).log2();
-        println!(
-            "{technique}: predicted exponents {:.3}, {:.3}, {:.3}",
-            exponent(0.8),
-            exponent(0.2),
-            exponent(0.05)
-        );
-        assert!((exponent(0.2) - 2.0).abs() < 0.05);
-        assert!(exponent(0.8) > exponent(0.4) && exponent(0.4) > exponent(0.2));
+        let biases = [0.8, 0.4, 0.2, 0.1].map(bias);
+        let exponents = [0, 1, 2].map(|i| (biases[i] / biases[i + 1]).log2());
+        println!("{technique}: predicted exponents {exponents:.3?}");
+        assert!((exponents[2] - 2.0).abs() < 0.05);
+        assert!(exponents[0] > exponents[1] && exponents[1] > exponents[2]);
     }
     let mut measured = |technique: &str, scene, radius: f64, iterations| {
         let settings = Settings {

@@ -8,14 +8,12 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::time::Duration;
 
 use glam::{Vec3, Vec3A};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::ploc::SortPrecision;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, SortPrecision};
 use rayon::prelude::*;
 
 use super::hierarchy::{Child, Hierarchy, Kind, Node};
@@ -86,14 +84,7 @@ pub(super) fn build(boxes: &[Boxed], leaves: Leaves, pack: Pack<'_>) -> Hierarch
         return Hierarchy { nodes: Vec::new(), roots };
     }
     let (members, groups) = group_by_centre(boxes);
-    let params = BvhBuildParams {
-        max_prims_per_leaf: 1,
-        post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
-        // 21 bits per axis do not tell the triangles of a statue apart on a ground a million times as wide.
-        sort_precision: SortPrecision::U128,
-        ..BvhBuildParams::medium_build()
-    };
-    let mut tree = build_bvh2(&seen_by_builder(&groups), params, &mut Duration::default());
+    let mut tree = binary_tree(&seen_by_builder(&groups));
     for node in tree.nodes.iter_mut().filter(|node| node.is_leaf()) {
         node.set_aabb(groups[tree.primitive_indices[node.first_index as usize] as usize].bounds);
     }
@@ -103,6 +94,25 @@ pub(super) fn build(boxes: &[Boxed], leaves: Leaves, pack: Pack<'_>) -> Hierarch
     let mut collapse = Collapse { binary, choices, nodes: Vec::new(), pack };
     let roots = vec![collapse.emit()];
     Hierarchy { nodes: collapse.nodes, roots }
+}
+
+/// The tree of obvhs's medium preset, with a box per leaf. Not by its `build_bvh2`, which is compiled for every
+/// search distance.
+fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
+    /// Neighbours on either side that are looked at for the one that a node is joined with.
+    const SEARCH: usize = 14;
+    /// Rounds of joining, from the leaves on, that look at the nearest one only.
+    const QUICK_ROUNDS: usize = 3;
+    /// Part of the nodes that are tried at other places.
+    const REINSERTED: f32 = 0.05;
+    let mut tree = Bvh2::zeroed(boxes.len());
+    let indices = (0..boxes.len() as u32).collect();
+    // 21 bits per axis do not tell the triangles of a statue apart on a ground a million times as wide.
+    let precision = SortPrecision::U128;
+    let mut builder = PlocBuilder::with_capacity(boxes.len());
+    builder.build_ploc::<SEARCH, _>(&mut tree, boxes, indices, precision, QUICK_ROUNDS);
+    ReinsertionOptimizer::default().run(&mut tree, REINSERTED, None);
+    tree
 }
 
 /// The boxes of groups, wider by a thousandth and some roundings, no two by the same amount, so that no pair is
@@ -122,7 +132,7 @@ fn seen_by_builder(groups: &[Group]) -> Vec<Aabb> {
         let growth = |corner: Vec3A| part * (GROWTH[0] * (max - min) + GROWTH[1] * corner.abs());
         Aabb::new(min - growth(min), max + growth(max))
     };
-    groups.par_iter().enumerate().map(seen).collect()
+    groups.iter().enumerate().map(seen).collect()
 }
 
 /// Calls `run` with the primitives of each block.
