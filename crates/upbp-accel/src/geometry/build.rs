@@ -96,8 +96,8 @@ pub(super) fn build(boxes: &[Boxed], leaves: Leaves, pack: Pack<'_>) -> Hierarch
     Hierarchy { nodes: collapse.nodes, roots }
 }
 
-/// The tree of obvhs's medium preset, with a box per leaf. Not by its `build_bvh2`, which is compiled for every
-/// search distance.
+/// The tree of obvhs's medium preset, with a box per leaf. Not by its `build_bvh2`, which is compiled for
+/// every search distance.
 fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     /// Neighbours on either side that are looked at for the one that a node is joined with.
     const SEARCH: usize = 14;
@@ -115,8 +115,8 @@ fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     tree
 }
 
-/// The boxes of groups, wider by a thousandth and some roundings, no two by the same amount, so that no pair is
-/// as good as another, and in units in which no area is too large or too small for a number.
+/// The boxes of groups, wider by a thousandth and some roundings, no two by the same amount, so that no pair
+/// is as good as another, and in units in which no area is too large or too small for a number.
 fn seen_by_builder(groups: &[Group]) -> Vec<Aabb> {
     /// The most that a box grows, relative to its extent and to its coordinates.
     const GROWTH: [f32; 2] = [1.0 / 1024.0, 16.0 * f32::EPSILON];
