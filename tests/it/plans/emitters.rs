@@ -1,8 +1,9 @@
 //! The choice of emitters for light sub-paths.
 
-use upbp_core::{FrozenPlan, Heuristic, LightPaths, Settings, Start};
+use upbp_core::{FrozenPlan, Heuristic, LightPaths, Settings, Start, Technique, TechniqueSet, Techniques};
 use upbp_scene::ReadyScene;
 use upbp_testing::renderer;
+use upbp_testing::shipped::Shipped;
 
 /// A dim sky, and three lamps, one as bright as the others, each in a hollow ball of opal glass; all in thin
 /// fog. Little of their light is found by camera sub-paths, and bright contributions are rare.
@@ -166,4 +167,21 @@ fn emitters_are_chosen_alike_whichever_heuristic_a_render_has() {
         renderer(&scene, settings).state().identity().frozen_plan().emitters
     };
     assert_eq!(emitters(Heuristic::Power), emitters(Heuristic::Balance));
+}
+
+/// What techniques find that a plan has not got is left to the others: emitters are those of a render that
+/// was given the techniques of the plan.
+#[test]
+fn emitters_are_chosen_for_the_techniques_of_the_plan() {
+    let scene = Shipped::find("many_lights").expect("a shipped scene").scene();
+    let scene = ReadyScene::load(scene).expect("a valid scene");
+    let plan = |techniques| {
+        let settings = Settings { techniques, deterministic: true, ..Settings::default() };
+        renderer(&scene, settings).state().identity().frozen_plan()
+    };
+    let auto = plan(Techniques::Auto);
+    let chosen = auto.plan.techniques;
+    assert!(chosen.has(Technique::LightTracing) && !chosen.has(Technique::Bb1d), "{chosen}");
+    assert_eq!(auto.emitters, plan(chosen.into()).emitters);
+    assert_ne!(auto.emitters, plan(TechniqueSet::STANDARD.into()).emitters);
 }

@@ -23,6 +23,7 @@ use super::full_plan::{full_plan, pilot_plan, plan_with};
 use super::guides::{self, Evidence};
 use super::memory_limit::Room;
 use super::parallel_walks::{PilotRun, SampleRoom, camera_path, in_pieces, light_path, pixel};
+use super::pilot_render::recorder::{PerTechnique, TECHNIQUES};
 use super::statistics::{self, PATHS_PER_BEAM_PATH};
 use super::thinned::Thinned;
 use crate::deadline::{Budget, Halt};
@@ -60,7 +61,8 @@ const PART: f64 = 0.2;
 const QUICK_LOOK: f64 = 0.2;
 
 /// Lets the scene choose its emitters, and the starts of light sub-paths on them, by what they contribute
-/// under a plan with `techniques`. The scene has to be as it was prepared.
+/// under a plan with `techniques`; returns the light that each technique brought from light sub-paths, in any
+/// unit. The scene has to be as it was prepared.
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
@@ -71,11 +73,12 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     lanes: Option<[f64; 3]>,
     room: &Room,
     budget: &Budget<'_>,
-) -> Result<(), RenderError> {
+) -> Result<PerTechnique<f64>, RenderError> {
+    let mut by_technique = [0.0; TECHNIQUES];
     let emitters = scene.scene.emitters().len();
     let is_guided = guides::can_guide(scene, techniques);
     if emitters < 2 && !is_guided {
-        return Ok(());
+        return Ok(by_technique);
     }
     if emitters > 1 {
         scene.choose_emitters_to_measure();
@@ -114,6 +117,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, enough, halt);
         let allowance = budget.part((1.0 - QUICK_LOOK) * PART * part);
         let seen = allowance.largest_from(FEW / f64::from(times), run).ok_or(RenderError::Cancelled)?;
+        by_technique = seen.by_technique;
         if emitters > 1 {
             scene.choose_emitters_by(&seen.emission, &shares(&seen.next_events, emitters));
             choose_by_receiver(scene, &seen.next_events);
@@ -135,7 +139,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
             }
         }
     }
-    Ok(())
+    Ok(by_technique)
 }
 
 /// Merges in a medium as those of `few`, with the greatest scales of `full`.
@@ -160,6 +164,8 @@ struct Measured {
     /// Contributions of next events, in two halves of different camera sub-paths.
     next_events: [Vec<NextEvent>; 2],
     guides: Evidence,
+    /// Light that light sub-paths brought, relative to that of its pixel.
+    by_technique: PerTechnique<f64>,
     /// Number of contributions.
     contributions: usize,
 }
@@ -292,6 +298,7 @@ fn measure<S: Scene, L: Lanes>(
     let relative = |contribution: Contribution| {
         if mean > 0.0 { mean / (mean + contribution.pixel) } else { 1.0 }
     };
+    let mut by_technique = [0.0; TECHNIQUES];
     let mut by_path = |seen: &[(u32, Contribution)], scale: f64| {
         for &(path, contribution) in seen {
             if let Some((end, light)) = &mut starts[path as usize] {
@@ -299,7 +306,9 @@ fn measure<S: Scene, L: Lanes>(
                 // In an iteration it would be as much brighter, and rarer, as its kernel is narrower.
                 let scale_of_squares = scale * blur(contribution.technique);
                 emission.push(contribution.square_of(end.emitter, chosen, scale_of_squares, relative));
-                *light += scale * relative * contribution.value * contribution.weight;
+                let brought = scale * relative * contribution.value * contribution.weight;
+                *light += brought;
+                by_technique[contribution.technique as usize] += brought;
             }
         }
     };
@@ -324,7 +333,7 @@ fn measure<S: Scene, L: Lanes>(
     let contributions = emission.len() + next_events.iter().map(Vec::len).sum::<usize>();
     let mut emission = EmitterShares::of_squares(probabilities, &emission);
     emission.samples = emission.samples.min(light_paths);
-    Some(Measured { emission, next_events, guides, contributions })
+    Some(Measured { emission, next_events, guides, by_technique, contributions })
 }
 
 /// The map that light sub-paths of a plan leave; what they contribute by themselves goes to `seen`.

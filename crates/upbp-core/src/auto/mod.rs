@@ -40,7 +40,6 @@ mod variance;
 mod volumes;
 
 use upbp_estimators::PreparedScene;
-use upbp_estimators::TechniqueSet;
 use upbp_estimators::scene::Scene;
 use upbp_media::Lanes;
 
@@ -51,6 +50,7 @@ use crate::settings::{CheckedSettings, Techniques};
 use candidate::Candidates;
 use cost::Cost;
 use memory_limit::Room;
+use pilot_render::recorder::TECHNIQUES;
 use pilot_render::{Limits, PilotRender, Size};
 use statistics::Statistics;
 use technique_support::TechniqueSupport;
@@ -75,8 +75,12 @@ const PLANNED: f64 = 0.7;
 const TIME_FOR_STATISTICS: f64 = 0.2;
 /// Part of that time that pilot renders may take at least: they have what the steps before them leave.
 const TIME_FOR_PILOT: f64 = 0.4;
+/// Part of the light of light sub-paths that is much for techniques to find that are off then.
+const MUCH: f64 = 0.2;
 /// Part of that time that is kept for what may come after pilot renders, another choice of emitters.
-const TIME_AFTER_PILOT: f64 = 0.2;
+const TIME_AFTER_PILOT: f64 = 0.25;
+/// Part of that time that another look at the length of light sub-paths may take after that.
+const TIME_FOR_VERTICES: f64 = 0.05;
 
 /// A plan, with what was learnt on the way to it.
 pub(crate) struct Choice {
@@ -127,9 +131,10 @@ fn choose_in<S: Scene, L: Lanes>(
 ) -> Result<Choice, RenderError> {
     let is_auto = settings.techniques == Techniques::Auto;
     let techniques = support.techniques;
-    if given.is_none() {
-        emitters::choose::<S, L>(scene, settings, techniques, lanes, &room, budget)?;
-    }
+    let found = match &given {
+        Some(_) => [0.0; TECHNIQUES],
+        None => emitters::choose::<S, L>(scene, settings, techniques, lanes, &room, budget)?,
+    };
     budget.step("looking around", 0.3)?;
     let allowance = budget.part(TIME_FOR_STATISTICS);
     let most = statistics::LIGHT_PATHS;
@@ -145,12 +150,24 @@ fn choose_in<S: Scene, L: Lanes>(
             let is_room = |counts| room.holds::<S>(counts, &statistics);
             let candidates = Candidates::new(scene, settings, &support, &statistics, full, most, is_room);
             let limits = Limits::of::<S, L>(&room);
-            let plan = best_plan::<S, L>(scene, settings, &candidates, limits, budget);
-            if !plan.uses_light_paths() {
-                // Next events have to find what light sub-paths would have found.
+            let mut plan = best_plan::<S, L>(scene, settings, &candidates, limits, budget);
+            let missed: f64 = techniques.without(plan.techniques).iter().map(|off| found[off as usize]).sum();
+            if missed > MUCH * found.iter().sum::<f64>() {
+                // It is left to the techniques that are on.
                 scene.choose_emitters_by_power();
-                let techniques = techniques.intersection(TechniqueSet::PT);
-                emitters::choose::<S, L>(scene, settings, techniques, lanes, &room, budget)?;
+                emitters::choose::<S, L>(scene, settings, plan.techniques, lanes, &room, budget)?;
+                let allowance = budget.part(TIME_FOR_VERTICES);
+                let few = statistics::FEW_LIGHT_PATHS;
+                let statistics = statistics::measure::<S, L>(
+                    scene,
+                    settings,
+                    plan.techniques,
+                    lanes,
+                    few,
+                    &room,
+                    &allowance,
+                )?;
+                plan.vertices_per_light_path = statistics.vertices_per_path;
             }
             plan
         } else {
