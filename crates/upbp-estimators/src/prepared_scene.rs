@@ -253,7 +253,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         };
         let can_be_followed = choice.guides.len() <= self.scene.emitters().len()
             && (0..).zip(&choice.guides).all(can_follow)
-            && choice.emission_bounds(&self.bounds).radius.is_finite();
+            && (choice.focus.is_none() || choice.emission_bounds(&self.bounds).has_density_on_disc());
         let clusters = self.tree.as_ref().map(EmitterTree::clusters);
         let is_by_these = choice
             .receivers

@@ -149,7 +149,7 @@ fn emitters_are_chosen_alike_whichever_heuristic_a_render_has() {
     let text = r#"(
   version: 1,
   camera: Perspective(origin: (0, 1.2, 4), target: (0, 0.4, 0), fov_degrees: 40),
-  film: (width: 64, height: 36),
+  film: (width: 96, height: 54, crop: (x: 16, y: 9, width: 64, height: 36)),
   media: { "flame": Homogeneous(glow: 20), "haze": Homogeneous(glow: 0.1) },
   materials: { "stone": Lambert(0.6), "glass": Dielectric(1.5), "gas": Null },
   shapes: [

@@ -88,6 +88,8 @@ pub(super) fn build(boxes: &[Boxed], leaves: Leaves, pack: Pack<'_>) -> Hierarch
     for node in tree.nodes.iter_mut().filter(|node| node.is_leaf()) {
         node.set_aabb(groups[tree.primitive_indices[node.first_index as usize] as usize].bounds);
     }
+    // Nodes at other places may be deeper than the builder has left them.
+    tree.max_depth = tree.max_depth.max(tree.depth(0) + 1);
     tree.refit_all();
     let binary = Binary { boxes, leaves, members, groups, tree };
     let choices = binary.choices();
@@ -115,8 +117,9 @@ fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     tree
 }
 
-/// The boxes of groups, wider by a thousandth and some roundings, no two by the same amount, so that no pair
-/// is as good as another, and in units in which no area is too large or too small for a number.
+/// The boxes of groups, wider by a thousandth and some roundings, each by an amount of its own, so that
+/// hardly any pair is as good as another, and in units in which no area is too large or too small for a
+/// number.
 fn seen_by_builder(groups: &[Group]) -> Vec<Aabb> {
     /// The most that a box grows, relative to its extent and to its coordinates.
     const GROWTH: [f32; 2] = [1.0 / 1024.0, 16.0 * f32::EPSILON];

@@ -274,7 +274,8 @@ impl TriangleMesh {
             || Self { surface: self.surface.clone(), placement: None, bounds, own_areas: OnceLock::new() };
         let cells = || self.surface.cells(|| Cells::cover(&unplaced())).clone();
         let Some(placement) = self.placement else { return (cells(), None) };
-        let error = placement.size_in_mesh(self.rounding(&placement));
+        // Of the placement and of what is drawn: a few roundings each.
+        let error = placement.size_in_mesh(8.0 * self.rounding(&placement));
         let shared = Some(cells()).filter(|cells| cells.allow(error));
         shared.map_or_else(|| (Arc::new(Cells::cover(self)), None), |shared| (shared, Some(placement)))
     }

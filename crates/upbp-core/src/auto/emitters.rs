@@ -9,10 +9,10 @@
 //! rounds learn where on the emitters light sub-paths should start ([`guides`]).
 
 use glam::Vec3;
-use upbp_estimators::mis::{ByTechnique, Densities, MisPlan, VolumeMerge, VolumeMerges};
+use upbp_estimators::mis::{ByTechnique, Densities};
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::path::{Context, LightChunk, LightVertex};
-use upbp_estimators::scene::{Camera, EmitterId, Scene};
+use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::{
     Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet,
     effective_samples,
@@ -56,7 +56,7 @@ const SPECULAR_OF_PIECE: usize = 4096;
 const GUIDED_ROUNDS: [(f64, u32); 3] = [(0.25, 1), (0.25, 1), (0.5, 4)];
 
 /// Part of the time of a preparation that the choice of emitters may take.
-const PART: f64 = 0.2;
+pub(super) const PART: f64 = 0.2;
 /// Part of that time for a quick look at the length of light sub-paths.
 const QUICK_LOOK: f64 = 0.2;
 
@@ -104,8 +104,13 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let full = full_plan(scene, settings, techniques, &statistics, room, budget);
     let [few, full] = [few, full].map(|plan| pilot_plan(scene, settings, &plan));
     // Kernels are those of the full one, and so are the most that they may be in a medium.
-    let volume = few.mis.volume.iter().zip(&full.mis.volume).map(|(few, full)| with_scales_of(few, full));
-    let mis = MisPlan { volume: volume.collect(), ..few.mis };
+    let mut mis = few.mis;
+    for (few, full) in mis.volume.iter_mut().zip(&full.mis.volume) {
+        few.pp3d.greatest_scale = full.pp3d.greatest_scale;
+        few.pb2d.greatest_scale = full.pb2d.greatest_scale;
+        few.bp2d.greatest_scale = full.bp2d.greatest_scale;
+        few.bb1d.greatest_scale = full.bb1d.greatest_scale;
+    }
     let plan = IterationPlan { mis, ..full };
     let most = (plan.light_paths / paths[0].max(1)).max(1);
     let mut first = Vec::new();
@@ -140,21 +145,6 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         }
     }
     Ok(by_technique)
-}
-
-/// Merges in a medium as those of `few`, with the greatest scales of `full`.
-fn with_scales_of(
-    few: &VolumeMerges<VolumeMerge>,
-    full: &VolumeMerges<VolumeMerge>,
-) -> VolumeMerges<VolumeMerge> {
-    let merge =
-        |few: VolumeMerge, full: VolumeMerge| VolumeMerge { greatest_scale: full.greatest_scale, ..few };
-    VolumeMerges {
-        pp3d: merge(few.pp3d, full.pp3d),
-        pb2d: merge(few.pb2d, full.pb2d),
-        bp2d: merge(few.bp2d, full.bp2d),
-        bb1d: merge(few.bb1d, full.bb1d),
-    }
 }
 
 /// Light that small runs of light and camera sub-paths have seen, by emitter.
@@ -262,8 +252,14 @@ fn measure<S: Scene, L: Lanes>(
         _ => 1.0,
     };
     let context = Context { prepared: scene, plan };
-    let crop = scene.scene.camera().crop();
-    let pixels = u64::from(crop.width) * u64::from(crop.height);
+    // Light tracing fills the crop. Without light sub-paths, a crop shows what the whole film does there.
+    let (width, height) = scene.scene.camera().resolution();
+    let film = if plan.needs_light_paths() {
+        scene.scene.camera().crop()
+    } else {
+        PixelRect { x: 0, y: 0, width, height }
+    };
+    let pixels = u64::from(film.width) * u64::from(film.height);
     let emitters = scene.scene.emitters().len();
     let emission_probability = |emitter| f64::from(scene.emission_probability(emitter));
     let mut emission = Vec::new();
@@ -282,7 +278,7 @@ fn measure<S: Scene, L: Lanes>(
         let (index, counters) = (u64::from(index), &mut Counters::default());
         let before = (seen.light, seen.emission.len(), seen.next_event.len(), seen.contributions);
         seen.most = before.3 + room.most();
-        camera_path(&context, &map, pixel(crop, index), index, scratch, counters, seen);
+        camera_path(&context, &map, pixel(film, index), index, scratch, counters, seen);
         let pixel = seen.light - before.0;
         let emission = seen.emission[before.1..].iter_mut().map(|(_, contribution)| contribution);
         let next_events = seen.next_event[before.2..].iter_mut().map(|(.., contribution)| contribution);
@@ -290,7 +286,7 @@ fn measure<S: Scene, L: Lanes>(
         // A run of single sub-paths has no smaller one.
         room.take(seen.contributions - before.3) || light_paths.max(camera_paths) == 1
     })?;
-    // Light tracing fills all of the crop, camera sub-paths a part of it.
+    // Light tracing fills all of these pixels, camera sub-paths a part of them.
     let scale = pixels as f64 / f64::from(camera_paths);
     let mean = walks.iter().map(|seen| seen.light).sum::<f64>() / f64::from(camera_paths)
         + seen.light / pixels as f64;

@@ -84,6 +84,15 @@ impl Room {
         Ok(*plan)
     }
 
+    /// A plan with as many fewer light sub-paths as memory asks for.
+    pub(super) fn limited<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Plan {
+        let need = LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>();
+        let part = (self.light_bytes as f64 / need.max(1.0)).min(1.0);
+        let [light_paths, beam_paths] = [plan.light_paths, plan.beam_paths]
+            .map(|count| ((f64::from(count) * part) as u32).max(count.min(1)));
+        Plan { light_paths, beam_paths, ..*plan }
+    }
+
     /// Whether there is room for a number of light sub-paths, and of those with beams.
     pub(crate) fn holds<S: Scene>(&self, [paths, beam_paths]: [u32; 2], statistics: &Statistics) -> bool {
         let need = LightCounts::expected(statistics, paths, beam_paths).peak_bytes::<S::Bsdf>();

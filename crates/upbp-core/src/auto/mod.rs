@@ -15,7 +15,8 @@
 //! The pilot render grows until no other candidate is likely to be better by more than that part and until it
 //! has as many light sub-paths as the full plan, or as there is room for, but takes at most
 //! [2 %](PILOT_PART) of the work that the render is going to do, or the time that is left for the
-//! preparation.
+//! preparation. Where techniques are off that find much, emitters are chosen once more for the others; radii
+//! stay as they are.
 //!
 //! None of these samples is part of the picture: whatever is chosen, the picture is unbiased. The choice
 //! counts work and looks at no clock, so that it can be repeated, unless a limit of time holds.
@@ -78,7 +79,7 @@ const TIME_FOR_PILOT: f64 = 0.4;
 /// Part of the light of light sub-paths that is much for techniques to find that are off then.
 const MUCH: f64 = 0.2;
 /// Part of that time that is kept for what may come after pilot renders, another choice of emitters.
-const TIME_AFTER_PILOT: f64 = 0.25;
+const TIME_AFTER_PILOT: f64 = emitters::PART + TIME_FOR_VERTICES;
 /// Part of that time that another look at the length of light sub-paths may take after that.
 const TIME_FOR_VERTICES: f64 = 0.05;
 
@@ -138,7 +139,7 @@ fn choose_in<S: Scene, L: Lanes>(
     budget.step("looking around", 0.3)?;
     let allowance = budget.part(TIME_FOR_STATISTICS);
     let most = statistics::LIGHT_PATHS;
-    let statistics =
+    let mut statistics =
         statistics::measure::<S, L>(scene, settings, techniques, lanes, most, &room, &allowance)?;
     budget.step("choosing techniques", 0.5)?;
     let plan = if let Some(frozen) = given {
@@ -152,22 +153,19 @@ fn choose_in<S: Scene, L: Lanes>(
             let limits = Limits::of::<S, L>(&room);
             let mut plan = best_plan::<S, L>(scene, settings, &candidates, limits, budget);
             let missed: f64 = techniques.without(plan.techniques).iter().map(|off| found[off as usize]).sum();
-            if missed > MUCH * found.iter().sum::<f64>() {
-                // It is left to the techniques that are on.
+            if !plan.uses_light_paths() || missed > MUCH * found.iter().sum::<f64>() {
+                // What they miss is left to the techniques that are on.
                 scene.choose_emitters_by_power();
                 emitters::choose::<S, L>(scene, settings, plan.techniques, lanes, &room, budget)?;
                 let allowance = budget.part(TIME_FOR_VERTICES);
                 let few = statistics::FEW_LIGHT_PATHS;
-                let statistics = statistics::measure::<S, L>(
-                    scene,
-                    settings,
-                    plan.techniques,
-                    lanes,
-                    few,
-                    &room,
-                    &allowance,
-                )?;
-                plan.vertices_per_light_path = statistics.vertices_per_path;
+                let on = plan.techniques;
+                let again = statistics::measure::<S, L>(scene, settings, on, lanes, few, &room, &allowance)?;
+                if again.vertices_per_path > 0.0 {
+                    plan = room.limited::<S>(&plan, &again);
+                    plan.vertices_per_light_path = again.vertices_per_path;
+                    statistics = again;
+                }
             }
             plan
         } else {

@@ -66,7 +66,8 @@ pub(crate) fn choose<S: Scene>(
         Some(Looks { paths, passes: passes.collect::<Option<_>>()? })
     };
     let looks = budget.part(PART).largest(run).ok_or(RenderError::Cancelled)?;
-    let reductions = looks.relative_to(scene.scene.camera().crop());
+    let (width, height) = scene.scene.camera().resolution();
+    let reductions = looks.relative_to(PixelRect { x: 0, y: 0, width, height });
     let least =
         if scene.scene.has_specular_surfaces() { SELDOM * f64::from(PASSES * looks.paths) } else { FEW };
     scene.leave_out_volumes(|emitter| looks.are_hits_enough(emitter, &reductions, least));
@@ -83,12 +84,13 @@ fn look<S: Scene>(
 ) -> Option<Vec<Seen>> {
     let plan = &IterationPlan { iteration: PilotRun::Volumes { pass }.iteration(), ..plan.clone() };
     let context = Context { prepared: scene, plan };
-    let crop = scene.scene.camera().crop();
+    let (width, height) = scene.scene.camera().resolution();
+    let film = PixelRect { x: 0, y: 0, width, height };
     let map = LightMap::<_, _, f64>::empty();
     let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut Vec<Seen>| {
         let mut seen = Seen::default();
         let (index, counters) = (u64::from(index), &mut Counters::default());
-        camera_path(&context, &map, pixel(crop, index), index, scratch, counters, &mut seen);
+        camera_path(&context, &map, pixel(film, index), index, scratch, counters, &mut seen);
         piece.push(seen);
         true
     })?;

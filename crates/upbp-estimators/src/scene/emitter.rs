@@ -12,6 +12,15 @@ pub struct BoundingSphere {
     pub radius: f32,
 }
 
+impl BoundingSphere {
+    /// Whether single precision holds the density of light from infinity that starts on a disc as wide.
+    #[must_use]
+    pub fn has_density_on_disc(&self) -> bool {
+        let area = std::f32::consts::PI * self.radius * self.radius;
+        area.is_normal() && area.recip().is_normal()
+    }
+}
+
 /// The kind of an emitter: in which measure its points are chosen, and whether a path can hit it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EmitterKind {

@@ -28,7 +28,7 @@ use self::rooms::Places;
 use self::surfaces::{BoundaryDraft, MeshFiles};
 use crate::description::{Fnv1a, SceneDescription};
 use crate::error::SceneError;
-use crate::light::{AreaLight, Light, VolumeLight, has_density_on_disc};
+use crate::light::{AreaLight, Light, VolumeLight};
 use crate::material::Material;
 use crate::scene::{Body, ReadyScene, Surface};
 
@@ -119,7 +119,7 @@ impl Builder<'_> {
         let (mut shapes, drafts): (Vec<_>, Vec<_>) = drafts.into_iter().collect::<Option<_>>()?;
         let origin = extent::move_near_origin(&mut shapes, &mut lights, &mut camera);
         let bounds = extent::bounds(&shapes, &lights, &camera);
-        if lights.iter().any(|light| light.kind().is_infinite()) && !has_density_on_disc(&bounds) {
+        if lights.iter().any(|light| light.kind().is_infinite()) && !bounds.has_density_on_disc() {
             let message = format!(
                 "has a radius of {:e}, too small or too large for light from infinity",
                 bounds.radius

@@ -137,12 +137,6 @@ pub(super) fn disc_area(bounds: &BoundingSphere) -> f32 {
     PI * bounds.radius * bounds.radius
 }
 
-/// Whether single precision holds the density of starts on that disc.
-pub(crate) fn has_density_on_disc(bounds: &BoundingSphere) -> bool {
-    let area = disc_area(bounds);
-    area.is_normal() && area.recip().is_normal()
-}
-
 /// Draws the start of a ray in `direction`, uniformly over a disc in front of the scene that is as wide as
 /// its bounds.
 fn start_on_disc(bounds: &BoundingSphere, direction: Vec3, u: [f32; 2], digits: [f32; 2]) -> Vec3 {

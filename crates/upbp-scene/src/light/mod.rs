@@ -24,7 +24,6 @@ pub use self::area::AreaLight;
 pub use self::constant::ConstantEnvironment;
 pub use self::directional::DirectionalLight;
 pub use self::image::{EnvironmentImage, EnvironmentImageError, ImageEnvironment};
-pub(crate) use self::infinite::has_density_on_disc;
 pub use self::point::PointLight;
 pub use self::spot::{SpotCone, SpotLight};
 pub use self::sun::SunLight;
