@@ -27,12 +27,12 @@ pub enum SceneError {
         /// The expected and the found text.
         message: String,
     },
-    /// The text is read, but describes no scene: all problems.
+    /// The text is read, but describes no scene.
     #[error("{}", Listing { path: path.as_deref(), problems })]
     Invalid {
         /// The file, if the description came from one.
         path: Option<PathBuf>,
-        /// At least one.
+        /// At least one; beyond a thousand the last one says how many more there are.
         problems: Vec<Problem>,
     },
     /// A description cannot be written as text.

@@ -143,7 +143,7 @@ fn light_sub_paths_are_shared_so_that_the_error_is_least() {
     assert!(others[0].1 > 2.0 * least, "the share matters: {others:?}");
 }
 
-/// What emitters bring is told by weights, and those of the power heuristic do not tell it.
+/// Weights tell what emitters bring, and those of the power heuristic do not.
 #[test]
 fn emitters_are_chosen_alike_whichever_heuristic_a_render_has() {
     let text = r#"(
@@ -169,7 +169,7 @@ fn emitters_are_chosen_alike_whichever_heuristic_a_render_has() {
     assert_eq!(emitters(Heuristic::Power), emitters(Heuristic::Balance));
 }
 
-/// What techniques find that a plan has not got is left to the others: emitters are those of a render that
+/// Techniques that a plan has not got leave what they find to the others: emitters are those of a render that
 /// was given the techniques of the plan.
 #[test]
 fn emitters_are_chosen_for_the_techniques_of_the_plan() {

@@ -85,12 +85,7 @@ pub(super) fn build(boxes: &[Boxed], leaves: Leaves, pack: Pack<'_>) -> Hierarch
     }
     let (members, groups) = group_by_centre(boxes);
     let mut tree = binary_tree(&seen_by_builder(&groups));
-    for node in tree.nodes.iter_mut().filter(|node| node.is_leaf()) {
-        node.set_aabb(groups[tree.primitive_indices[node.first_index as usize] as usize].bounds);
-    }
-    // Nodes at other places may be deeper than the builder has left them.
-    tree.max_depth = tree.max_depth.max(tree.depth(0) + 1);
-    tree.refit_all();
+    fit(&mut tree, &groups);
     let binary = Binary { boxes, leaves, members, groups, tree };
     let choices = binary.choices();
     let mut collapse = Collapse { binary, choices, nodes: Vec::new(), pack };
@@ -115,6 +110,29 @@ fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     builder.build_ploc::<SEARCH, _>(&mut tree, boxes, indices, precision, QUICK_ROUNDS);
     ReinsertionOptimizer::default().run(&mut tree, REINSERTED, None);
     tree
+}
+
+/// Gives all nodes the boxes of what is below them. Not by obvhs's `refit_all`, whose stack is as deep as a
+/// tree before its nodes are tried at other places.
+fn fit(tree: &mut Bvh2, groups: &[Group]) {
+    let (mut order, mut waiting) = (Vec::with_capacity(tree.nodes.len()), vec![0]);
+    while let Some(index) = waiting.pop() {
+        order.push(index);
+        let node = &tree.nodes[index as usize];
+        if !node.is_leaf() {
+            waiting.extend([node.first_index, node.first_index + 1]);
+        }
+    }
+    for index in order.into_iter().rev() {
+        let node = &tree.nodes[index as usize];
+        let first = node.first_index as usize;
+        let bounds = if node.is_leaf() {
+            groups[tree.primitive_indices[first] as usize].bounds
+        } else {
+            tree.nodes[first].aabb().union(tree.nodes[first + 1].aabb())
+        };
+        tree.nodes[index as usize].set_aabb(bounds);
+    }
 }
 
 /// The boxes of groups, wider by a thousandth and some roundings, each by an amount of its own, so that

@@ -42,7 +42,7 @@ pub struct VolumeMerges<T = f64> {
     pub bb1d: T,
 }
 
-/// How a technique merges in one medium, where the scale of radii is one.
+/// The merges of a technique in one medium, where the scale of radii is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeMerge {
     /// Samples times the volume of the kernel: `n V_d`, d its dimension; 0 if the technique is off there.

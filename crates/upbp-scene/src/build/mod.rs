@@ -77,7 +77,7 @@ impl ReadyScene {
     ///
     /// # Errors
     ///
-    /// [`SceneError::Invalid`] with all problems.
+    /// [`SceneError::Invalid`] with all problems together.
     pub fn build(description: &SceneDescription, base_dir: impl AsRef<Path>) -> Result<Self, SceneError> {
         let mut builder = Builder {
             description,
