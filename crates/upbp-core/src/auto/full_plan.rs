@@ -60,12 +60,10 @@ pub(super) fn full_plan<S: Scene>(
     let wanted_beams = settings
         .beams
         .unwrap_or_else(|| enough_beams(scene, settings, statistics).min(wanted / 10).max(1))
-        .min(wanted);
-    // Need grows in proportion: a part of the sub-paths takes this part of the memory.
-    let need = LightCounts::expected(statistics, wanted, wanted_beams).peak_bytes::<S::Bsdf>();
-    let part = (room.light_bytes as f64 / need.max(1.0)).min(1.0);
-    let afford = |count: u32| ((f64::from(count) * part) as u32).max(1);
-    plan_with(scene, settings, techniques, statistics, [wanted, wanted_beams].map(afford))
+        .min(wanted)
+        .max(1);
+    let paths = room.limited::<S>([wanted, wanted_beams], statistics);
+    plan_with(scene, settings, techniques, statistics, paths)
 }
 
 /// The most light sub-paths that memory and time allow, and that do not crowd kernels.

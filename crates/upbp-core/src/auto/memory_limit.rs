@@ -84,13 +84,13 @@ impl Room {
         Ok(*plan)
     }
 
-    /// A plan with as many fewer light sub-paths as memory asks for.
-    pub(super) fn limited<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Plan {
-        let need = LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>();
+    /// As many of so many light sub-paths, and of those with beams, as there is room for, at least one if
+    /// there are any.
+    pub(super) fn limited<S: Scene>(&self, paths: [u32; 2], statistics: &Statistics) -> [u32; 2] {
+        // Need grows in proportion: a part of the sub-paths takes this part of the memory.
+        let need = LightCounts::expected(statistics, paths[0], paths[1]).peak_bytes::<S::Bsdf>();
         let part = (self.light_bytes as f64 / need.max(1.0)).min(1.0);
-        let [light_paths, beam_paths] = [plan.light_paths, plan.beam_paths]
-            .map(|count| ((f64::from(count) * part) as u32).max(count.min(1)));
-        Plan { light_paths, beam_paths, ..*plan }
+        paths.map(|count| ((f64::from(count) * part) as u32).max(count.min(1)))
     }
 
     /// Whether there is room for a number of light sub-paths, and of those with beams.

@@ -162,7 +162,8 @@ fn choose_in<S: Scene, L: Lanes>(
                 let on = plan.techniques;
                 let again = statistics::measure::<S, L>(scene, settings, on, lanes, few, &room, &allowance)?;
                 if again.vertices_per_path > 0.0 {
-                    plan = room.limited::<S>(&plan, &again);
+                    let paths = [plan.light_paths, plan.beam_paths];
+                    [plan.light_paths, plan.beam_paths] = room.limited::<S>(paths, &again);
                     plan.vertices_per_light_path = again.vertices_per_path;
                     statistics = again;
                 }
