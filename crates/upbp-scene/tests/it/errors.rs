@@ -338,11 +338,9 @@ fn scenes_in_which_light_from_infinity_has_no_density_are_refused() {
         ReadyScene::from_ron_str(&text, "").map(|_| ()).map_err(|error| error.to_string())
     };
     for light in ["Constant(1)", "Directional(direction: (0, -1, 0), irradiance: 1)"] {
-        for radius in ["1e-20", "1e20"] {
-            let error = scene(radius, light).unwrap_err();
-            let message = "too small or too large for light from infinity";
-            assert!(error.contains("scene: has a radius of 1.0") && error.contains(message), "{error}");
-        }
+        let error = scene("1e-20", light).unwrap_err();
+        let message = "too small or too large for light from infinity";
+        assert!(error.contains("scene: has a radius of 1.0") && error.contains(message), "{error}");
         assert_eq!(scene("1e-15", light), Ok(()));
     }
     assert_eq!(scene("1e-20", "Point(position: (0, 2, 0), intensity: 1)"), Ok(()));
