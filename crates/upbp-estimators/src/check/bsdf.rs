@@ -62,6 +62,10 @@ fn check_bsdf_from(bsdf: &impl Bsdf, interface: Interface, from: Vec3, seed: u64
         if sample.delta {
             rest += 1;
             let lobe = &mut dirac[usize::from(sample.to.z * from.z < 0.0)];
+            // Once for each walk.
+            if lobe.0 == 0 || (lobe.0 == 1 && draw % 2 == 1) {
+                check_dirac_reverse(bsdf, interface, from, walk, &sample, &mut random)?;
+            }
             *lobe = (lobe.0 + 1, sample.pdf);
         } else {
             observed[cell(sample.to)] += 1;
@@ -74,6 +78,38 @@ fn check_bsdf_from(bsdf: &impl Bsdf, interface: Interface, from: Vec3, seed: u64
         require(within, "a Dirac lobe is drawn with its probability", (from, count, mean))?;
     }
     compare_histogram(&observed, &expected, rest, 1.0 - total, from)
+}
+
+/// A walk the other way has the probability that a Dirac lobe reports of it, and carries as much.
+fn check_dirac_reverse(
+    bsdf: &impl Bsdf,
+    interface: Interface,
+    from: Vec3,
+    walk: Walk,
+    sample: &BsdfSample,
+    random: &mut Random,
+) -> Check {
+    /// Draws, by which a lobe is found that has at least the [least](LEAST) probability.
+    const MOST: usize = 4000;
+    const LEAST: f32 = 0.005;
+    let other = walk.other();
+    let is_back = |back: &BsdfSample| back.delta && back.to.distance(from) < 1e-3;
+    let draw = |_| bsdf.sample(sample.to, other, interface, random.next(), random.pair());
+    let back = (0..MOST).map(draw).find_map(|back| back.filter(is_back));
+    let case = (from, walk, sample, back);
+    let Some(back) = back else {
+        return require(sample.pdf_reverse < LEAST, "a Dirac lobe leads back as probably as it says", case);
+    };
+    let agrees = same(back.pdf, sample.pdf_reverse) && same(back.pdf_reverse, sample.pdf);
+    require(agrees, "a Dirac lobe leads back as probably as it says", case)?;
+    let index = |direction: Vec3| if direction.z > 0.0 { interface.above } else { interface.below };
+    let flux = |from: Vec3, walk: Walk, sample: &BsdfSample| {
+        let is_compressed = walk == Walk::Camera && from.z * sample.to.z < 0.0;
+        let ratio = if is_compressed { index(from) / index(sample.to) } else { 1.0 };
+        sample.weight * (sample.pdf / (ratio * ratio))
+    };
+    let is_same = same_spectrum(flux(from, walk, sample), flux(sample.to, other, &back));
+    require(is_same, "a Dirac lobe is reciprocal up to the squared index", case)
 }
 
 /// The rules for a single draw.

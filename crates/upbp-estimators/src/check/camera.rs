@@ -3,7 +3,7 @@
 use glam::Vec2;
 
 use super::{Check, Random, is_density, is_unit, require, same};
-use crate::scene::Camera;
+use crate::scene::{Camera, CameraRay};
 
 /// Checks the contract of [`Camera`]: that `connect` inverts `ray`, and that the density of a pixel's
 /// directions is one over its solid angle on average; that some place of the film has a ray, and that all
@@ -14,11 +14,7 @@ pub fn check_camera(camera: &impl Camera) -> Check {
     let (width, height) = camera.resolution();
     require(width > 0 && height > 0, "the film is not empty", (width, height))?;
     let crop = camera.crop();
-    let inside = crop.width > 0
-        && crop.height > 0
-        && crop.x.checked_add(crop.width).is_some_and(|end| end <= width)
-        && crop.y.checked_add(crop.height).is_some_and(|end| end <= height);
-    require(inside, "the crop is a part of the film", crop)?;
+    require(crop.is_part_of((width, height)), "the crop is a part of the film", crop)?;
     let size = Vec2::new(width as f32, height as f32);
     let mut random = Random(3);
     let mut seen = 0;
@@ -27,6 +23,7 @@ pub fn check_camera(camera: &impl Camera) -> Check {
         let u_lens = random.pair();
         let distance = 0.1 + 10.0 * random.next();
         let Some(ray) = camera.ray(film, u_lens) else { continue };
+        let distance = distance.max(least_distance(&ray));
         seen += 1;
         let case = (film, u_lens, ray);
         require(ray.origin.is_finite(), "a ray starts at a finite point", case)?;
@@ -60,12 +57,17 @@ pub fn check_camera(camera: &impl Camera) -> Check {
     Ok(())
 }
 
+/// From which on a point of a ray is told from its origin well enough, by the digits of its coordinates.
+fn least_distance(ray: &CameraRay) -> f32 {
+    0.02 * ray.origin.length()
+}
+
 /// The images that all of the lens makes of a point that is seen at `film`.
 fn check_images(camera: &impl Camera, film: Vec2, u_lens: [f32; 2], distance: f32) -> Check {
     const STEPS: u32 = 128;
     let grid = |i: u32| [i % STEPS, i / STEPS].map(|k| (k as f32 + 0.5) / STEPS as f32);
     let Some(ray) = camera.ray(film, u_lens) else { return Ok(()) };
-    let point = ray.origin + ray.direction * distance;
+    let point = ray.origin + ray.direction * distance.max(least_distance(&ray));
     let Some(connection) = camera.connect_at(point, film) else { return Ok(()) };
     let case = (film, u_lens, ray, connection);
     let is_density = is_density(connection.image_area) && connection.image_area > 0.0;

@@ -26,26 +26,45 @@ pub fn check_emitter(emitter: &impl Emitter, bounds: &BoundingSphere, receivers:
 
 fn check_densities(emitter: &impl Emitter, bounds: &BoundingSphere, receivers: &[Vec3]) -> Check {
     let mut random = Random(7);
+    let mut guided = Guided::default();
     for _ in 0..2000 {
-        check_emission(emitter, bounds, &mut random)?;
+        check_emission(emitter, bounds, &mut random, &mut guided)?;
         for &receiver in receivers {
             check_incident(emitter, bounds, receiver, &mut random)?;
         }
     }
+    guided.check()?;
+    if emitter.kind().is_infinite() {
+        check_disc(emitter, bounds, &mut random)?;
+    }
     match emitter.kind() {
-        EmitterKind::Area => receivers
-            .iter()
-            .try_for_each(|&receiver| check_area_irradiance(emitter, bounds, receiver, &mut random)),
-        EmitterKind::Point => check_point_directions(emitter, bounds, &mut random),
-        EmitterKind::Directional => Ok(()),
+        EmitterKind::Area => {
+            check_emitted_directions(emitter, bounds, &mut random)?;
+            receivers
+                .iter()
+                .try_for_each(|&receiver| check_area_irradiance(emitter, bounds, receiver, &mut random))
+        }
+        EmitterKind::Point => {
+            check_single(emitter, bounds, &mut random)?;
+            check_point_directions(emitter, bounds, &mut random)
+        }
+        EmitterKind::Directional => check_single(emitter, bounds, &mut random),
         EmitterKind::Environment => check_environment_directions(emitter, bounds, &mut random),
-        EmitterKind::Volume(_) => receivers
-            .iter()
-            .try_for_each(|&receiver| check_volume_fluence(emitter, bounds, receiver, &mut random)),
+        EmitterKind::Volume(_) => {
+            check_emitted_directions(emitter, bounds, &mut random)?;
+            receivers
+                .iter()
+                .try_for_each(|&receiver| check_volume_fluence(emitter, bounds, receiver, &mut random))
+        }
     }
 }
 
-fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Check {
+fn check_emission(
+    emitter: &impl Emitter,
+    bounds: &BoundingSphere,
+    random: &mut Random,
+    guided: &mut Guided,
+) -> Check {
     let (u_position, u_direction) = (random.pair(), random.pair());
     let Some(emission) = emitter.sample_emission(bounds, u_position, u_direction) else {
         return Ok(());
@@ -63,14 +82,18 @@ fn check_emission(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut 
         let across = offset.reject_from_normalized(emission.direction).length();
         require(across <= bounds.radius * 1.001, "light from infinity starts on the disc", emission)?;
         let disc = 1.0 / (std::f32::consts::PI * bounds.radius * bounds.radius);
-        require(same(emission.pdf_direction, disc), "the disc is sampled uniformly", emission)?;
+        require(
+            same(emission.pdf_direction, disc),
+            "the density on the disc is one over its area",
+            emission,
+        )?;
     }
     if kind == EmitterKind::Area {
         let cosine = emission.direction.dot(emission.point.normal);
         require(cosine > 0.0, "a surface emits on the side of its normal", emission)?;
     }
     let receiver = emission.point.position + emission.direction * bounds.radius;
-    check_coordinates(emitter, bounds, [u_position, u_direction], &emission, receiver)?;
+    check_coordinates(emitter, bounds, [u_position, u_direction], &emission, receiver, guided)?;
     check_bounds(emitter, bounds, &emission)?;
     let seen = emitter.hit(bounds, &emission.point, emission.direction, receiver);
     require(seen.is_some() == kind.is_hittable(), "hit answers for lights that can be hit", emission)?;
@@ -94,6 +117,24 @@ fn check_bounds(emitter: &impl Emitter, bounds: &BoundingSphere, emission: &Emis
     require(is_towards, "light goes within the angles of its emitter's bounds", (place, emission))
 }
 
+/// Starts whose coordinates are known.
+#[derive(Default)]
+struct Guided {
+    /// Which pairs are known, by the first of them.
+    axes: Option<[bool; 2]>,
+    starts: u32,
+    /// Those that the coordinates give again to most digits.
+    exact: u32,
+}
+
+impl Guided {
+    fn check(&self) -> Check {
+        let numbers = (self.exact, self.starts);
+        // The rest may be at poles and rims, where few digits are left.
+        require(10 * self.exact >= 9 * self.starts, "coordinates of most starts give them exactly", numbers)
+    }
+}
+
 /// Coordinates that are known start the same light again.
 fn check_coordinates(
     emitter: &impl Emitter,
@@ -101,9 +142,13 @@ fn check_coordinates(
     [u_position, u_direction]: [[f32; 2]; 2],
     emission: &Emission,
     receiver: Vec3,
+    guided: &mut Guided,
 ) -> Check {
     let found = emitter.emission_coordinates(bounds, &emission.point, emission.direction, receiver);
     let Some(found) = found else { return Ok(()) };
+    let axes = [found.position.is_some(), found.direction.is_some()];
+    let is_known = *guided.axes.get_or_insert(axes) == axes;
+    require(is_known, "which coordinates are known does not depend on the ray", (emission, found))?;
     let pairs = [found.position.unwrap_or(u_position), found.direction.unwrap_or(u_direction)];
     let is_number = pairs.as_flattened().iter().all(|u| (-1e-4..=1.0001).contains(u));
     require(is_number, "coordinates of a start are random numbers", (emission, found))?;
@@ -111,8 +156,55 @@ fn check_coordinates(
     // At the border rounding may draw nothing.
     let Some(again) = emitter.sample_emission(bounds, u_position, u_direction) else { return Ok(()) };
     let off = again.point.position.distance(emission.point.position);
-    let is_same = off <= 1e-3 * bounds.radius && again.direction.distance(emission.direction) <= 1e-3;
-    require(is_same, "coordinates of a start give that start", (emission, found, again))
+    let turn = again.direction.distance(emission.direction);
+    let within = |part: f32| off <= part * bounds.radius && turn <= part;
+    guided.starts += 1;
+    guided.exact += u32::from(within(1e-4));
+    require(within(1e-3), "coordinates of a start give that start", (emission, found, again))
+}
+
+/// The places on the disc in front of the scene where light from infinity starts.
+fn check_disc(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Check {
+    let mut moments: [Mean; 5] = Default::default();
+    for _ in 0..DRAWS {
+        let Some(emission) = emitter.sample_emission(bounds, random.pair(), random.pair()) else { continue };
+        let offset = (emission.point.position - bounds.centre).as_dvec3() / f64::from(bounds.radius);
+        let (tangent, bitangent) = emission.direction.as_dvec3().any_orthonormal_pair();
+        let [x, y] = [tangent, bitangent].map(|axis| axis.dot(offset));
+        for (mean, term) in moments.iter_mut().zip([x, y, x * x - 0.25, y * y - 0.25, x * y]) {
+            mean.add(term);
+        }
+    }
+    let drawn = moments.iter().filter(|moment| moment.count > 0.0);
+    drawn.into_iter().try_for_each(|moment| moment.agrees((0.0, 2e-4), "the disc is sampled uniformly"))
+}
+
+/// A light that has one point or one direction: what is emitted is what receivers on its way see.
+fn check_single(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Check {
+    let draws: Vec<_> =
+        (0..1000).filter_map(|_| emitter.sample_emission(bounds, random.pair(), random.pair())).collect();
+    let brightest = draws.iter().map(|emission| emission.radiance.mean()).fold(0.0, f32::max);
+    let densest = draws.iter().map(|emission| emission.pdf_direction).fold(0.0, f32::max);
+    // At the rim of a beam nearly nothing is left, and rounding decides of how much.
+    let close = |a: f32, b: f32, largest: f32| same(a, b) || (a - b).abs() <= 1e-3 * largest;
+    for emission in draws {
+        require(same(emission.pdf_position, 1.0), "the density of a Dirac is one", emission)?;
+        let receiver = emission.point.position + emission.direction * bounds.radius;
+        let Some(incident) = emitter.sample_incident(bounds, receiver, random.pair()) else {
+            let is_dark = emission.radiance.mean() <= 1e-3 * brightest;
+            require(is_dark, "what is emitted is seen on its way", (emission, receiver))?;
+            continue;
+        };
+        let case = (emission, incident);
+        let are_one = same(incident.pdf, 1.0) && same(incident.pdf_position, 1.0);
+        require(are_one, "the density of a Dirac is one", case)?;
+        let opposite = incident.towards_light.distance(-emission.direction) <= 1e-3;
+        require(opposite, "light is seen where it comes from", case)?;
+        let agrees = close(incident.radiance.mean(), emission.radiance.mean(), brightest)
+            && close(incident.pdf_direction, emission.pdf_direction, densest);
+        require(agrees, "what is emitted is what is seen", case)?;
+    }
+    Ok(())
 }
 
 fn check_incident(
@@ -178,6 +270,90 @@ impl Mean {
     }
 }
 
+/// Samples of light with functions of what was drawn. Their means, weighted by the light, tell draws that do
+/// not follow their densities, also where the light over its density is always the same.
+#[derive(Default)]
+struct Distribution(Vec<(f64, [f64; 6])>);
+
+impl Distribution {
+    fn add(&mut self, light: f64, functions: [f64; 6]) {
+        if light > 0.0 {
+            self.0.push((light, functions));
+        }
+    }
+
+    /// Mean of a function, and its standard error.
+    fn moment(&self, function: usize) -> (f64, f64) {
+        let light: f64 = self.0.iter().map(|(light, _)| light).sum();
+        let mean = self.0.iter().map(|(light, values)| light * values[function]).sum::<f64>() / light;
+        let squares: f64 =
+            self.0.iter().map(|(light, values)| (light * (values[function] - mean)).powi(2)).sum();
+        (mean, squares.sqrt() / light)
+    }
+
+    fn agrees(&self, other: &Self, what: &'static str) -> Check {
+        if self.0.is_empty() || other.0.is_empty() {
+            return require(self.0.is_empty() && other.0.is_empty(), what, (self.0.len(), other.0.len()));
+        }
+        (0..6).try_for_each(|function| {
+            let [own, others] = [self, other].map(|one| one.moment(function));
+            let tolerance = 5.0 * own.1.hypot(others.1) + 2e-3;
+            require((own.0 - others.0).abs() <= tolerance, what, (function, own, others))
+        })
+    }
+}
+
+/// Where an emitter starts light sub-paths: functions of a place have about the size of one.
+struct Places {
+    centre: DVec3,
+    spread: f64,
+}
+
+impl Places {
+    fn of(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Self {
+        let drawn: Vec<DVec3> = (0..1000)
+            .filter_map(|_| emitter.sample_emission(bounds, random.pair(), random.pair()))
+            .map(|emission| emission.point.position.as_dvec3())
+            .collect();
+        let centre = drawn.iter().sum::<DVec3>() / drawn.len().max(1) as f64;
+        let spread = drawn.iter().map(|place| place.distance(centre)).fold(0.0, f64::max);
+        Self { centre, spread: spread.max(f64::MIN_POSITIVE) }
+    }
+
+    fn functions(&self, place: Vec3) -> [f64; 6] {
+        let DVec3 { x, y, z } = (place.as_dvec3() - self.centre) / self.spread;
+        [x, y, z, x * x, y * y, z * z]
+    }
+}
+
+/// Directions from a surface or a volume must be drawn by their density. Directions that are drawn evenly and
+/// looked at with `hit` tell how much light goes where.
+fn check_emitted_directions(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Check {
+    let is_area = emitter.kind() == EmitterKind::Area;
+    let functions = |emission: &Emission, direction: Vec3| {
+        let Vec3 { x, y, z } = direction;
+        let cosine = if is_area { direction.dot(emission.point.normal) } else { 0.0 };
+        [x, y, z, x * y, cosine, cosine * cosine].map(f64::from)
+    };
+    let cosine = |emission: &Emission, direction: Vec3| {
+        if is_area { direction.dot(emission.point.normal).max(0.0) } else { 1.0 }
+    };
+    let (mut drawn, mut even) = (Distribution::default(), Distribution::default());
+    for _ in 0..DRAWS {
+        let Some(emission) = emitter.sample_emission(bounds, random.pair(), random.pair()) else { continue };
+        let light = emission.radiance.mean() * cosine(&emission, emission.direction);
+        let light = light / (emission.pdf_position * emission.pdf_direction);
+        drawn.add(f64::from(light), functions(&emission, emission.direction));
+        let direction = random.direction();
+        let receiver = emission.point.position + direction * bounds.radius;
+        let seen = emitter.hit(bounds, &emission.point, direction, receiver);
+        let radiance = seen.map_or(0.0, |seen| seen.radiance.mean());
+        let light = radiance * cosine(&emission, direction) / emission.pdf_position;
+        even.add(f64::from(light), functions(&emission, direction));
+    }
+    drawn.agrees(&even, "emission follows the density of directions")
+}
+
 /// The light that falls on a receiver must be the same by points for it and by points of emission. Meant for
 /// convex lights: the second way does not see that a surface hides itself.
 fn check_area_irradiance(
@@ -187,23 +363,33 @@ fn check_area_irradiance(
     random: &mut Random,
 ) -> Check {
     let (mut chosen, mut emitted) = (Mean::default(), Mean::default());
+    let (mut places_chosen, mut places_emitted) = (Distribution::default(), Distribution::default());
+    let places = Places::of(emitter, bounds, random);
     for _ in 0..DRAWS {
-        let term = emitter.sample_incident(bounds, receiver, random.pair()).map_or(0.0, |incident| {
+        let incident = emitter.sample_incident(bounds, receiver, random.pair());
+        let term = incident.map_or(0.0, |incident| {
             let cosine = incident.point.normal.dot(-incident.towards_light).max(0.0);
-            incident.radiance.mean() * cosine / (incident.distance * incident.distance * incident.pdf)
+            let term =
+                incident.radiance.mean() * cosine / (incident.distance * incident.distance * incident.pdf);
+            places_chosen.add(f64::from(term), places.functions(incident.point.position));
+            term
         });
         chosen.add(f64::from(term));
-        let term = emitter.sample_emission(bounds, random.pair(), random.pair()).map_or(0.0, |emission| {
+        let emission = emitter.sample_emission(bounds, random.pair(), random.pair());
+        let term = emission.map_or(0.0, |emission| {
             let between = receiver - emission.point.position;
             let towards = between.normalize_or_zero();
             let cosine = emission.point.normal.dot(towards).max(0.0);
             let seen = emitter.hit(bounds, &emission.point, towards, receiver);
             let radiance = seen.map_or(0.0, |seen| seen.radiance.mean());
-            radiance * cosine / (between.length_squared() * emission.pdf_position)
+            let term = radiance * cosine / (between.length_squared() * emission.pdf_position);
+            places_emitted.add(f64::from(term), places.functions(emission.point.position));
+            term
         });
         emitted.add(f64::from(term));
     }
-    chosen.agrees(emitted.value(), "both ways to choose points give the same irradiance")
+    chosen.agrees(emitted.value(), "both ways to choose points give the same irradiance")?;
+    places_chosen.agrees(&places_emitted, "both ways to choose points give the same light everywhere")
 }
 
 /// The light of a volume must be the same by points for a receiver and by points of emission, out to the same
@@ -221,19 +407,32 @@ fn check_volume_fluence(
         Ok(f64::from(radiance / (receiver.distance_squared(point.position) + near * near) / pdf))
     };
     let (mut chosen, mut emitted) = (Mean::default(), Mean::default());
+    let (mut places_chosen, mut places_emitted) = (Distribution::default(), Distribution::default());
+    let places = Places::of(emitter, bounds, random);
+    // Light that seldom gets out is seldom chosen for a receiver, and counts much where it is.
+    let is_often = |point: &EmitterPoint| {
+        let towards = (receiver - point.position).normalize_or_zero();
+        let seen = emitter.hit(bounds, point, towards, receiver);
+        seen.is_some_and(|seen| seen.pdf_incident >= 0.1 * seen.pdf_position)
+    };
     for _ in 0..DRAWS {
-        let term = match emitter.sample_incident(bounds, receiver, random.pair()) {
-            Some(incident) => fluence(&incident.point, incident.radiance.mean(), incident.pdf)?,
-            None => 0.0,
-        };
+        let mut term = 0.0;
+        if let Some(incident) = emitter.sample_incident(bounds, receiver, random.pair()) {
+            term = fluence(&incident.point, incident.radiance.mean(), incident.pdf)?;
+            let light = if is_often(&incident.point) { term } else { 0.0 };
+            places_chosen.add(light, places.functions(incident.point.position));
+        }
         chosen.add(term);
-        let term = match emitter.sample_emission(bounds, random.pair(), random.pair()) {
-            Some(emission) => fluence(&emission.point, emission.radiance.mean(), emission.pdf_position)?,
-            None => 0.0,
-        };
+        let mut term = 0.0;
+        if let Some(emission) = emitter.sample_emission(bounds, random.pair(), random.pair()) {
+            term = fluence(&emission.point, emission.radiance.mean(), emission.pdf_position)?;
+            let light = if is_often(&emission.point) { term } else { 0.0 };
+            places_emitted.add(light, places.functions(emission.point.position));
+        }
         emitted.add(term);
     }
-    chosen.agrees(emitted.value(), "both ways to choose points give the same fluence")
+    chosen.agrees(emitted.value(), "both ways to choose points give the same fluence")?;
+    places_chosen.agrees(&places_emitted, "both ways to choose points give the same light everywhere")
 }
 
 /// `∫ pdf_direction dω = 1` around a point, seen by receivers around it.
@@ -261,11 +460,24 @@ fn check_point_directions(emitter: &impl Emitter, bounds: &BoundingSphere, rando
     }
     // A cone's rim cuts through the grid: a few per cent for the narrowest that this is meant for.
     require((density - 1.0).abs() < 0.03, "the density of directions integrates to one", density)?;
+    let sources = Sources::of(emitter, bounds, random);
+    let (mut drawn, mut even) = (Distribution::default(), Distribution::default());
     for _ in 0..DRAWS {
         let emission = emitter.sample_emission(bounds, random.pair(), random.pair());
-        power.add(emission.map_or(0.0, |e| f64::from(e.radiance.mean() / e.pdf_direction)));
+        let term = emission.map_or(0.0, |e| f64::from(e.radiance.mean() / e.pdf_direction));
+        power.add(term);
+        if let Some(emission) = emission {
+            drawn.add(term, sources.functions(emission.direction));
+        }
+        let direction = sources.sample(random);
+        let receiver = position + direction * bounds.radius;
+        if let Some(incident) = emitter.sample_incident(bounds, receiver, [0.5; 2]) {
+            let term = f64::from(incident.radiance.mean()) / sources.pdf(direction);
+            even.add(term, sources.functions(direction));
+        }
     }
-    power.agrees((flux, 0.006 * flux), "emission carries the flux that receivers see")
+    power.agrees((flux, 0.006 * flux), "emission carries the flux that receivers see")?;
+    drawn.agrees(&even, "emission follows the density of directions")
 }
 
 /// A distribution of directions: every other one anywhere, and every other one in a cone around where light
@@ -300,6 +512,14 @@ impl Sources {
         (across + (1.0 - below_pole) * self.axis).as_vec3().normalize()
     }
 
+    /// Functions of a direction, about as large as one within the cone.
+    fn functions(&self, direction: Vec3) -> [f64; 6] {
+        let direction = direction.as_dvec3();
+        let (tangent, bitangent) = self.axis.any_orthonormal_pair();
+        let [x, y] = [tangent, bitangent].map(|axis| axis.dot(direction) / (2.0 * self.height).sqrt());
+        [x, y, x * x, y * y, x * y, versine(self.axis, direction) / self.height]
+    }
+
     fn pdf(&self, direction: Vec3) -> f64 {
         let is_inside = versine(self.axis, direction.as_dvec3()) <= self.height;
         0.5 / (2.0 * TAU) + if is_inside { 0.5 / (TAU * self.height) } else { 0.0 }
@@ -319,22 +539,36 @@ fn check_environment_directions(
 ) -> Check {
     let anywhere = EmitterPoint { position: bounds.centre, normal: Vec3::Z };
     let (mut density, mut flux) = (Mean::default(), Mean::default());
+    let mut all = Distribution::default();
     let sources = Sources::of(emitter, bounds, random);
     for _ in 0..20 * DRAWS {
         let direction = sources.sample(random);
         let pdf = sources.pdf(direction);
         let seen = emitter.hit(bounds, &anywhere, direction, bounds.centre);
         density.add(seen.map_or(0.0, |seen| f64::from(seen.pdf_position) / pdf));
-        flux.add(seen.map_or(0.0, |seen| f64::from(seen.radiance.mean()) / pdf));
+        let light = seen.map_or(0.0, |seen| f64::from(seen.radiance.mean()) / pdf);
+        flux.add(light);
+        all.add(light, sources.functions(direction));
     }
     density.agrees((1.0, 0.0), "the density of directions integrates to one")?;
     let (mut chosen, mut emitted) = (Mean::default(), Mean::default());
+    let (mut directions_chosen, mut directions_emitted) = (Distribution::default(), Distribution::default());
     for _ in 0..DRAWS {
-        let incident = emitter.sample_incident(bounds, bounds.centre, random.pair());
-        chosen.add(incident.map_or(0.0, |i| f64::from(i.radiance.mean() / i.pdf)));
-        let emission = emitter.sample_emission(bounds, random.pair(), random.pair());
-        emitted.add(emission.map_or(0.0, |e| f64::from(e.radiance.mean() / e.pdf_position)));
+        let mut light = 0.0;
+        if let Some(incident) = emitter.sample_incident(bounds, bounds.centre, random.pair()) {
+            light = f64::from(incident.radiance.mean() / incident.pdf);
+            directions_chosen.add(light, sources.functions(-incident.towards_light));
+        }
+        chosen.add(light);
+        let mut light = 0.0;
+        if let Some(emission) = emitter.sample_emission(bounds, random.pair(), random.pair()) {
+            light = f64::from(emission.radiance.mean() / emission.pdf_position);
+            directions_emitted.add(light, sources.functions(emission.direction));
+        }
+        emitted.add(light);
     }
     chosen.agrees(flux.value(), "next event estimation sees all of the environment")?;
-    emitted.agrees(flux.value(), "emission sees all of the environment")
+    emitted.agrees(flux.value(), "emission sees all of the environment")?;
+    directions_chosen.agrees(&all, "next event estimation follows the density of directions")?;
+    directions_emitted.agrees(&all, "emission follows the density of directions")
 }

@@ -1,15 +1,15 @@
 //! [`check_scene`]: hits, crossings and bodies of a scene agree.
 
 use glam::{Vec2, Vec3};
-use upbp_media::{Medium as _, MediumId, RaySegment};
+use upbp_media::{Medium as _, MediumId, RaySegment, Spectrum};
 
 use super::normals::Normals;
-use super::{Check, ContractViolation, Random, is_unit, require};
+use super::{Check, ContractViolation, Random, is_unit, require, same_spectrum};
 use crate::Ray;
 use crate::path::{cross_all, has_surface};
 use crate::scene::{
-    Boundary, BoundingSphere, Bsdf, Camera as _, Crossing, Emitter, EmitterId, EmitterKind, Interface,
-    PathEnd, Scene, Walk,
+    Boundary, BoundingSphere, Bsdf, Camera as _, Crossing, Emission, Emitter, EmitterId, EmitterKind,
+    EmitterPoint, Interface, PathEnd, Scene, Walk,
 };
 
 /// Checks that the questions of [`Scene`] get consistent answers along random rays through its bounds: hits
@@ -18,7 +18,8 @@ use crate::scene::{
 /// find what `intersect` does, and the bodies around a point follow from the boundaries on the way to it.
 ///
 /// Rays meet every light that has an area, and walks stop where it is: it is on no null boundary, nor on a
-/// refracting surface that another body hides. All light from infinity passes what is around everything
+/// refracting surface that another body hides; its surface shines on the side that its light starts from, and
+/// a volume as its medium does. All light from infinity passes what is around everything
 /// alike; nothing is seen from where it is said to be [hidden](Scene::hides); media have
 /// [extents](Scene::medium_extent).
 ///
@@ -91,6 +92,14 @@ fn check_lights(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random
             let is_judged = hit.as_ref().is_some_and(|hit| hit.geometric_normal.dot(direction).abs() > 1e-2);
             let is_there = !is_judged || stops_on_surface(scene, &ray);
             require(is_there, "no light is on a surface that another body hides", (index, ray))?;
+            let shines = hit.as_ref().filter(|_| is_judged).is_none_or(|hit| {
+                let point = EmitterPoint { position: hit.position, normal: hit.geometric_normal };
+                let seen = emitter.hit(bounds, &point, emission.direction, origin);
+                seen.is_some_and(|seen| !seen.radiance.is_black())
+            });
+            let is_light = shines || emission.radiance.is_black();
+            require(is_light, "a light shines on the side of its surface that it starts from", (index, ray))?;
+            check_glow(scene, emitter, &emission)?;
             starts += 1;
             met += u32::from(hit.is_some());
         }
@@ -98,6 +107,18 @@ fn check_lights(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random
         require(need_not_be_met || met > 0, "rays meet lights that have an area", (index, starts))?;
     }
     Ok(())
+}
+
+/// Checks that light which starts in a volume is that of the medium there.
+fn check_glow<S: Scene>(scene: &S, emitter: &S::Emitter, emission: &Emission) -> Check {
+    let EmitterKind::Volume(body) = emitter.kind() else { return Ok(()) };
+    let position = emission.point.position;
+    let bodies = scene.stack_at(position);
+    let Some(top) = bodies.top().filter(|top| top.body == body) else { return Ok(()) };
+    let medium = top.medium.and_then(|medium| scene.media().get(medium.0 as usize));
+    let source = medium.map_or(Spectrum::ZERO, |medium| medium.source(position));
+    let is_that = same_spectrum(source, emission.radiance);
+    require(is_that, "a volume shines as the medium in it", (body, emission, source))
 }
 
 /// Whether a walk along `ray` stops on the surface that it meets first, together with what coincides there.
@@ -184,7 +205,7 @@ fn check_hidden(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random
 /// its end.
 fn is_seen(scene: &impl Scene, origin: Vec3, direction: Vec3, distance: f32) -> bool {
     let roundings = 32.0 * f32::EPSILON * (1.0 + origin.length() / distance);
-    let ray = crate::Ray { origin, direction, t_min: 0.0, t_max: distance * (1.0 - roundings) };
+    let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * (1.0 - roundings) };
     let mut crossings = Vec::new();
     scene.is_clear(&ray, &mut crossings) && !crossings.iter().any(|crossing| crossing.scatters)
 }
@@ -193,10 +214,10 @@ fn is_seen(scene: &impl Scene, origin: Vec3, direction: Vec3, distance: f32) -> 
 const RAYS_AT_RARE: usize = 32;
 
 /// A ray from outside of everything, through `target` and beyond everything.
-fn ray_through(bounds: &BoundingSphere, target: Vec3, random: &mut Random) -> Option<crate::Ray> {
+fn ray_through(bounds: &BoundingSphere, target: Vec3, random: &mut Random) -> Option<Ray> {
     let origin = bounds.centre + random.direction() * (1.2 * bounds.radius);
     let direction = (target - origin).try_normalize()?;
-    Some(crate::Ray { origin, direction, t_min: 0.0, t_max: 4.0 * bounds.radius })
+    Some(Ray { origin, direction, t_min: 0.0, t_max: 4.0 * bounds.radius })
 }
 
 fn look_through(scene: &impl Scene, target: Vec3, random: &mut Random, normals: &mut Normals) -> Check {
@@ -207,7 +228,7 @@ fn look_through(scene: &impl Scene, target: Vec3, random: &mut Random, normals: 
 }
 
 /// Checks that a scene says so if the surface that a ray meets has a Dirac lobe.
-fn check_lobes(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check {
+fn check_lobes(scene: &impl Scene, ray: &Ray, random: &mut Random) -> Check {
     let Some(hit) = scene.intersect(ray) else { return Ok(()) };
     let Some(bsdf) = hit.boundary.bsdf() else { return Ok(()) };
     let below = hit.boundary.interior().map_or(1.0, |interior| interior.ior);
@@ -217,7 +238,7 @@ fn check_lobes(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Che
     require(told, "a scene without specular surfaces has none", (ray, hit.t, sample))
 }
 
-fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check {
+fn check_ray(scene: &impl Scene, ray: &Ray, random: &mut Random) -> Check {
     let radius = scene.bounds().radius;
     if let Some(hit) = scene.intersect(ray) {
         let case = (ray, hit.t, hit.geometric_normal, hit.shading_normal);
@@ -255,11 +276,11 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
 
     // Short of the hit nothing blocks; beyond an opaque one something does.
     let mut passed = Vec::new();
-    let before = crate::Ray { t_max: end - 1e-3 * radius, ..*ray };
+    let before = Ray { t_max: end - 1e-3 * radius, ..*ray };
     let clear = before.t_max <= before.t_min || scene.is_clear(&before, &mut passed);
     require(clear, "nothing blocks before the nearest hit", (ray, end))?;
     if hit.is_some_and(|hit| matches!(hit.boundary, Boundary::Opaque(_))) {
-        let beyond = crate::Ray { t_max: end + 1e-3 * radius, ..*ray };
+        let beyond = Ray { t_max: end + 1e-3 * radius, ..*ray };
         require(!scene.is_clear(&beyond, &mut Vec::new()), "an opaque hit blocks", (ray, end))?;
     }
 
@@ -270,13 +291,11 @@ fn check_ray(scene: &impl Scene, ray: &crate::Ray, random: &mut Random) -> Check
         return Ok(());
     }
     let mut stack = scene.stack_at(ray.origin);
-    for crossing in crossings.iter().filter(|crossing| crossing.t < t) {
-        let _ = stack.cross(crossing.interior, crossing.entering);
-    }
+    cross_all(&mut stack, &crossings[..crossings.partition_point(|crossing| crossing.t < t)]);
     let there = scene.stack_at(ray.origin + ray.direction * t);
     require(stack == there, "the bodies around a point follow from the boundaries", (ray, t, stack, there))
 }
 
-fn is_ordered(crossings: &[Crossing], ray: &crate::Ray, end: f32) -> bool {
+fn is_ordered(crossings: &[Crossing], ray: &Ray, end: f32) -> bool {
     crossings.is_sorted_by(|a, b| a.t <= b.t) && crossings.iter().all(|c| c.t > ray.t_min && c.t <= end)
 }

@@ -4,8 +4,8 @@ use glam::{Vec2, Vec3};
 use upbp_estimators::check::{check_bsdf, check_camera, check_emitter, check_medium, check_scene};
 use upbp_estimators::scene::{
     Boundary, BoundingSphere, Bsdf, BsdfEvaluation, BsdfSample, Camera, CameraConnection, CameraRay,
-    Emission, Emitter, EmitterId, EmitterKind, EmitterPoint, Hit, HitDensities, Incident, Interface,
-    LensConnection, PathEnd, PixelRect, Scene, Walk,
+    Emission, EmissionCoordinates, Emitter, EmitterId, EmitterKind, EmitterPoint, Hit, HitDensities,
+    Incident, Interface, LensConnection, PathEnd, PixelRect, Scene, Walk,
 };
 use upbp_estimators::{PreparedScene, Ray};
 use upbp_media::{
@@ -145,6 +145,13 @@ fn a_density_above_one_is_found() {
 /// A light that errs in what `.1` says.
 struct WrongLight(Light, &'static str);
 
+impl WrongLight {
+    /// Random numbers that are not even, where they are what is wrong.
+    fn warped(&self, what: &str, [u, v]: [f32; 2]) -> [f32; 2] {
+        if self.1 == what { [u * u, v] } else { [u, v] }
+    }
+}
+
 impl Emitter for WrongLight {
     fn kind(&self) -> EmitterKind {
         self.0.kind()
@@ -153,10 +160,44 @@ impl Emitter for WrongLight {
         if self.1 == "power" { 0.0 } else { self.0.power(bounds) }
     }
     fn sample_emission(&self, bounds: &BoundingSphere, a: [f32; 2], b: [f32; 2]) -> Option<Emission> {
-        self.0.sample_emission(bounds, a, b)
+        let (a, b) = (self.warped("places", a), self.warped("directions", b));
+        let emission = self.0.sample_emission(bounds, a, b)?;
+        let factor = if self.1 == "density of a Dirac" { 2.0 } else { 1.0 };
+        Some(Emission { pdf_position: emission.pdf_position * factor, ..emission })
     }
     fn sample_incident(&self, bounds: &BoundingSphere, receiver: Vec3, u: [f32; 2]) -> Option<Incident> {
-        self.0.sample_incident(bounds, receiver, u)
+        let incident = self.0.sample_incident(bounds, receiver, self.warped("next events", u))?;
+        let sign = if self.1 == "backwards" { -1.0 } else { 1.0 };
+        Some(Incident { towards_light: sign * incident.towards_light, ..incident })
+    }
+    fn pdf_passage(&self, point: &EmitterPoint) -> f32 {
+        self.0.pdf_passage(point)
+    }
+    fn pdf_incident(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        receiver: Vec3,
+        pdf_position: f32,
+    ) -> f32 {
+        self.0.pdf_incident(bounds, point, direction, receiver, pdf_position)
+    }
+    fn emission_coordinates(
+        &self,
+        bounds: &BoundingSphere,
+        point: &EmitterPoint,
+        direction: Vec3,
+        on_ray: Vec3,
+    ) -> Option<EmissionCoordinates> {
+        if !["nothing", "coordinates", "digits"].contains(&self.1) {
+            return None;
+        }
+        let found = self.0.emission_coordinates(bounds, point, direction, on_ray)?;
+        let is_unknown = self.1 == "coordinates" && direction.x > 0.0;
+        let rough = |u: f32| if self.1 == "digits" { (3e3 * u).round() / 3e3 } else { u };
+        let position = found.position.filter(|_| !is_unknown).map(|pair| pair.map(rough));
+        Some(EmissionCoordinates { position, ..found })
     }
     fn hit(
         &self,
@@ -165,6 +206,8 @@ impl Emitter for WrongLight {
         direction: Vec3,
         to: Vec3,
     ) -> Option<HitDensities> {
+        let point =
+            &EmitterPoint { normal: if self.1 == "turned" { -point.normal } else { point.normal }, ..*point };
         let hit = self.0.hit(bounds, point, direction, to)?;
         let factor = if self.1 == "density of a hit" { 2.0 } else { 1.0 };
         Some(HitDensities { pdf_position: hit.pdf_position * factor, ..hit })
@@ -178,6 +221,102 @@ fn a_light_with_a_wrong_density_is_found() {
     let light = WrongLight(sky, "density of a hit");
     let violation = check_emitter(&light, &bounds, &[Vec3::ZERO]).unwrap_err();
     assert_eq!(violation.what, "hit agrees with sample_emission");
+}
+
+#[test]
+fn draws_that_do_not_follow_their_densities_are_found() {
+    let bounds = BoundingSphere { centre: Vec3::ZERO, radius: 2.0 };
+    let scene = ReadyScene::from_ron_str(
+        "(version: 1, camera: Perspective(origin: (0, 1, 4), target: (0, 0, 0), fov_degrees: 40),
+        media: { \"flame\": Homogeneous(glow: 1) }, materials: { \"black\": Lambert(0), \"null\": Null },
+        shapes: [
+            (geometry: Quad(origin: (0, 1, 0), edge_u: (0, 0, 1), edge_v: (1, 0, 0)), material: \"black\", emission: 1),
+            (geometry: Sphere(centre: (0, -0.5, 0), radius: 0.3), material: \"null\", interior: \"flame\"),
+        ],
+        lights: [Constant(1), Sun(direction: (1, -1, 0), irradiance: 1), Directional(direction: (0, -1, 0), irradiance: 1),
+            Point(position: (0, 0.5, 0), intensity: 1),
+            Spot(position: (0, 0.5, 0), target: (1, 0, 0), intensity: 1, cutoff_degrees: 20)])",
+        "",
+    )
+    .unwrap();
+    let even = "follows the density of directions";
+    let [alike, disc] = ["both ways to choose points give the same", "the disc is sampled uniformly"];
+    let found = |light: &Light, fault| {
+        let light = WrongLight(light.clone(), fault);
+        check_emitter(&light, &bounds, &[Vec3::new(0.3, -1.2, 0.2), Vec3::new(0.4, 1.9, 0.6)])
+            .map_err(|violation| violation.what)
+    };
+    for light in scene.emitters() {
+        found(light, "nothing").unwrap();
+        let expected: &[_] = match light.kind() {
+            EmitterKind::Area | EmitterKind::Volume(_) => {
+                &[("directions", even), ("places", alike), ("next events", alike)]
+            }
+            EmitterKind::Environment => &[("directions", even), ("places", disc), ("next events", even)],
+            EmitterKind::Directional => &[("places", disc), ("backwards", "seen where it comes from")],
+            EmitterKind::Point => &[("directions", even), ("density of a Dirac", "a Dirac is one")],
+        };
+        for &(fault, what) in expected {
+            let Err(violation) = found(light, fault) else { panic!("{fault} of {light:?} is not found") };
+            assert!(violation.contains(what), "{fault} of {light:?}: {violation}");
+        }
+        let point = EmitterPoint { position: Vec3::ZERO, normal: Vec3::Z };
+        let coordinates = light.emission_coordinates(&bounds, &point, Vec3::Z, Vec3::ZERO);
+        if light.kind() == EmitterKind::Environment
+            && coordinates.is_some_and(|found| found.position.is_some())
+        {
+            assert!(found(light, "coordinates").unwrap_err().contains("does not depend on the ray"));
+            assert!(found(light, "digits").unwrap_err().contains("most starts"));
+        }
+    }
+}
+
+/// Mirrors and glass that err in what `.1` says.
+#[derive(Clone, Copy)]
+struct WrongGlass(Material, &'static str);
+
+impl Bsdf for WrongGlass {
+    fn eval(&self, _: Vec3, _: Vec3, _: Interface) -> Spectrum {
+        Spectrum::ZERO
+    }
+    fn pdf(&self, _: Vec3, _: Vec3, _: Interface) -> f32 {
+        0.0
+    }
+    fn sample(
+        &self,
+        from: Vec3,
+        walk: Walk,
+        interface: Interface,
+        u_lobe: f32,
+        u: [f32; 2],
+    ) -> Option<BsdfSample> {
+        let mut sample = self.0.sample(from, walk, interface, u_lobe, u)?;
+        if self.1 == "no reverse" {
+            sample.pdf_reverse = 0.0;
+        }
+        if self.1 == "index" && from.z * sample.to.z < 0.0 {
+            // That of light, whichever the walk.
+            sample.weight = Spectrum::ONE;
+        }
+        Some(sample)
+    }
+    fn is_connectible(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn faults_of_a_dirac_lobe_are_found() {
+    let glass = Material::Dielectric(Dielectric);
+    for interface in [Interface { above: 1.0, below: 1.5 }, Interface { above: 1.33, below: 1.1 }] {
+        check_bsdf(&WrongGlass(glass, "nothing"), interface).unwrap();
+        for (fault, expected) in [
+            ("no reverse", "a Dirac lobe leads back as probably as it says"),
+            ("index", "a Dirac lobe is reciprocal up to the squared index"),
+        ] {
+            assert_eq!(check_bsdf(&WrongGlass(glass, fault), interface).unwrap_err().what, expected);
+        }
+    }
 }
 
 /// A camera whose densities are off by factors, an infinite one for no rays, or whose connections are by a
@@ -225,6 +364,15 @@ fn faults_of_a_camera_are_found() {
     let check = |pdf, image_area, shift| check_camera(&WrongCamera { camera, pdf, image_area, shift });
     check(1.0, 1.0, Vec2::ZERO).unwrap();
     let fault = |pdf, image_area, shift| check(pdf, image_area, shift).unwrap_err().what;
+    // Coordinates of hundreds, as the usual Cornell box has.
+    let far = PerspectiveView {
+        origin: Vec3::new(278.0, 273.0, -800.0),
+        target: Vec3::new(278.0, 273.0, 0.0),
+        lens_radius: 0.0,
+        ..view
+    };
+    let crop = PixelRect { x: 0, y: 0, width: 1920, height: 1080 };
+    check_camera(&PerspectiveCamera::new(&far, 1920, 1080, crop).unwrap()).unwrap();
     assert_eq!(fault(1.02, 1.0, Vec2::ZERO), "a pixel's density is one over its solid angle");
     assert_eq!(fault(1.0, 1.0, Vec2::splat(0.5)), "connect inverts ray");
     assert_eq!(fault(1.0, 1.1, Vec2::ZERO), "images of a point have the density of connect_at");
@@ -416,6 +564,7 @@ fn faults_of_a_scene_are_found() {
         ("lights", "what is hidden is not seen"),
         ("light", "what is hidden is not seen"),
         ("lens", "what is hidden is not seen"),
+        ("turned", "a light shines on the side of its surface that it starts from"),
     ] {
         assert_eq!(check_scene(&WrongScene::new(fault)).unwrap_err().what, expected, "{fault}");
     }
