@@ -8,8 +8,8 @@
 
 use crate::Spectrum;
 
-/// Least probability of a channel, before normalisation: its inverse bounds the throughput of a passed
-/// segment.
+/// Least probability, before normalisation, of a channel that [needs](is_needed) one: the inverse of what is
+/// left of it bounds the throughput of a passed segment.
 const FLOOR: f64 = 0.05;
 
 /// Points of the quadrature over distances.
@@ -17,7 +17,8 @@ const POINTS: u32 = 256;
 
 /// The probabilities of the channels, which sum to one, from the coefficients in inverse scene units.
 pub(crate) fn channel_probabilities(sigma_s: Spectrum, sigma_t: Spectrum) -> [f64; 3] {
-    let mut alpha = [1.0 / 3.0; 3];
+    let floor = is_needed(sigma_s, sigma_t).map(|is_needed| if is_needed { FLOOR } else { 0.0 });
+    let mut alpha = normalised(floor);
     for _ in 0..64 {
         // A channel whose variance grows faster than others gets more of the samples: the fixed point has
         // equal growth in all channels that are above the floor.
@@ -27,14 +28,29 @@ pub(crate) fn channel_probabilities(sigma_s: Spectrum, sigma_t: Spectrum) -> [f6
         if !(sum > 0.0 && sum.is_finite()) {
             break;
         }
-        let floored = raised.map(|a| (a / sum).max(FLOOR));
-        let sum: f64 = floored.iter().sum();
-        alpha = floored.map(|a| a / sum);
+        alpha = normalised(std::array::from_fn(|c| (raised[c] / sum).max(floor[c])));
     }
     // With few bits the three sum to one without rounding: a segment of length zero is passed with certainty.
     let scale = f64::from(1_u32 << 20);
-    let [r, g, _] = alpha.map(|a| (a * scale).round() / scale);
-    [r, g, 1.0 - r - g]
+    let mut alpha = alpha.map(|a| (a * scale).round() / scale);
+    let missing = 1.0 - alpha.iter().sum::<f64>();
+    if let Some(largest) = alpha.iter_mut().max_by(|a, b| a.total_cmp(b)) {
+        *largest += missing;
+    }
+    alpha
+}
+
+/// Whether distances are to be drawn from each channel: those that scatter, and those that get farther than
+/// all of these. Of other channels nothing is left where they stop, and what passes is bounded by the channel
+/// that gets farthest.
+fn is_needed(sigma_s: Spectrum, sigma_t: Spectrum) -> [bool; 3] {
+    let farthest = (0..3).filter(|&c| sigma_s[c] > 0.0).map(|c| sigma_t[c]).fold(f32::INFINITY, f32::min);
+    [0, 1, 2].map(|c| sigma_s[c] > 0.0 || sigma_t[c] < farthest)
+}
+
+fn normalised(parts: [f64; 3]) -> [f64; 3] {
+    let sum: f64 = parts.iter().sum();
+    parts.map(|part| part / sum)
 }
 
 /// The second moment `M_c` of a channel, with the distance substituted by `u = 1 − e^{−σ_c t}`.
@@ -78,7 +94,9 @@ pub(crate) fn segment_growth(
         let (sigma, scattering) = (extinctions[channel], f64::from(sigma_s[channel]));
         // Relative to the transmittance of the channel, which may underflow.
         let mixed = |length: f64, factor: &dyn Fn(usize) -> f64| -> f64 {
-            (0..3).map(|k| alpha[k] * factor(k) * ((sigma - extinctions[k]) * length).exp()).sum()
+            // Infinity times nothing would be no number.
+            let drawn = (0..3).filter(|&k| alpha[k] > 0.0);
+            drawn.map(|k| alpha[k] * factor(k) * ((sigma - extinctions[k]) * length).exp()).sum()
         };
         let stops = |length: f64| {
             let density = mixed(length, &|k| extinctions[k]);
@@ -124,6 +142,32 @@ mod tests {
                     assert!(best < other * 1.01, "{chosen:?}: {best}, {alpha:?}: {other}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn channels_that_only_absorb_are_drawn_where_they_get_farther() {
+        let of = |sigma_a: [f32; 3], sigma_s: [f32; 3]| {
+            let sigma_s = Spectrum::from(sigma_s);
+            let sigma_t = Spectrum::from(sigma_a) + sigma_s;
+            let alpha = channel_probabilities(sigma_s, sigma_t);
+            (alpha, segment_growth(&alpha, sigma_s, sigma_t, 1.0, [1.0; 3]))
+        };
+        // The one channel that scatters is like a grey medium.
+        let (alpha, growth) = of([0.0, 200.0, 200.0], [2.0, 0.0, 0.0]);
+        assert_eq!(alpha, [1.0, 0.0, 0.0]);
+        // But for the quadrature.
+        assert!((growth - 1.0).abs() < 2e-3, "{growth}");
+        let (alpha, growth) = of([0.0, 0.0, 200.0], [2.0, 2.0, 0.0]);
+        assert_eq!(alpha, [0.5, 0.5, 0.0]);
+        assert!((growth - 1.0).abs() < 2e-3, "{growth}");
+        // Clear red has to pass.
+        let (alpha, growth) = of([0.0, 1.0, 4.0], [0.0, 0.5, 0.5]);
+        assert!(alpha.iter().all(|a| *a > 0.04) && growth.is_finite(), "{alpha:?} {growth}");
+        // Rounding goes to a channel that is drawn.
+        for sigma in [0.7, 1.1, 1.9, 3.1] {
+            let (alpha, _) = of([0.3, 0.0, 9.0], [1.0, sigma, 0.0]);
+            assert!(alpha[2] == 0.0 && alpha[0] + alpha[1] == 1.0, "{alpha:?}");
         }
     }
 

@@ -114,28 +114,10 @@ impl Homogeneous {
         Ok(self)
     }
 
-    /// Absorption coefficient in inverse scene units.
-    #[must_use]
-    pub const fn absorption(&self) -> Spectrum {
-        self.sigma_a
-    }
-
-    /// Scattering coefficient in inverse scene units.
-    #[must_use]
-    pub const fn scattering(&self) -> Spectrum {
-        self.sigma_s
-    }
-
     /// Extinction coefficient in inverse scene units: absorption plus scattering.
     #[must_use]
     pub const fn extinction(&self) -> Spectrum {
         self.sigma_t
-    }
-
-    /// Radiance `L_e` of an opaque stretch in W m⁻² sr⁻¹.
-    #[must_use]
-    pub const fn emission(&self) -> Spectrum {
-        self.emission
     }
 
     /// Light of one channel that a stretch sends to its start, W m⁻² sr⁻¹: `∫₀^ℓ j e^{−σ_t t} dt`.

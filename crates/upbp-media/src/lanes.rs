@@ -86,7 +86,7 @@ impl Lanes for [f64; 3] {
 /// moment of the mixture that is drawn anew on each segment hardly grows. Not tuned.
 const LEAST_RATIO: f32 = 1.25;
 
-/// Factor by which the second moment may grow per segment without lanes, and be of no account.
+/// Growth of the second moment per segment below which lanes are not worth their time.
 const LEAST_GROWTH: f64 = 1.01;
 
 /// The probability of each lane to be the hero of a walk through `media`: equal shares for all lanes that
@@ -97,7 +97,6 @@ const LEAST_GROWTH: f64 = 1.01;
 pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
     let largest = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(0.0, f32::max);
     let least = |lanes: &Spectrum| (0..3).map(|lane| lanes[lane]).fold(f32::INFINITY, f32::min);
-    let turns_differ = |medium: &M, a: usize, b: usize| medium.scatters() && medium.phase().differs(a, b);
     let profits = |medium: &M| {
         let far_apart = |lanes| largest(&lanes) >= LEAST_RATIO * least(&lanes);
         let differ = medium.lane_extinctions().is_some_and(far_apart)
@@ -107,13 +106,30 @@ pub fn lane_probabilities<M: Medium>(media: &[M]) -> Option<[f64; 3]> {
     if !media.iter().any(profits) {
         return None;
     }
-    let differ = |medium: &M, a: usize, b: usize| {
-        turns_differ(medium, a, b) || medium.lane_extinctions().is_some_and(|lanes| lanes[a] != lanes[b])
-    };
-    let is_new = |lane: usize| (0..lane).all(|other| media.iter().any(|medium| differ(medium, lane, other)));
+    let is_new = |lane: usize| (0..lane).all(|other| differ(media, lane, other));
     let drawn = [0, 1, 2].map(is_new);
     let count = drawn.iter().filter(|is_drawn| **is_drawn).count();
     (count > 1).then(|| drawn.map(|is_drawn| if is_drawn { 1.0 / count as f64 } else { 0.0 }))
+}
+
+/// Whether walks through `media` with lanes of these probabilities find what scatters in any channel: each
+/// lane is drawn, or does not differ from one that is.
+#[must_use]
+pub fn lanes_cover<M: Medium>(media: &[M], probabilities: [f64; 3]) -> bool {
+    let is_drawn = |lane: usize| probabilities[lane] > 0.0;
+    (0..3).all(|lane| (0..3).any(|other| is_drawn(other) && (other == lane || !differ(media, lane, other))))
+}
+
+/// Whether two lanes differ in any of the media.
+fn differ<M: Medium>(media: &[M], a: usize, b: usize) -> bool {
+    media.iter().any(|medium| {
+        turns_differ(medium, a, b) || medium.lane_extinctions().is_some_and(|lanes| lanes[a] != lanes[b])
+    })
+}
+
+/// Whether two channels of a medium scatter into other directions.
+fn turns_differ<M: Medium>(medium: &M, a: usize, b: usize) -> bool {
+    medium.scatters() && medium.phase().differs(a, b)
 }
 
 #[cfg(test)]
@@ -238,6 +254,16 @@ mod tests {
         // Lobes apart triple the second moment of what scatters, the square of an albedo of one half, and
         // roulette doubles it.
         assert_eq!(of(1.0, [0.99, 0.0, -0.99]), Some([1.0 / 3.0; 3]));
+    }
+
+    #[test]
+    fn lanes_that_are_not_drawn_are_like_one_that_is() {
+        let (half, media) =
+            ([0.5, 0.5, 0.0], |sigma_s| [medium([0.0; 3], [2.0; 3]), medium([0.0; 3], sigma_s)]);
+        assert!(lanes_cover(&media([1.0, 4.0, 1.0]), half) && lanes_cover(&media([1.0, 4.0, 4.0]), half));
+        assert!(!lanes_cover(&media([1.0, 4.0, 2.0]), half) && !lanes_cover(&media([0.0, 0.0, 1.0]), half));
+        assert!(lanes_cover(&media([1.0, 4.0, 2.0]), [0.3, 0.3, 0.4]));
+        assert!(!lanes_cover(&media([1.0, 4.0, 4.0]), [1.0, 0.0, 0.0]));
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub use self::basis::orthonormal_basis;
 pub use self::error::MediaError;
 pub use self::homogeneous::Homogeneous;
 pub use self::lane_values::LaneValues;
-pub use self::lanes::{Lanes, lane_probabilities};
+pub use self::lanes::{Lanes, lane_probabilities, lanes_cover};
 pub use self::medium::Medium;
 pub use self::medium_stack::{BodyId, Crossed, Interior, MediumId, MediumStack};
 pub use self::phase::{
