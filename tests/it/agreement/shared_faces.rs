@@ -45,7 +45,7 @@ impl Body {
         (near < far).then_some([near, far])
     }
 
-    fn shape(&self, placed: &DAffine3, is_mesh: bool) -> String {
+    fn shape(&self, placed: &DAffine3, is_mesh: bool, medium: Option<&str>) -> String {
         let at = |i: usize| format!("{:?}", placed.transform_point3(self.corner(i)).as_vec3());
         let geometry = if is_mesh {
             // The corners of each face, counter-clockwise from outside.
@@ -62,7 +62,8 @@ impl Body {
             format!("Box(min: {}, max: {})", at(0), at(7))
         };
         let material = if self.refracts { format!("g{}", self.rank) } else { "null".to_owned() };
-        format!("(geometry: {geometry}, material: \"{material}\", priority: {}),", self.rank)
+        let interior = medium.map(|name| format!("interior: \"{name}\", ")).unwrap_or_default();
+        format!("(geometry: {geometry}, material: \"{material}\", {interior}priority: {}),", self.rank)
             .replace("Vec3", "")
     }
 }
@@ -109,12 +110,29 @@ fn placement() -> impl Strategy<Value = (DAffine3, bool)> {
 
 /// A material for each rank, of an index of its own.
 fn scene(bodies: &[Body], placed: &DAffine3, is_mesh: bool) -> ReadyScene {
-    let shapes: String = bodies.iter().map(|body| body.shape(placed, is_mesh)).collect();
+    let shapes: String = bodies.iter().map(|body| body.shape(placed, is_mesh, None)).collect();
     let material = |rank: u32| format!("\"g{rank}\": Dielectric({:?}), ", 1.1 + 0.1 * f64::from(rank));
     let materials = (0..8).map(material).collect::<Vec<_>>().concat();
     let text = format!(
         "(version: 1, camera: Perspective(origin: (90, 0, 0), target: (0, 0, 0), fov_degrees: 40),
           materials: {{ {materials} \"null\": Null }}, shapes: [{shapes}], lights: [Constant(1)])"
+    );
+    ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// Media that light of some colours passes and others do not; walks draw from a mixture.
+const MEDIA: [&str; 3] = ["haze", "smoke", "vacuum"];
+
+/// Index-matched bodies of the media with these numbers, in the first one.
+fn scene_of_media(bodies: &[Body], media: &[usize]) -> ReadyScene {
+    let medium = |body: &Body| Some(MEDIA[media[body.rank as usize]]).filter(|name| *name != "vacuum");
+    let shapes: String =
+        bodies.iter().map(|body| body.shape(&DAffine3::IDENTITY, false, medium(body))).collect();
+    let text = format!(
+        "(version: 1, camera: Perspective(origin: (90, 0, 0), target: (0, 0, 0), fov_degrees: 40),
+          outside: \"haze\", media: {{ \"haze\": Homogeneous(sigma_a: (0.3, 0.6, 0.9), sigma_s: (0.1, 0.2, 0.3)),
+          \"smoke\": Homogeneous(sigma_a: (1, 0.1, 0.1), sigma_s: (0.1, 0.1, 0.4)) }},
+          materials: {{ \"null\": Null }}, shapes: [{shapes}], lights: [Point(position: (80, 0, 0), intensity: 1)])"
     );
     ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
@@ -243,6 +261,51 @@ proptest! {
             let target = Target::Infinity(direction);
             let clear = clear_edge::<_, f64>(&scene, &stretches[0].stack, start, &target, &mut Vec::new());
             prop_assert_eq!(clear.is_some(), surfaces == 0);
+        }
+    }
+
+    /// With media whose densities depend on where an edge is cut: a walk along it, one back, and a connection
+    /// have to agree. Faces of index-matched boxes coincide to the bit.
+    #[test]
+    fn walks_and_connections_cut_edges_at_the_same_places(
+        bodies in bodies(),
+        media in vec(0..MEDIA.len(), 8),
+        lines in vec(line(), 12),
+    ) {
+        let bodies: Vec<_> = bodies.into_iter().map(|body| Body { refracts: false, ..body }).collect();
+        let scene = scene_of_media(&bodies, &media);
+        for (origin, direction) in lines {
+            let line = Line { origin, direction, placed: DAffine3::IDENTITY };
+            let Some(stretches) = stretches(&scene, &bodies, &line) else { continue };
+            let mut stream = Stream::new(1, 0, StreamKind::Camera, 0);
+            let ends = [line.at(0.0), line.at(f64::from(SIDE))];
+            let stacks = ends.map(|end| scene.stack_at(end));
+            let target = Target::Medium(ends[1]);
+            let connected = clear_edge::<_, f64>(&scene, &stacks[0], ends[0], &target, &mut Vec::new());
+            let connected = connected.expect("nothing refracts");
+            let mut walk = |from: usize| {
+                let between = ends[1 - from] - ends[from];
+                let direction = between.normalize();
+                let mut edge_trace: EdgeTrace<Material> = EdgeTrace::new();
+                edge_trace.trace(
+                    &scene, ends[from], direction, &stacks[from], 0.0, Extent::ToSurface, (), &mut stream,
+                );
+                let t = between.length();
+                let span = edge_trace.spans.iter().rfind(|span| span.start <= t).expect("the first one");
+                edge_trace.density_to(&scene, span, t)
+            };
+            let [forward, backward] = [walk(0), walk(1)];
+            for (walked, expected) in [
+                (forward.pass_probability, connected.pass_probability),
+                (forward.stop_at_end, connected.stop_at_end),
+                (forward.stop_at_start, connected.stop_at_start),
+                (backward.pass_probability, connected.pass_probability),
+                (backward.stop_at_end, connected.stop_at_start),
+                (backward.stop_at_start, connected.stop_at_end),
+            ] {
+                let close = (walked - expected).abs() <= 1e-3 * expected;
+                prop_assert!(close, "{forward:?} {backward:?} {connected:?} {stretches:?}");
+            }
         }
     }
 }

@@ -73,7 +73,7 @@ pub(crate) fn arrive<'a, S: Scene, L: Lanes>(
 
 /// Densities for the weights of the next vertex, of a vertex that has scattered; `scale` is that of kernel
 /// radii there.
-pub(crate) fn scatter<S: Scene, D: Densities, L: Lanes>(
+pub(crate) fn depart<S: Scene, D: Densities, L: Lanes>(
     context: &Context<'_, S>,
     mis: &VertexMis<D, L>,
     interaction: &Interaction<S::Bsdf>,

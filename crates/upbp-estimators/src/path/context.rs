@@ -25,11 +25,12 @@ impl<S: Scene> Clone for Context<'_, S> {
 impl<S: Scene> Copy for Context<'_, S> {}
 
 impl<S: Scene> Context<'_, S> {
-    /// Distance that must be known along a ray of a walk that has stopped in media `stops` times, from within
-    /// the bodies of `stack`: `all` of it if somebody else asks for that.
+    /// How far a ray is followed from within the bodies of `stack`, by a walk that has stopped in media
+    /// `stops` times: to the next surface if `all` is asked for, in a dense medium, and at every 32nd stop,
+    /// else until the walk stops.
     ///
-    /// Where rounding has taken a walk out of a body, and its ray leads away from there, nothing but the end
-    /// of the ray may tell: the walk would scatter for ever in a medium without end, in full light.
+    /// A walk that rounding has taken out of its body, and that heads away from it, meets no boundary that
+    /// would tell, and would scatter for ever in a medium without end. The end of one ray in 32 does.
     #[inline]
     pub(crate) fn extent(&self, all: bool, stops: u32, stack: &MediumStack) -> Extent {
         /// Stops after which the bodies are put to the proof.

@@ -222,7 +222,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         let medium = medium_of(scene, &self.start);
         let mut span = MediumSpan { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
         self.enter(scene, &span, &mut flight, stream);
-        if (1..=corrections).any(|i| self.cross(scene, &mut span, &mut flight, i, stream)) {
+        if (1..=corrections).any(|i| self.cross(scene, &mut span, &mut flight, i, i < corrections, stream)) {
             return None;
         }
         let mut ray =
@@ -252,7 +252,8 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                     return correction;
                 }
                 self.crossings.push(self.found[i]);
-                if self.cross(scene, &mut span, &mut flight, self.crossings.len(), stream) {
+                let more = i + 1 < before && self.found[i + 1].t == self.found[i].t;
+                if self.cross(scene, &mut span, &mut flight, self.crossings.len(), more, stream) {
                     return None;
                 }
             }
@@ -273,7 +274,8 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 }
                 for i in before..self.found.len() {
                     self.crossings.push(self.found[i]);
-                    if self.cross(scene, &mut span, &mut flight, self.crossings.len(), stream) {
+                    let more = i + 1 < self.found.len();
+                    if self.cross(scene, &mut span, &mut flight, self.crossings.len(), more, stream) {
                         return None;
                     }
                 }
@@ -378,13 +380,15 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         self.stop.is_some() && flight.extent == Extent::ToStop
     }
 
-    /// Goes on behind the last of the first `crossings` crossings; whether the walk has stopped before.
+    /// Goes on behind the last of the first `crossings` crossings, unless there are `more` at its place;
+    /// whether the walk has stopped before.
     fn cross<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
         span: &mut MediumSpan<L>,
         flight: &mut Flight<L>,
         crossings: usize,
+        more: bool,
         stream: &mut Stream,
     ) -> bool {
         if crossings == 1 {
@@ -394,7 +398,11 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         if self.end.cross(crossing.interior, crossing.entering) != upbp_media::Crossed::Done {
             self.conflicts += 1;
         }
-        // An invisible boundary between two parts of the same medium changes nothing, not even a density.
+        // Boundaries that coincide lead from the medium before them to the one behind. An invisible boundary
+        // between two parts of the same medium changes nothing, not even a density.
+        if more {
+            return false;
+        }
         let medium = medium_of(scene, &self.end);
         if medium == span.medium {
             return false;

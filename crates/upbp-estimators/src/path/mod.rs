@@ -8,7 +8,7 @@ mod interaction;
 mod vertex;
 mod visibility;
 
-pub(crate) use arrival::{Arrival, Arrived, arrive, scatter};
+pub(crate) use arrival::{Arrival, Arrived, arrive, depart};
 pub use context::{Context, Scratch};
 pub(crate) use crossing::{cross_all, has_surface};
 pub use edge::{EdgeTrace, Extent, MediumSpan};

@@ -5,7 +5,9 @@ use upbp_media::{BodyId, Lanes, MediumStack};
 
 use crate::film_sample::Output;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
-use crate::path::{CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, ray_origin};
+use crate::path::{
+    CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, cross_all, ray_origin,
+};
 use crate::random::Stream;
 use crate::scene::{
     BoundingSphere, Crossing, Emitter, EmitterId, EmitterKind, Incident, PathEnd, Scene, Walk,
@@ -23,7 +25,7 @@ pub(crate) fn next_events<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let plan = context.plan;
     if plan.next_events == 0.0
-        || !plan.lengths.contain(vertex.depth + 1)
+        || !plan.lengths.contains(vertex.depth + 1)
         || context.hides_from_both(sides, PathEnd::Lights)
     {
         return;
@@ -146,8 +148,6 @@ fn choose_point<E: Emitter>(
 
 /// Whether `body` counts at the end of an edge that starts in the bodies of `stack`.
 fn is_in_body(mut stack: MediumStack, crossings: &[Crossing], body: BodyId) -> bool {
-    for crossing in crossings {
-        let _ = stack.cross(crossing.interior, crossing.entering);
-    }
+    cross_all(&mut stack, crossings);
     stack.top().is_some_and(|top| top.body == body)
 }
