@@ -66,12 +66,8 @@ impl PerspectiveCamera {
         let half_width = (0.5 * f64::from(view.horizontal_fov)).tan();
         let half_size =
             Vec2::new(half_width as f32, (half_width * f64::from(height) / f64::from(width)) as f32);
-        let fits = |start: u32, length: u32, whole: u32| {
-            length > 0 && start.checked_add(length).is_some_and(|end| end <= whole)
-        };
         let valid = (0.0..std::f32::consts::PI).contains(&view.horizontal_fov)
-            && fits(crop.x, crop.width, width)
-            && fits(crop.y, crop.height, height)
+            && crop.is_part_of((width, height))
             && half_size.is_finite()
             && half_size.min_element() > 0.0
             && view.lens_radius.is_finite()

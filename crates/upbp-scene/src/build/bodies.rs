@@ -39,8 +39,8 @@ pub(super) fn rank(drafts: &[SurfaceDraft], geometry: &SceneGeometry) -> Result<
     let mut bodies: Vec<Body> = Vec::with_capacity(drafts.len());
     for ((place, &(shape, inside)), priority) in drafts.iter().enumerate().zip(0..) {
         let ior = inside.ior.unwrap_or_else(|| {
-            let around = shapes_around(&boxes, centre(geometry.shape(shape))).into_iter().rev();
-            let mut lower = around.filter(|other| *other < place);
+            let centre = centre(geometry.shape(shape));
+            let mut lower = shapes_around(&boxes, centre, |other| other < place).into_iter().rev();
             let surrounding =
                 lower.find(|other| surrounds(drafts[*other].0, geometry.shape(shape), geometry));
             surrounding.map_or(1.0, |other| bodies[other].interior.ior)
@@ -76,11 +76,15 @@ pub(super) fn touch((min, max): (Vec3, Vec3), (other_min, other_max): (Vec3, Vec
     min.cmple(other_max + rounding).all() && other_min.cmple(max + rounding).all()
 }
 
-/// The shapes whose boxes hold a point, in their order: whatever lies inside of a shape has the centre of its
-/// box in that of the shape. In a scene of a million there is no time to ask each about each.
-pub(super) fn shapes_around(boxes: &BoxTree, point: Vec3) -> Vec<usize> {
+/// Those of some shapes whose boxes hold a point, in their order: whatever lies inside of a shape has the
+/// centre of its box in that of the shape. In a scene of a million there is no time to ask each about each.
+pub(super) fn shapes_around(boxes: &BoxTree, point: Vec3, is_one: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut around = Vec::new();
-    boxes.for_each_around(point, |index| around.push(index));
+    boxes.for_each_around(point, |index| {
+        if is_one(index) {
+            around.push(index);
+        }
+    });
     around.sort_unstable();
     around
 }
@@ -97,11 +101,11 @@ impl Builder<'_> {
         let Places { drafts, geometry, boxes } = places;
         for (index, _) in drafts.iter().enumerate().filter(|(_, draft)| !draft.emission.is_black()) {
             let lamp = places.shape(index);
-            let is_around = |outer: &usize| {
-                let is_opaque = drafts[*outer].boundary.inside().is_none() && !rooms.contains(outer);
-                is_opaque && is_buried(lamp, ShapeId(*outer as u32), geometry)
-            };
-            if let Some(outer) = shapes_around(boxes, centre(lamp)).into_iter().find(is_around) {
+            let is_opaque = |outer: usize| drafts[outer].boundary.inside().is_none();
+            let is_around =
+                |outer: &usize| !rooms.contains(outer) && is_buried(lamp, ShapeId(*outer as u32), geometry);
+            let mut opaque = shapes_around(boxes, centre(lamp), is_opaque).into_iter();
+            if let Some(outer) = opaque.find(is_around) {
                 self.problem(self.shape_item(index), self.message_of_room(outer));
             }
         }
@@ -112,15 +116,14 @@ impl Builder<'_> {
     pub(super) fn check_bodies_count(&mut self, rooms: &[usize], places: Places<'_>) {
         let Places { drafts, geometry, boxes } = places;
         let mut bodies = drafts_of_bodies(drafts);
-        let around = |id: ShapeId| -> Vec<_> {
+        let around = |id: ShapeId, is_one: &dyn Fn(usize) -> bool| {
             let shape = geometry.shape(id);
-            let around = shapes_around(boxes, centre(shape)).into_iter();
-            around.filter(|outer| is_inside(shape, places.shape(*outer))).collect()
+            let is_around = |outer| is_one(outer) && is_inside(shape, places.shape(outer));
+            shapes_around(boxes, centre(shape), is_around)
         };
+        let is_opaque = |outer: usize| drafts[outer].boundary.inside().is_none() && !rooms.contains(&outer);
         for &(id, _) in &bodies {
-            let is_opaque =
-                |outer: &usize| drafts[*outer].boundary.inside().is_none() && !rooms.contains(outer);
-            if let Some(outer) = around(id).into_iter().find(is_opaque) {
+            if let Some(&outer) = around(id, &is_opaque).first() {
                 let outer = self.shape_item(outer);
                 let message = format!(
                     "lies inside of the opaque {outer}: it would be nowhere (a basin is made of quads)"
@@ -130,9 +133,10 @@ impl Builder<'_> {
         }
         bodies.sort_by_key(|(_, inside)| inside.priority);
         for &(id, Inside { priority, .. }) in &bodies {
-            let priority_of = |outer: usize| Some((drafts[outer].boundary.inside()?.priority, outer));
-            let outer = around(id).into_iter().filter_map(priority_of);
-            if let Some((other, outer)) = outer.filter(|(other, _)| *other > priority).min() {
+            let priority_of = |outer: usize| drafts[outer].boundary.inside().map(|inside| inside.priority);
+            let is_higher = |outer| priority_of(outer).is_some_and(|other| other > priority);
+            let outer = around(id, &is_higher).into_iter();
+            if let Some((other, outer)) = outer.map(|outer| (priority_of(outer).unwrap_or(0), outer)).min() {
                 let message = format!(
                     "lies inside of {}, whose priority {other} is higher than its own {priority}: it would be nowhere",
                     self.shape_item(outer)

@@ -14,7 +14,8 @@ impl Builder<'_> {
     pub(super) fn camera(&mut self) -> Option<PerspectiveCamera> {
         let film = &self.description.film;
         let (width, height) = (film.width.get(), film.height.get());
-        let crop = film.crop.map_or(PixelRect { x: 0, y: 0, width, height }, |crop| PixelRect {
+        let whole = PixelRect::whole((width, height));
+        let crop = film.crop.map_or(whole, |crop| PixelRect {
             x: crop.x,
             y: crop.y,
             width: crop.width.get(),
@@ -46,7 +47,6 @@ impl Builder<'_> {
             );
             self.problem("camera", message);
         }
-        let whole = PixelRect { x: 0, y: 0, width, height };
         if view.origin == view.target {
             self.problem("camera", "`origin` and `target` are the same point");
         } else if PerspectiveCamera::new(&view, width, height, whole).is_none() {

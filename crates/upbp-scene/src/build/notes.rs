@@ -54,7 +54,8 @@ impl Builder<'_> {
     }
 
     /// Notes bodies both of whose faces are met as one, so that light passes as if there was nothing.
-    pub(super) fn note_thin_bodies(&mut self, places: Places<'_>) {
+    /// `origin` is the point that has become the origin.
+    pub(super) fn note_thin_bodies(&mut self, places: Places<'_>, origin: Vec3) {
         let mut known = BTreeMap::new();
         let is_thin = |index: usize| {
             if !matches!(places.drafts[index].boundary, BoundaryDraft::Refracting(..)) {
@@ -76,11 +77,12 @@ impl Builder<'_> {
         };
         let thin: Vec<_> = (0..places.drafts.len()).filter_map(is_thin).collect();
         if let [(index, thickness, largest), others @ ..] = &thin[..] {
+            let from = if origin == Vec3::ZERO { String::new() } else { format!(" from {origin}") };
             self.note(
                 self.shape_item(*index),
                 format!(
-                    "is {thickness} thick, and is not seen at coordinates up to {largest}: surfaces that are nearer to each \
-                     other than 5e-6 of their coordinates are met as one{}",
+                    "is {thickness} thick, and is not seen at coordinates up to {largest}{from}: surfaces that are nearer \
+                     to each other than 5e-6 of their coordinates are met as one{}",
                     and_others(others.len(), ["is", "are"])
                 ),
             );

@@ -4,7 +4,7 @@ use glam::Vec3;
 use upbp_accel::{BoxTree, SceneGeometry, Shape, ShapeId};
 use upbp_media::{Homogeneous, Medium};
 
-use super::bodies::shapes_around;
+use super::bodies::{shapes_around, touch};
 use super::builder::Builder;
 use super::lights;
 use super::surfaces::SurfaceDraft;
@@ -32,15 +32,9 @@ impl Places<'_> {
     /// The opaque shapes that a point is inside of, in their order.
     pub(super) fn rooms_around(&self, point: Vec3) -> Vec<usize> {
         let is_room =
-            |index: &usize| self.drafts[*index].boundary.inside().is_none() && self.is_in(point, *index);
-        shapes_around(self.boxes, point).into_iter().filter(is_room).collect()
+            |index: usize| self.drafts[index].boundary.inside().is_none() && self.is_in(point, index);
+        shapes_around(self.boxes, point, is_room)
     }
-}
-
-/// Whether the boxes of two shapes overlap.
-fn boxes_meet(a: &Shape, b: &Shape) -> bool {
-    let [(min, max), (other_min, other_max)] = [a, b].map(Shape::aabb);
-    min.cmple(other_max).all() && other_min.cmple(max).all()
 }
 
 /// Something that shines.
@@ -83,7 +77,7 @@ impl Builder<'_> {
             Source::Shape(index) if *index == room => {
                 matches!(places.shape(room), Shape::Mesh(mesh) if mesh.signed_volume() < 0.0)
             }
-            Source::Shape(index) => boxes_meet(places.shape(*index), places.shape(room)),
+            Source::Shape(index) => touch(places.shape(*index).aabb(), places.shape(room).aabb()),
         };
         if sources.iter().any(|source| rooms.iter().all(|room| is_in(source, *room))) {
             return;

@@ -268,7 +268,7 @@ impl Builder<'_> {
             let materials = read.material_count();
             if part.is_none() && materials > 1 {
                 let message = format!("has {materials} materials, and all of it is one shape: with `part` a shape takes the triangles of one of them");
-                self.note(format!("mesh `{file}`"), message);
+                self.note_once(format!("mesh `{file}`"), message);
             }
             if read.lacks_normals() && smooth == SmoothingAngle::ZERO {
                 self.note_once(

@@ -239,15 +239,19 @@ impl EnvironmentImage {
     ///
     /// The middle of the image is at −z, its top at +y, and its right half, as seen from inside, at +x.
     pub(super) fn lookup(&self, direction: Vec3) -> (Spectrum, f32) {
+        let Place { x, y, .. } = self.place_of(direction);
+        let radiance = self.pixels[y * self.width + x];
+        (radiance, (f64::from(radiance.luminance()) / self.total_luminance) as f32)
+    }
+
+    fn place_of(&self, direction: Vec3) -> Place {
         let longitude = direction.x.atan2(-direction.z);
         let column = (longitude / TAU + 0.5) * self.width as f32;
         // The arc tangent keeps the angle at the poles, where the arc cosine has no digits.
         let polar = direction.x.hypot(direction.z).atan2(direction.y);
         let row = polar * FRAC_1_PI * self.height as f32;
-        let x = (column as usize).min(self.width - 1);
-        let y = (row as usize).min(self.height - 1);
-        let radiance = self.pixels[y * self.width + x];
-        (radiance, (f64::from(radiance.luminance()) / self.total_luminance) as f32)
+        let (x, y) = ((column as usize).min(self.width - 1), (row as usize).min(self.height - 1));
+        Place { x, y, column, polar }
     }
 
     /// Draws a direction of the image, in proportion to the luminance.
@@ -266,16 +270,9 @@ impl EnvironmentImage {
 
     /// The random numbers with which [`sample`](Self::sample) draws a direction.
     fn coordinates(&self, direction: Vec3) -> [f32; 2] {
-        let longitude = direction.x.atan2(-direction.z);
-        let column = (longitude / TAU + 0.5) * self.width as f32;
-        let polar = f64::from(direction.x.hypot(direction.z).atan2(direction.y));
-        let row = polar * std::f64::consts::FRAC_1_PI * self.height as f64;
-        let x = (column as usize).min(self.width - 1);
-        let y = (row as usize).min(self.height - 1);
+        let Place { x, y, column, polar } = self.place_of(direction);
         let (top, bottom) = (polar_angle(self.height, y), polar_angle(self.height, y + 1));
-        // Differences of cosines as products, which keep their digits at the poles.
-        let belt = |from: f64, to: f64| (0.5 * (from + to)).sin() * (0.5 * (to - from)).sin();
-        let v = (belt(top, polar) / belt(top, bottom)).clamp(0.0, 1.0) as f32;
+        let v = (belt(top, f64::from(polar)) / belt(top, bottom)).clamp(0.0, 1.0) as f32;
         let u = (column - x as f32).clamp(0.0, 1.0);
         let between = |ends: &[f32], step: usize, within: f32| {
             let start = if step == 0 { 0.0 } else { ends[step - 1] };
@@ -284,6 +281,21 @@ impl EnvironmentImage {
         let row = &self.columns[y * self.width..(y + 1) * self.width];
         [between(&self.rows, y, v), between(row, x, u)]
     }
+}
+
+/// The pixel of a direction.
+struct Place {
+    x: usize,
+    y: usize,
+    /// Columns from the left edge of the image.
+    column: f32,
+    /// Angle from the top.
+    polar: f32,
+}
+
+/// `cos from − cos to`, as a product, which keeps its digits at the poles.
+fn belt(from: f64, to: f64) -> f64 {
+    2.0 * (0.5 * (from + to)).sin() * (0.5 * (to - from)).sin()
 }
 
 /// Whether a file begins as pictures of the Radiance format do, or is named so.
@@ -320,11 +332,10 @@ fn polar_angle(height: usize, y: usize) -> f64 {
     std::f64::consts::PI * y as f64 / height as f64
 }
 
-/// Solid angle of each pixel of row `y`: `(2π/w) (cos θ₀ − cos θ₁)`, the difference as a product.
+/// Solid angle of each pixel of row `y`: `(2π/w) (cos θ₀ − cos θ₁)`.
 fn pixel_solid_angle(width: usize, height: usize, y: usize) -> f64 {
     let (top, bottom) = (polar_angle(height, y), polar_angle(height, y + 1));
-    let belt = 2.0 * (0.5 * (top + bottom)).sin() * (0.5 * (bottom - top)).sin();
-    std::f64::consts::TAU / width as f64 * belt
+    std::f64::consts::TAU / width as f64 * belt(top, bottom)
 }
 
 /// The step of a cumulative table that `u` falls on, and the place within the step, in `[0, 1)`.
