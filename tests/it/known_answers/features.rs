@@ -1,13 +1,18 @@
 //! Layers for denoisers against closed forms: walls seen directly, by a mirror and through glass, a medium.
 
-use upbp_core::{FeatureImages, Settings, TechniqueSet};
+use upbp_core::{FeatureImages, Roulette, Settings, TechniqueSet};
 use upbp_testing::{analytic, renderer};
 
 /// Features of what a camera at the origin sees along −z.
 fn features(scene: &str, iterations: u32) -> FeatureImages {
+    features_with(Roulette::Off, scene, iterations)
+}
+
+fn features_with(roulette: Roulette, scene: &str, iterations: u32) -> FeatureImages {
     let scene = analytic::scene(&(analytic::narrow_camera([0.0; 3], [0.0, 0.0, -1.0], 4) + scene));
     let techniques = TechniqueSet::PT.into();
-    let settings = Settings { techniques, features: true, ..Settings::default() };
+    let roulette = Some(roulette);
+    let settings = Settings { techniques, roulette, features: true, ..Settings::default() };
     let mut renderer = renderer(&scene, settings);
     (0..iterations).for_each(|_| {
         renderer.iterate();
@@ -48,8 +53,19 @@ fn mirrors_and_clear_boundaries_are_looked_through() {
     let wall =
         "(geometry: Quad(origin: (5, -4, -8), edge_u: (0, 0, 12), edge_v: (0, 8, 0)), material: \"red\")";
     let body = "(geometry: Box(min: (2, -1, -3), max: (3, 1, -1)), material: \"still\")";
-    let features = features(&format!("{MATERIALS}, shapes: [{mirror}, {wall}, {body}], {LIGHT}"), 2);
-    assert_all(&features, [0.3, 0.15, 0.05], [-1.0, 0.0, 0.0], 7.0);
+    let scene = format!("{MATERIALS}, shapes: [{mirror}, {wall}, {body}], {LIGHT}");
+    assert_all(&features(&scene, 2), [0.3, 0.15, 0.05], [-1.0, 0.0, 0.0], 7.0);
+
+    // Roulette ends half of the walks at the mirror, of which nothing is seen: not the mirror.
+    let iterations = 2000;
+    let features = features_with(Roulette::Below(1.0), &scene, iterations);
+    let five_errors = 5.0 * 0.5 / f64::from(iterations).sqrt();
+    for (pixel, &depth) in features.depth.iter().enumerate() {
+        let [albedo, normal] = [&features.albedo, &features.normal].map(|image| image.pixels[pixel]);
+        assert!((f64::from(albedo[0]) - 0.3).abs() < 0.6 * five_errors, "{albedo:?}");
+        assert!((f64::from(normal[0]) + 0.5).abs() < five_errors && normal[1] == 0.0, "{normal:?}");
+        assert!((depth - 7.0).abs() < 2e-2, "{depth}");
+    }
 }
 
 #[test]

@@ -29,7 +29,7 @@ pub(crate) fn bb1d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             let photons = &map.beams[index as usize];
             if kernel > 0.0
                 && photons.medium == medium
-                && plan.lengths.contain(edge.depth + photons.depth)
+                && plan.lengths.contains(edge.depth + photons.depth)
                 && let Some(light) = photons.vertex_at(context, approach.t_segment)
                 && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), (t, scale))
             {

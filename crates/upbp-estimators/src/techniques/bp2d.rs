@@ -26,7 +26,7 @@ pub(crate) fn bp2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let tests = map.beam_tree.around_point(vertex.position, kernel.radius(), |index, t, distance2| {
         let beam = &map.beams[index as usize];
         if beam.medium == medium
-            && plan.lengths.contain(vertex.depth + beam.depth)
+            && plan.lengths.contains(vertex.depth + beam.depth)
             && let Some(light) = beam.vertex_at(context, t)
         {
             merge(context, Technique::Bp2d, &light, vertex, kernel.value(distance2), out);

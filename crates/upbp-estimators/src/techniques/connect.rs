@@ -32,7 +32,7 @@ pub(crate) fn connections<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let factor = map.vertices.len() as f64 / (f64::from(plan.connections) * f64::from(plan.light_paths));
     for _ in 0..stream.round(plan.connections) {
         let light = &map.vertices[stream.index(map.vertices.len())];
-        if plan.lengths.contain(vertex.depth + light.depth + 1) {
+        if plan.lengths.contains(vertex.depth + light.depth + 1) {
             connect(context, vertex, sides, light, factor, crossings, out);
             out.observer.call(Technique::Connect, 0);
         }

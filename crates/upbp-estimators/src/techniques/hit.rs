@@ -9,7 +9,7 @@ use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::Context;
 use crate::path::{CameraEdge, EdgeTrace, MediumSpan};
 use crate::random::Stream;
-use crate::scene::{Bsdf, Emitter, EmitterId, EmitterPoint, Hit, HitDensities, Scene, Walk};
+use crate::scene::{Bsdf, Emitter, EmitterId, EmitterPoint, HitDensities, Scene, Walk};
 use crate::technique::Technique;
 
 /// Emission of media along the whole ray to the next surface.
@@ -25,7 +25,7 @@ pub(crate) fn emission_along<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let Context { prepared, plan } = *context;
-    if plan.mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
+    if plan.mis.hit == 0.0 || !plan.lengths.contains(edge.depth) {
         return;
     }
     let may_have_others = prepared.has_volume_emitters() && edge.depth > 1 && !edge.mis.is_alone();
@@ -131,24 +131,6 @@ fn weight_of_hit<S: Scene, D: Densities, L: Lanes>(
     )
 }
 
-/// The camera sub-path has hit a surface that may shine.
-#[expect(clippy::too_many_arguments, reason = "the state of one hit, used here only")]
-pub(crate) fn emitter_hit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
-    context: &Context<'_, S>,
-    hit: &Hit<S::Bsdf>,
-    direction: Vec3,
-    receiver: Vec3,
-    mis_edge: &Edge<L>,
-    throughput: Spectrum,
-    edge: &CameraEdge<O::Densities, L>,
-    out: &mut Output<'_, O>,
-) {
-    if let Some(emitter) = hit.emitter {
-        let point = EmitterPoint { position: hit.position, normal: hit.geometric_normal };
-        shine(context, emitter, &point, -direction, receiver, mis_edge, throughput, edge, out);
-    }
-}
-
 /// The camera sub-path has left the scene.
 pub(crate) fn environment<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
@@ -185,8 +167,8 @@ pub(crate) fn environment<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 }
 
 /// An emitter's light at the end of a camera sub-path.
-#[expect(clippy::too_many_arguments, reason = "the state of one hit, used here only")]
-fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
+#[expect(clippy::too_many_arguments, reason = "the state of one hit")]
+pub(crate) fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     emitter: EmitterId,
     point: &EmitterPoint,
@@ -198,7 +180,7 @@ fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     out: &mut Output<'_, O>,
 ) {
     let Context { prepared, plan } = *context;
-    if plan.mis.hit == 0.0 || !plan.lengths.contain(edge.depth) {
+    if plan.mis.hit == 0.0 || !plan.lengths.contains(edge.depth) {
         return;
     }
     let Some(light) = prepared.scene.emitters().get(emitter.0 as usize) else { return };

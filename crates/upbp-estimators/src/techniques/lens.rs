@@ -19,7 +19,7 @@ pub(crate) fn next_events_at_lens<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Si
     out: &mut Output<'_, O>,
 ) {
     let (Context { prepared, plan }, film) = (*context, out.film);
-    if plan.next_events == 0.0 || !plan.lengths.contain(1) || prepared.lens_emitters(film).is_empty() {
+    if plan.next_events == 0.0 || !plan.lengths.contains(1) || prepared.lens_emitters(film).is_empty() {
         return;
     }
     for _ in 0..stream.round(plan.next_events) {

@@ -17,7 +17,7 @@ mod surf;
 pub(crate) use bb1d::bb1d;
 pub(crate) use bp2d::bp2d;
 pub(crate) use connect::connections;
-pub(crate) use hit::{emission_along, emitter_hit, environment};
+pub(crate) use hit::{emission_along, environment, shine};
 pub(crate) use lens::next_events_at_lens;
 pub(crate) use light_tracing::light_tracing;
 pub(crate) use nee::next_events;

@@ -29,7 +29,7 @@ pub(crate) fn pb2d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             let photon = &map.vertices[index as usize];
             if kernel > 0.0
                 && matches!(photon.interaction, Interaction::Medium(other) if other == medium)
-                && plan.lengths.contain(edge.depth + photon.depth)
+                && plan.lengths.contains(edge.depth + photon.depth)
                 && let Some(vertex) = edge.vertex_at(context, edge_trace, (span, medium), (t, scale))
             {
                 merge(context, Technique::Pb2d, photon, &vertex, kernel, out);

@@ -27,7 +27,7 @@ pub(crate) fn pp3d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let tests = map.medium.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
         let photon = &map.vertices[index as usize];
         if matches!(photon.interaction, Interaction::Medium(other) if other == medium)
-            && plan.lengths.contain(vertex.depth + photon.depth)
+            && plan.lengths.contains(vertex.depth + photon.depth)
         {
             merge(context, Technique::Pp3d, photon, vertex, kernel.value(distance2), out);
         }

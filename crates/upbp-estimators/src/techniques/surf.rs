@@ -31,7 +31,7 @@ pub(crate) fn surf<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let ahead = |index| map.read_ahead(index);
     let tests = map.surface.in_ball_ahead(vertex.position, kernel.radius(), ahead, |index, distance2| {
         let photon = &map.vertices[index as usize];
-        if plan.lengths.contain(vertex.depth + photon.depth)
+        if plan.lengths.contains(vertex.depth + photon.depth)
             && lies_on(surface, vertex, photon, kernel.radius())
         {
             merge(context, Technique::Surf, photon, vertex, kernel.value(distance2), out);

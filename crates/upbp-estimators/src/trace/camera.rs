@@ -10,11 +10,11 @@ use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, ray_origin, scatter,
+    Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, depart, ray_origin,
 };
 use crate::random::{Stream, StreamKind};
 use crate::roulette::Survival;
-use crate::scene::{Camera, Scene, Walk};
+use crate::scene::{Camera, EmitterPoint, Hit, Scene, Walk};
 use crate::technique::{Layer, Technique};
 use crate::techniques;
 
@@ -90,9 +90,6 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             Arrival::Vertex(arrived) => arrived,
             Arrival::Escaped => {
                 techniques::environment(context, edge_trace, &edge, &mut out);
-                if !scattered_before {
-                    walk.features = Features::NONE;
-                }
                 break;
             }
             Arrival::Absorbed => break,
@@ -115,13 +112,20 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             edge.mis.start,
             in_medium,
         );
-        if !in_medium && let Some(hit) = &edge_trace.hit {
-            techniques::emitter_hit(context, hit, direction, origin, &mis_edge, throughput, &edge, &mut out);
+        if !in_medium
+            && let Some(Hit { emitter: Some(emitter), position, geometric_normal, .. }) = edge_trace.hit
+        {
+            let point = EmitterPoint { position, normal: geometric_normal };
+            techniques::shine(context, emitter, &point, from, origin, &mis_edge, throughput, &edge, &mut out);
         }
         if plan.features && !scattered_before {
             let Arrived { interaction, position, distance, .. } = &arrived;
             travelled += distance;
-            walk.features = Features::at(scene, interaction, *position, from, throughput, travelled);
+            let features = Features::at(scene, interaction, *position, from, throughput, travelled);
+            // Not a mirror: roulette may end the walk there. What is black is seen.
+            if interaction.is_connectible() || features.albedo.is_black() {
+                walk.features = features;
+            }
         }
         if depth == plan.lengths.max {
             out.counters.cut_walks += u64::from(arrived.interaction.is_connectible());
@@ -192,7 +196,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         stops += u32::from(in_medium);
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
-            mis: scatter(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),
+            mis: depart(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),
             connections: plan.mis.connections(),
             depth,
         };

@@ -9,7 +9,7 @@ use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
     Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE, MediumSpan,
-    PhotonBeam, Scratch, arrive, ray_origin, scatter,
+    PhotonBeam, Scratch, arrive, depart, ray_origin,
 };
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
@@ -114,7 +114,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         };
         if connectible {
             if plan.mis.light_tracing > 0.0
-                && plan.lengths.contain(depth + 1)
+                && plan.lengths.contains(depth + 1)
                 && !context.hides_from_both(&sides, PathEnd::Lens)
             {
                 light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
@@ -153,7 +153,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             origin: ray_origin(&interaction, position, scattered.direction),
             direction: scattered.direction,
             stack: sides.towards(scattered.transmitted).clone(),
-            mis: scatter(context, &mis, &interaction, scale, &scattered),
+            mis: depart(context, &mis, &interaction, scale, &scattered),
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,
             infinite: false,
