@@ -176,8 +176,8 @@ impl<'a> Allowance<'a> {
         Halt { canceller: self.canceller, deadline }
     }
 
-    /// The time that is left over the time that `work` took. Infinite without a limit.
-    pub(crate) fn left_over(&self, work: Duration) -> f64 {
+    /// Ratio of the time that is left to the time that `work` took; infinite without a limit.
+    pub(crate) fn time_ratio(&self, work: Duration) -> f64 {
         self.time.map_or(f64::INFINITY, |time| {
             time.saturating_sub(self.start.elapsed()).as_secs_f64() / work.as_secs_f64().max(1e-9)
         })
@@ -208,7 +208,7 @@ impl<'a> Allowance<'a> {
             let began = Instant::now();
             let Some(result) = run(part, &halt) else { return best };
             best = Some(result);
-            let next = (part * self.left_over(began.elapsed())).min(1.0);
+            let next = (part * self.time_ratio(began.elapsed())).min(1.0);
             if part >= 1.0 || next < 2.0 * part {
                 return best;
             }
@@ -275,12 +275,12 @@ mod tests {
     fn more_is_done_as_long_as_there_is_time() {
         let canceller = Canceller::default();
         let second = Duration::from_secs(1);
-        assert_eq!(Allowance::new(&canceller, None).left_over(second), f64::INFINITY);
-        let left = Allowance::new(&canceller, Some(1e6)).left_over(second);
+        assert_eq!(Allowance::new(&canceller, None).time_ratio(second), f64::INFINITY);
+        let left = Allowance::new(&canceller, Some(1e6)).time_ratio(second);
         assert!(left > 0.9e6 && left <= 1e6, "{left}");
         let none = Allowance::new(&canceller, Some(0.0));
         assert!(none.halt().now() && none.is_limited());
-        assert_eq!(none.left_over(second), 0.0);
+        assert_eq!(none.time_ratio(second), 0.0);
     }
 
     #[test]

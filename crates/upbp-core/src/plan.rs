@@ -53,15 +53,12 @@ pub struct Plan {
 impl Plan {
     /// Whether any technique uses light sub-paths.
     pub(crate) fn uses_light_paths(&self) -> bool {
-        !self.techniques.without(TechniqueSet::PT).is_empty()
+        self.techniques.intersects(TechniqueSet::LIGHT_PATHS)
     }
 
     /// The light sub-paths that the samples of a technique come from.
     pub(crate) const fn paths_of(&self, technique: Technique) -> u32 {
-        match technique {
-            Technique::Bp2d | Technique::Bb1d => self.beam_paths,
-            _ => self.light_paths,
-        }
+        if technique.uses_beams() { self.beam_paths } else { self.light_paths }
     }
 
     /// The part of the camera sub-paths that make the queries of a technique.
@@ -74,15 +71,19 @@ impl Plan {
         let radii = &self.radii;
         let lengths = [radii.surf, radii.pp3d, radii.pb2d, radii.bp2d, radii.bb1d];
         let possible = |x: &f32| (0.0..=LARGEST_RADIUS).contains(x);
+        let merges = [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bp2d, Technique::Bb1d];
+        let mut radii_of = merges.into_iter().zip(lengths);
         if self.techniques.is_empty() {
             Err("techniques: expected at least one".into())
-        } else if self.light_paths == 0 && !self.techniques.without(TechniqueSet::PT).is_empty() {
+        } else if self.light_paths == 0 && self.uses_light_paths() {
             Err(format!("light_paths: expected at least 1 for {}", self.techniques))
         } else if self.beam_paths > self.light_paths {
             Err(format!(
                 "beam_paths: expected at most light_paths ({}), found {}",
                 self.light_paths, self.beam_paths
             ))
+        } else if self.beam_paths == 0 && self.techniques.iter().any(Technique::uses_beams) {
+            Err(format!("beam_paths: expected at least 1 for {}", self.techniques))
         } else if ![self.connections, self.next_events].iter().all(|mean| PER_VERTEX.contains(mean)) {
             Err(format!(
                 "connections, next_events: expected {PER_VERTEX:?}, found {} and {}",
@@ -96,6 +97,10 @@ impl Plan {
             Err(format!("vertices_per_light_path: expected a number, found {}", self.vertices_per_light_path))
         } else if !(lengths.iter().all(possible) && possible(&radii.floor)) {
             Err(format!("radii: expected lengths up to {LARGEST_RADIUS:e}, found {radii:?}"))
+        } else if let Some((technique, _)) =
+            radii_of.find(|(technique, radius)| self.techniques.has(*technique) && !(*radius > 0.0))
+        {
+            Err(format!("radii.{}: expected a number above 0, since the plan has it", technique.name()))
         } else if !radii.field.is_valid(lengths.into_iter().fold(0.0, f32::max)) {
             Err(format!(
                 "radii.field: expected positive factors, of which the greatest is at most {} times the least, \
@@ -267,6 +272,18 @@ pub(crate) mod tests {
         assert!(without.validate().unwrap_err().contains("techniques"));
         assert!(wrong(|p| p.next_events = 5000.0).contains("next_events"));
         assert!(wrong(|p| p.vertices_per_light_path = f64::INFINITY).contains("vertices"));
-        assert!(FrozenPlan::from_ron("(plan: (techniques: \"pt\", from: 0))").is_err());
+        assert!(wrong(|p| p.radii.surf = 0.0).contains("radii.surf: expected a number above 0"));
+        assert!(wrong(|p| p.techniques = TechniqueSet::ALL).contains("beam_paths: expected at least 1"));
+        let text = FrozenPlan { plan: plan(), emitters: Arc::default() }.to_ron();
+        for (place, more) in
+            [("light_paths:", "from: 0, "), ("surf: 0.001", "most_mean_free_path: Some(1), ")]
+        {
+            assert_eq!(text.matches(place).count(), 1, "{text}");
+            let error = FrozenPlan::from_ron(&text.replace(place, &(more.to_owned() + place))).unwrap_err();
+            assert!(
+                error.to_string().contains("nexpected field") || error.to_string().contains("nknown field"),
+                "{error}"
+            );
+        }
     }
 }

@@ -69,6 +69,7 @@ impl Radii {
 /// `γ = 1/(d + 4)` for a kernel of `d` dimensions balances variance and squared bias of what merges alone can
 /// find, and is consistent, since `0 < γ < 1/d` (section 5.1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RadiusSchedule {
     /// Radius of surface merging, scene units, as all in iteration 0 where `φ` is one; 0 where it is off.
     pub surf: f32,
@@ -119,17 +120,7 @@ impl RadiusSchedule {
 
     /// The kernels of an iteration where `φ` is one.
     pub(crate) fn kernels(&self, iteration: u64) -> Kernels {
-        let kernel = |technique, make: fn(f32) -> Kernel| {
-            let radius = self.at(technique, iteration as f64);
-            if radius > 0.0 { make(radius) } else { Kernel::NONE }
-        };
-        Kernels {
-            surf: kernel(Technique::Surf, Kernel::disc),
-            pp3d: kernel(Technique::Pp3d, Kernel::ball),
-            pb2d: kernel(Technique::Pb2d, Kernel::parabolic_disc),
-            bp2d: kernel(Technique::Bp2d, Kernel::parabolic_disc),
-            bb1d: kernel(Technique::Bb1d, Kernel::parabolic_line),
-        }
+        Kernels::from_fn(|technique| Kernel::of(technique, self.at(technique, iteration as f64)))
     }
 
     /// Most mean free paths of a radius in a medium in an iteration.

@@ -80,8 +80,9 @@ pub fn effective_samples(samples: impl IntoIterator<Item = f64>) -> f64 {
     if count.is_finite() { count } else { 0.0 }
 }
 
-/// Steps towards probabilities that reproduce themselves. With many, the emitter that the samples at hand
-/// favour takes all from others like it, as far as another technique finds their light too.
+/// Steps towards probabilities that reproduce themselves. More would trust the samples too far: of emitters
+/// that are alike, the one that they happen to favour would take all, where another technique finds the light
+/// of the others too.
 const ROUNDS: u32 = 4;
 
 /// Power and an even choice keep at least this share.

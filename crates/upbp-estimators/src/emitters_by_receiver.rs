@@ -61,13 +61,6 @@ enum Region {
     Shares(Vec<(u16, u16)>),
 }
 
-impl Default for ReceiverShares {
-    /// Shares of which nothing is learnt: the tree alone chooses.
-    fn default() -> Self {
-        Self { nodes: vec![Region::Shares(Vec::new())] }
-    }
-}
-
 impl ReceiverShares {
     /// The shares of what was seen within `bounds`, or anywhere if nothing was seen there:
     /// receivers far out in clear air would take up the depth of the tree.
@@ -92,10 +85,10 @@ impl ReceiverShares {
     fn end(&self, index: usize, depth: u32, clusters: usize) -> Option<usize> {
         match self.nodes.get(index)? {
             Region::Shares(shares) => {
-                let sum: u32 = shares.iter().map(|&(_, share)| u32::from(share)).sum();
+                let sum: u64 = shares.iter().map(|&(_, share)| u64::from(share)).sum();
                 let is_valid = shares.is_sorted_by(|a, b| a.0 < b.0)
                     && shares.last().is_none_or(|&(last, _)| (last as usize) < clusters)
-                    && sum <= u32::from(SHARES);
+                    && sum <= u64::from(SHARES);
                 is_valid.then_some(index + 1)
             }
             &Region::Sides { axis, at, blend, upper } => {

@@ -32,8 +32,7 @@ impl Kernels {
             let is_held = ends.iter().all(|factor| kernel.scaled(*factor).radius() > 0.0);
             if is_held { kernel } else { Kernel::NONE }
         };
-        let Self { surf, pp3d, pb2d, bp2d, bb1d } = self;
-        Self { surf: held(surf), pp3d: held(pp3d), pb2d: held(pb2d), bp2d: held(bp2d), bb1d: held(bb1d) }
+        self.map(held)
     }
 
     /// The least radius of those that merge on surfaces and of those that do in media, scene units; infinite
@@ -61,7 +60,7 @@ impl PathLengths {
     /// Whether a path of `edges` edges is rendered.
     #[inline]
     #[must_use]
-    pub const fn contain(self, edges: u32) -> bool {
+    pub const fn contains(self, edges: u32) -> bool {
         self.min <= edges && edges <= self.max
     }
 }
@@ -95,8 +94,8 @@ pub struct IterationPlan {
     pub periods: MergePeriods,
     /// Ranks of the pixels whose turn it is to make them, each below its period.
     pub turns: PerMerge<u32>,
-    /// Largest coordinates at which the least of the kernels on surfaces, and of those in media, is wide
-    /// enough, where the scale of radii is one; infinite without merges.
+    /// Largest coordinates at which single precision still resolves the smallest kernel, on surfaces and in
+    /// media, where the scale of radii is one; infinite without merges.
     pub resolved: [f32; 2],
     /// Counts and volumes for the weights.
     pub mis: MisPlan,
@@ -201,7 +200,11 @@ impl IterationPlan {
     #[must_use]
     pub fn new<S: Scene>(scene: &S, choices: &IterationChoices) -> Self {
         let IterationChoices { techniques, light_paths, radius_field, .. } = *choices;
-        let kernels = choices.kernels.held_by(&radius_field);
+        let of_set = |technique| {
+            let known = choices.kernels.get(technique).filter(|_| techniques.has(technique));
+            known.copied().unwrap_or(Kernel::NONE)
+        };
+        let kernels = Kernels::from_fn(of_set).held_by(&radius_field);
         let beam_paths = choices.beam_paths.min(light_paths);
         let periods = choices.periods;
         let on = |technique, value: f64| {
@@ -222,12 +225,15 @@ impl IterationPlan {
             VolumeMerges::from_fn(|technique| {
                 let kernel = kernels.get(technique).unwrap_or(&Kernel::NONE);
                 let width = width(kernel, mean_free_path);
-                let count = if medium.scatters() { merge(technique, kernel) / (1.0 + width) } else { 0.0 };
                 let most = *choices.mean_free_paths.get(technique).unwrap_or(&f32::INFINITY);
                 let scale = (most * mean_free_path).max(resolved) / kernel.radius();
                 // A host may not know the mean free path.
                 let is_limited = most.is_finite() && mean_free_path >= 0.0 && scale > 0.0;
-                VolumeMerge { count, width, greatest_scale: if is_limited { scale } else { f32::INFINITY } }
+                let greatest_scale = if is_limited { scale } else { f32::INFINITY };
+                let is_held = kernel.scaled(radius_field.least().min(greatest_scale)).radius() > 0.0;
+                let merges = medium.scatters() && is_held;
+                let count = if merges { merge(technique, kernel) / (1.0 + width) } else { 0.0 };
+                VolumeMerge { count, width, greatest_scale }
             })
         };
         // Expected samples of one connection: draws per vertex over stored vertices per light path.
@@ -390,6 +396,12 @@ impl IterationPlan {
     pub(crate) fn per_photon(&self, technique: Technique) -> f32 {
         let paths = if technique.uses_beams() { self.beam_paths } else { self.light_paths };
         self.periods.period(technique) as f32 / paths as f32
+    }
+
+    /// The light sub-paths that are traced: all, or none if no technique uses any.
+    #[must_use]
+    pub fn traced_light_paths(&self) -> u32 {
+        if self.needs_light_paths() { self.light_paths } else { 0 }
     }
 
     /// Whether light sub-paths are of any use.

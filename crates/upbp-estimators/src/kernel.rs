@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use crate::technique::Technique;
+
 /// A radial kernel in one, two or three dimensions, normalised to integrate to one.
 ///
 /// Points use constant kernels for the three-dimensional and the surface estimate, parabolic (Epanechnikov)
@@ -47,6 +49,18 @@ impl Kernel {
             return Self::NONE;
         }
         Self { shape, radius, peak, falloff, effective_volume }
+    }
+
+    /// The kernel of a technique; [`NONE`](Self::NONE) of one that does not merge.
+    #[must_use]
+    pub fn of(technique: Technique, radius: f32) -> Self {
+        match technique {
+            Technique::Surf => Self::disc(radius),
+            Technique::Pp3d => Self::ball(radius),
+            Technique::Pb2d | Technique::Bp2d => Self::parabolic_disc(radius),
+            Technique::Bb1d => Self::parabolic_line(radius),
+            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => Self::NONE,
+        }
     }
 
     /// Constant on a disc: surface merging.

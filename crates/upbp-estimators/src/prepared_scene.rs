@@ -64,10 +64,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         let camera = scene.camera();
         let (width, height) = camera.resolution();
         let crop = camera.crop();
-        let inside = |start: u32, size: u32, whole: u32| {
-            size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
-        };
-        if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {
+        if !crop.is_part_of((width, height)) {
             return Err(PrepareError::Crop { width, height, crop });
         }
         let from_infinity = from_infinity::<S, f64>(scene, &bounds);
@@ -198,7 +195,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         self.choice = choice;
     }
 
-    /// The sphere that emitters are asked with: they start light from infinity in front of it.
+    /// The sphere that emitters' methods are given; light from infinity starts on a disc in front of it.
     #[must_use]
     pub const fn emission_bounds(&self) -> &BoundingSphere {
         &self.emission_bounds

@@ -42,10 +42,9 @@ pub enum StreamKind {
     Camera,
     /// Light sub-paths of the preparation, which sets radii and counts before the first iteration.
     PilotLight,
-    /// Camera sub-paths of the preparation. Those with the same index, of iterations that differ in their
-    /// lower 32 bits only, begin alike and are independent after a few draws: what they differ in is what
-    /// stratification leaves of the variance of a pixel, since it takes away what their common decisions
-    /// make.
+    /// Camera sub-paths of the preparation. Those of one index whose iterations differ in their lower 32 bits
+    /// only share their first decisions and are independent after them: their difference tells the variance
+    /// of a pixel that stratification leaves.
     PilotCamera,
     /// The turns in which pixels make photon queries.
     MergePeriods,

@@ -204,6 +204,16 @@ impl TechniqueSet {
     pub const ALL: Self = Self(0b1_1111_1111);
     /// The techniques with photons in media.
     pub const VOLUME_MERGES: Self = Self(0b1_1110_0000);
+    /// The techniques with photon beams.
+    pub const BEAMS: Self = Self(0b1_1000_0000);
+    /// The techniques with light sub-paths.
+    pub const LIGHT_PATHS: Self = Self(0b1_1111_1100);
+
+    /// The set of one technique.
+    #[must_use]
+    pub const fn only(technique: Technique) -> Self {
+        Self(1 << technique as u8)
+    }
 
     /// Whether `technique` is in the set.
     #[must_use]

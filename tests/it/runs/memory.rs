@@ -210,10 +210,12 @@ const FOG: &str = r#"(version: 1,
 #[test]
 fn preparations_take_what_is_allowed() {
     const MEMORY: u32 = 60;
-    /// Prepares a render with paths of up to `longest` edges.
-    fn prepare(scene: &ReadyScene, longest: u32) {
+    /// Prepares a render by some techniques, with paths of up to `longest` edges.
+    fn prepare(scene: &ReadyScene, techniques: &str, longest: u32) {
         let before = status("VmRSS");
-        let settings = Settings { memory: Some(MEMORY), max_length: longest, ..Settings::default() };
+        let techniques = techniques.parse().expect("technique names");
+        let settings =
+            Settings { techniques, memory: Some(MEMORY), max_length: longest, ..Settings::default() };
         let renderer = scene.renderer(settings.validate().expect("valid settings")).expect("a renderer");
         let taken = (status("VmHWM") - before) / MIB;
         println!("{taken:.1} MiB");
@@ -221,19 +223,21 @@ fn preparations_take_what_is_allowed() {
         assert!(renderer.report().plan.light_paths > 0, "techniques are chosen all the same");
     }
     let usual = Settings::default().max_length;
-    let prepare_text = |text, longest| {
+    let prepare_text = |text, techniques, longest| {
         let scene = ReadyScene::from_ron_str(text, ".").expect("a valid scene");
-        on_one_thread(|| prepare(&scene, longest));
+        on_one_thread(|| prepare(&scene, techniques, longest));
     };
     match own_process::case().as_deref() {
         // Thick clusters of photons: without a limit the preparation takes 108 MiB.
-        Some("clusters") => with_scene("suite/dense_marble.ron", 200, |scene| prepare(scene, usual)),
+        Some("clusters") => with_scene("suite/dense_marble.ron", 200, |scene| prepare(scene, "auto", usual)),
         // Emitters are measured: without a limit up to 500 MiB.
-        Some("milk") => prepare_text(MILK, usual),
+        Some("milk") => prepare_text(MILK, "auto", usual),
+        // Beams alone are stored, no vertices.
+        Some("beams") => prepare_text(FOG, "hit+nee+bb1d", 4096),
         // Long walks: with all of their queries the preparation takes a hundred MiB.
-        Some(_) => prepare_text(FOG, 4096),
+        Some(_) => prepare_text(FOG, "auto", 4096),
         None => {
-            for case in ["clusters", "milk", "fog"] {
+            for case in ["clusters", "milk", "fog", "beams"] {
                 own_process::run("runs::memory::preparations_take_what_is_allowed", case, &GIVE_BACK);
             }
         }

@@ -6,7 +6,6 @@ use upbp_estimators::scene::Scene;
 use upbp_estimators::{MergePeriods, PreparedScene, Roulette, Technique, TechniqueSet};
 
 use super::cost::Cost;
-use super::full_plan::BEAMS;
 use super::roulette;
 use super::statistics::Statistics;
 use super::technique_support::TechniqueSupport;
@@ -16,10 +15,10 @@ use crate::settings::{CheckedSettings, LightPaths};
 
 /// Numbers of light sub-paths, relative to the full plan's: more than one per pixel where what matters is
 /// found by them alone, as what the sun throws through water is.
-const LIGHT_PATHS: [f64; 5] = [0.0625, 0.25, 1.0, 4.0, 16.0];
+const LIGHT_PATH_FACTORS: [f64; 5] = [0.0625, 0.25, 1.0, 4.0, 16.0];
 /// Numbers of light sub-paths with beams, relative to the full plan's: fewer are fast, and more of them show
 /// less as rays.
-const BEAM_PATHS: [f64; 3] = [0.25, 1.0, 4.0];
+const BEAM_PATH_FACTORS: [f64; 3] = [0.25, 1.0, 4.0];
 /// Factors of emission hits, next events and connections in the weights: photons and beams tell less than as
 /// many independent samples would, by how much depends on what they share.
 const CAMERA_FACTORS: [f32; 3] = [1.0, 2.0, 4.0];
@@ -65,17 +64,18 @@ impl Candidates {
             if is_fixed { vec![full] } else { parts.iter().map(count).filter(is_candidate).collect() }
         };
         let is_fixed = settings.light_paths != LightPaths::Auto;
-        let light_paths = counts(full.light_paths, &LIGHT_PATHS, is_fixed, &|count| count <= most);
+        let light_paths = counts(full.light_paths, &LIGHT_PATH_FACTORS, is_fixed, &|count| count <= most);
         let longest = light_paths.iter().copied().fold(full.light_paths, u32::max);
         let is_fixed = settings.beams.is_some();
-        let beam_paths = counts(full.beam_paths, &BEAM_PATHS, is_fixed, &|count| is_room([longest, count]));
+        let beam_paths =
+            counts(full.beam_paths, &BEAM_PATH_FACTORS, is_fixed, &|count| is_room([longest, count]));
         let usual = full.radii.surf;
         let widest = if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };
         let mut candidates = Self {
             full: Plan { roulette: settings.roulette.unwrap_or(roulette::OF_PILOT), ..full },
             always: if support.needs_merges { finds_all(full.techniques) } else { TechniqueSet::EMPTY },
             safeguard: if scene.scene.has_specular_surfaces() {
-                full.techniques.intersection(TechniqueSet::EMPTY.with(Technique::Surf))
+                full.techniques.intersection(TechniqueSet::only(Technique::Surf))
             } else {
                 TechniqueSet::EMPTY
             },
@@ -105,7 +105,7 @@ impl Candidates {
         for technique in self.safeguard.without(self.always).iter() {
             paths = with_period(paths, technique, PERIOD);
         }
-        [camera, paths, everything].map(possible)
+        [camera, paths, everything].map(|plan| self.possible(plan))
     }
 
     /// The usual plan with those of some techniques that can be had, and the roulette that suits them.
@@ -120,7 +120,7 @@ impl Candidates {
     /// All candidates that differ from a plan in one thing.
     pub(super) fn steps(&self, from: &Plan) -> Vec<Plan> {
         let mut steps = Vec::new();
-        for technique in self.full.techniques.without(TechniqueSet::PT).iter() {
+        for technique in self.full.techniques.intersection(TechniqueSet::LIGHT_PATHS).iter() {
             let always = with_period(*from, technique, NonZeroU32::MIN);
             let techniques = always.techniques.with(technique);
             steps.push(Plan { techniques, ..always });
@@ -128,19 +128,19 @@ impl Candidates {
                 steps.push(Plan { techniques, ..with_period(always, technique, PERIOD) });
             }
             if !self.always.has(technique) {
-                let alone = TechniqueSet::EMPTY.with(technique);
+                let alone = TechniqueSet::only(technique);
                 steps.push(Plan { techniques: always.techniques.without(alone), ..always });
             }
         }
         steps.extend(self.light_paths(from));
-        if from.techniques.intersects(BEAMS) {
+        if from.techniques.intersects(TechniqueSet::BEAMS) {
             steps.extend(self.beam_paths.iter().map(|&beam_paths| Plan { beam_paths, ..*from }));
         }
         if from.techniques.has(Technique::Surf) {
             steps.extend(self.surf_radii.iter().map(|&radius| with_surf_radius(*from, radius)));
         }
         steps.extend(self.roulettes.iter().map(|&roulette| Plan { roulette, ..*from }));
-        steps.into_iter().map(possible).filter(|step| step != from).collect()
+        steps.into_iter().map(|step| self.possible(step)).filter(|step| step != from).collect()
     }
 
     /// A plan with each camera factor, if it has light sub-paths.
@@ -149,10 +149,18 @@ impl Candidates {
         factors.iter().map(|&camera_factor| Plan { camera_factor, ..*from }).collect()
     }
 
+    /// A plan with beams from no more light sub-paths than it has, and from as many as were asked for if it
+    /// has so many.
+    fn possible(&self, plan: Plan) -> Plan {
+        let most = if plan.techniques.intersects(TechniqueSet::BEAMS) { plan.light_paths } else { u32::MAX };
+        let beam_paths = if let [only] = self.beam_paths[..] { only } else { plan.beam_paths };
+        Plan { beam_paths: beam_paths.min(most), ..plan }
+    }
+
     /// A plan with each number of light sub-paths, if it has any.
     pub(super) fn light_paths(&self, from: &Plan) -> Vec<Plan> {
         let counts = if from.uses_light_paths() { self.light_paths.as_slice() } else { &[] };
-        counts.iter().map(|&light_paths| possible(Plan { light_paths, ..*from })).collect()
+        counts.iter().map(|&light_paths| self.possible(Plan { light_paths, ..*from })).collect()
     }
 
     /// A plan with the techniques that may find light that the pilot render missed, if it has light
@@ -181,15 +189,10 @@ impl Candidates {
 /// A plan as it is written down: without sub-paths that no technique uses.
 pub(super) fn finished(plan: Plan) -> Plan {
     let light_paths = if plan.uses_light_paths() { plan.light_paths } else { 0 };
-    let beam_paths = if plan.techniques.intersects(BEAMS) { plan.beam_paths.min(light_paths) } else { 0 };
+    let beam_paths =
+        if plan.techniques.intersects(TechniqueSet::BEAMS) { plan.beam_paths.min(light_paths) } else { 0 };
     let camera_factor = if light_paths > 0 { plan.camera_factor } else { 1.0 };
     Plan { light_paths, beam_paths, camera_factor, ..plan }
-}
-
-/// A plan with beams from no more light sub-paths than it has.
-fn possible(plan: Plan) -> Plan {
-    let most = if plan.techniques.intersects(BEAMS) { plan.light_paths } else { u32::MAX };
-    Plan { beam_paths: plan.beam_paths.min(most), ..plan }
 }
 
 fn with_period(plan: Plan, technique: Technique, period: NonZeroU32) -> Plan {
@@ -274,7 +277,7 @@ mod tests {
                     continue;
                 }
                 assert!(
-                    !step.techniques.intersects(BEAMS) || step.beam_paths <= step.light_paths,
+                    !step.techniques.intersects(TechniqueSet::BEAMS) || step.beam_paths <= step.light_paths,
                     "{step:?}"
                 );
                 fewer += u32::from(!candidates.beam_paths.contains(&step.beam_paths));

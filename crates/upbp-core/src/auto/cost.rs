@@ -6,7 +6,6 @@
 
 use upbp_estimators::{Technique, TechniqueSet};
 
-use super::full_plan::BEAMS;
 use super::pilot_render::recorder::PerTechnique;
 use super::pilot_render::{PilotRender, Work};
 use crate::deadline::Stop;
@@ -82,7 +81,7 @@ impl<'a> Cost<'a> {
             let run = plan.techniques.intersection(techniques);
             1.0 - run.iter().map(|technique| 1.0 - plan.active_part(technique)).product::<f64>()
         };
-        let light_tracing = TechniqueSet::EMPTY.with(Technique::LightTracing);
+        let light_tracing = TechniqueSet::only(Technique::LightTracing);
         let roulette = self.0.roulette(plan);
         let beyond = SHORT + (1.0 - SHORT) * any(ALONG_QUERY_BEAMS);
         let mut camera = NS_PER_CAMERA_PATH + work.camera_edges[roulette] * NS_PER_EDGE * beyond;
@@ -105,7 +104,7 @@ impl<'a> Cost<'a> {
             let i = Technique::LightTracing as usize;
             light += work.calls[i][self.0.roulette(plan)] * NS_PER_CALL[i];
         }
-        let trees = [TechniqueSet::EMPTY.with(Technique::Surf), MEDIUM_POINTS];
+        let trees = [TechniqueSet::only(Technique::Surf), MEDIUM_POINTS];
         let queried = trees.map(|queries| plan.techniques.intersects(queries));
         if plan.techniques.has(Technique::Connect) || queried.contains(&true) {
             light += work.vertices * NS_PER_VERTEX;
@@ -114,7 +113,8 @@ impl<'a> Cost<'a> {
             light += if queried { points * NS_PER_TREE_POINT } else { 0.0 };
         }
         let light_paths = if plan.uses_light_paths() { f64::from(plan.light_paths) } else { 0.0 };
-        let beam_paths = if plan.techniques.intersects(BEAMS) { f64::from(plan.beam_paths) } else { 0.0 };
+        let beam_paths =
+            if plan.techniques.intersects(TechniqueSet::BEAMS) { f64::from(plan.beam_paths) } else { 0.0 };
         light_paths * light + beam_paths * work.beams * NS_PER_TREE_BEAM
     }
 
@@ -169,7 +169,7 @@ mod tests {
     }
 
     fn only(technique: Technique, paths: u32) -> Plan {
-        Plan { techniques: TechniqueSet::EMPTY.with(technique), roulette: OF_PILOT, ..planned(paths) }
+        Plan { techniques: TechniqueSet::only(technique), roulette: OF_PILOT, ..planned(paths) }
     }
 
     #[test]

@@ -33,22 +33,22 @@ use crate::settings::CheckedSettings;
 /// Camera sub-paths of a round with [many](MANY) emitters, or with guides.
 const CAMERA_PATHS: u32 = 2048;
 /// Light sub-paths of a round with [many](MANY) emitters, at most.
-const LIGHT_PATHS: u32 = 4096;
+const ROUND_LIGHT_PATHS: u32 = 4096;
 /// Light sub-paths of a round with guides, at most: few of them bring light.
 const GUIDED_LIGHT_PATHS: u32 = 16384;
 /// Emitters from which on the number of sub-paths does not grow any more.
 const MANY: usize = 8;
 /// Contributions of a round, at most, about: more tell nothing new.
 const CONTRIBUTIONS: f64 = 1e6;
-/// The part of the sub-paths that tells how many contributions there are going to be, and that a run has
-/// without time: fewer see nothing of what is small in the picture.
-const FEW: f64 = 1.0 / 16.0;
+/// Part of the planned sub-paths that a first run traces, to predict the number of contributions. It is also
+/// the least that runs when time is short: fewer miss what is small in the picture.
+const FIRST_PART: f64 = 1.0 / 16.0;
 /// Light vertices of a round, at most, about: more tell nothing new.
 const LIGHT_VERTICES: f64 = 2e5;
 /// Factor of the camera sub-paths if [many](MANY) emitters are chosen by receiver: there is more to learn.
 const MORE_CAMERA_PATHS: u32 = 4;
 /// Second moment of next events with a choice by receiver, over that without, up to which it is made.
-const WORTH: f64 = 0.9;
+const MOST_OF_ALIKE: f64 = 0.9;
 /// Points of specular surfaces that a piece of the work keeps.
 const SPECULAR_OF_PIECE: usize = 4096;
 /// Rounds with guides, each by its part of the time and the most that its sub-paths may be multiplied by: one
@@ -56,7 +56,7 @@ const SPECULAR_OF_PIECE: usize = 4096;
 const GUIDED_ROUNDS: [(f64, u32); 3] = [(0.25, 1), (0.25, 1), (0.5, 4)];
 
 /// Part of the time of a preparation that the choice of emitters may take.
-pub(super) const PART: f64 = 0.2;
+pub(super) const TIME_FOR_EMITTERS: f64 = 0.2;
 /// Part of that time for a quick look at the length of light sub-paths.
 const QUICK_LOOK: f64 = 0.2;
 
@@ -84,14 +84,14 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         scene.choose_emitters_to_measure();
         scene.choose_by_receiver(&[]);
     }
-    let quick = budget.part(QUICK_LOOK * PART);
+    let quick = budget.part(QUICK_LOOK * TIME_FOR_EMITTERS);
     let few = statistics::FEW_LIGHT_PATHS;
     let statistics = statistics::measure::<S, L>(scene, settings, techniques, lanes, few, room, &quick)?;
     let rounds: &[_] = if is_guided { &GUIDED_ROUNDS } else { &[(1.0, 1)] };
     let most_times = f64::from(rounds.iter().map(|(_, times)| *times).max().unwrap_or(1));
     let vertices =
         LIGHT_VERTICES.min(room.items::<LightVertex<S::Bsdf, ByTechnique, L>>() as f64 / most_times);
-    let most = if is_guided { GUIDED_LIGHT_PATHS } else { LIGHT_PATHS };
+    let most = if is_guided { GUIDED_LIGHT_PATHS } else { ROUND_LIGHT_PATHS };
     let light_paths = (vertices / statistics.vertices_per_path.max(1.0)).clamp(1.0, f64::from(most));
     let enough = CONTRIBUTIONS.min(room.items::<NextEvent>() as f64);
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
@@ -100,16 +100,17 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let part = if is_guided { 1.0 } else { emitters.min(MANY) as f64 / MANY as f64 };
     let paths = [light_paths, f64::from(camera_paths)].map(|paths| ((paths * part) as u32).max(1));
     // Light is weighted as with so many light sub-paths, for a plan may have far fewer than the full one.
-    let few = plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / PATHS_PER_BEAM_PATH]);
+    let small =
+        plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / PATHS_PER_BEAM_PATH]);
     let full = full_plan(scene, settings, techniques, &statistics, room, budget);
-    let [few, full] = [few, full].map(|plan| pilot_plan(scene, settings, &plan));
+    let [small, full] = [small, full].map(|plan| pilot_plan(scene, settings, &plan));
     // Kernels are those of the full one, and so are the most that they may be in a medium.
-    let mut mis = few.mis;
-    for (few, full) in mis.volume.iter_mut().zip(&full.mis.volume) {
-        few.pp3d.greatest_scale = full.pp3d.greatest_scale;
-        few.pb2d.greatest_scale = full.pb2d.greatest_scale;
-        few.bp2d.greatest_scale = full.bp2d.greatest_scale;
-        few.bb1d.greatest_scale = full.bb1d.greatest_scale;
+    let mut mis = small.mis;
+    for (small, full) in mis.volume.iter_mut().zip(&full.mis.volume) {
+        small.pp3d.greatest_scale = full.pp3d.greatest_scale;
+        small.pb2d.greatest_scale = full.pb2d.greatest_scale;
+        small.bp2d.greatest_scale = full.bp2d.greatest_scale;
+        small.bb1d.greatest_scale = full.bb1d.greatest_scale;
     }
     let plan = IterationPlan { mis, ..full };
     let most = (plan.light_paths / paths[0].max(1)).max(1);
@@ -120,8 +121,9 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         let times = times.min(most);
         let paths = paths.map(|count| times * count);
         let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, enough, halt);
-        let allowance = budget.part((1.0 - QUICK_LOOK) * PART * part);
-        let seen = allowance.largest_from(FEW / f64::from(times), run).ok_or(RenderError::Cancelled)?;
+        let allowance = budget.part((1.0 - QUICK_LOOK) * TIME_FOR_EMITTERS * part);
+        let seen =
+            allowance.largest_from(FIRST_PART / f64::from(times), run).ok_or(RenderError::Cancelled)?;
         by_technique = seen.by_technique;
         if emitters > 1 {
             scene.choose_emitters_by(&seen.emission, &shares(&seen.next_events, emitters));
@@ -151,7 +153,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
 struct Measured {
     /// The contribution of every emitter by light sub-paths.
     emission: EmitterShares,
-    /// Contributions of next events, in two halves of different camera sub-paths.
+    /// Findings of next events, in two halves of different camera sub-paths.
     next_events: [Vec<NextEvent>; 2],
     guides: Evidence,
     /// Light that light sub-paths brought, relative to that of its pixel.
@@ -183,7 +185,7 @@ fn choose_by_receiver<S: Scene>(scene: &mut PreparedScene<'_, S>, seen: &[Vec<Ne
     scene.choose_alike();
     let alike = second_moment(scene, &seen[1]);
     scene.choose_by_receiver(&samples(&seen[0]));
-    if second_moment(scene, &seen[1]) < WORTH * alike {
+    if second_moment(scene, &seen[1]) < MOST_OF_ALIKE * alike {
         scene.choose_by_receiver(&samples(&seen.concat()));
     } else {
         scene.choose_alike();
@@ -212,14 +214,14 @@ fn measure_enough<S: Scene, L: Lanes>(
 ) -> Option<Measured> {
     /// Most contributions that a run may bring, relative to those that are enough.
     const FAR_MORE: f64 = 2.0;
-    let (mut next, mut best) = (part.min(FEW), None);
+    let (mut next, mut best) = (part.min(FIRST_PART), None);
     loop {
         let room = SampleRoom::new((FAR_MORE * enough) as usize);
         let Some(seen) = measure::<S, L>(scene, plan, paths, next, &room, halt) else {
             match best {
                 _ if halt.now() => return None,
                 Some(best) => return Some(best),
-                None => next *= FEW,
+                None => next *= FIRST_PART,
             }
             continue;
         };
@@ -264,7 +266,7 @@ fn measure<S: Scene, L: Lanes>(
     let emission_probability = |emitter| f64::from(scene.emission_probability(emitter));
     let mut emission = Vec::new();
 
-    let mut seen = Seen::default();
+    let mut seen = Findings::default();
     let map = light_sub_paths::<_, L>(&context, &mut seen, halt)?;
     let mut starts = vec![None; plan.light_paths as usize];
     for &(path, end) in &seen.starts {
@@ -274,7 +276,7 @@ fn measure<S: Scene, L: Lanes>(
     let per_pixel = f64::from(plan.light_paths) / pixels as f64;
     seen.emission.iter_mut().for_each(|(_, contribution)| contribution.pixel *= per_pixel);
 
-    let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Seen| {
+    let walks = in_pieces(camera_paths, halt, |index, scratch, seen: &mut Findings| {
         let (index, counters) = (u64::from(index), &mut Counters::default());
         let before = (seen.light, seen.emission.len(), seen.next_event.len(), seen.contributions);
         seen.most = before.3 + room.most();
@@ -335,34 +337,33 @@ fn measure<S: Scene, L: Lanes>(
 /// The map that light sub-paths of a plan leave; what they contribute by themselves goes to `seen`.
 fn light_sub_paths<S: Scene, L: Lanes>(
     context: &Context<'_, S>,
-    seen: &mut Seen,
+    seen: &mut Findings,
     halt: &Halt<'_>,
 ) -> Option<LightMap<S::Bsdf, ByTechnique, L>> {
     let plan = context.plan;
-    let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
-    let pieces =
-        in_pieces(paths, halt, |index, scratch, (out, seen): &mut (LightChunk<_, ByTechnique, L>, Seen)| {
+    let paths = plan.traced_light_paths();
+    let pieces = in_pieces(
+        paths,
+        halt,
+        |index, scratch, (out, seen): &mut (LightChunk<_, ByTechnique, L>, Findings)| {
             // They contribute by light tracing alone.
             seen.most = usize::MAX;
             light_path(context, index, scratch, out, seen);
             true
-        })?;
+        },
+    )?;
     let (mut vertices, mut beams) = (Vec::new(), Vec::new());
     for (out, own) in pieces {
         vertices.extend(out.vertices);
         beams.extend(out.beams);
         seen.append(own);
     }
-    Some(if plan.stores_vertices() || plan.stores_beams() {
-        LightMap::build(plan, vertices, beams)
-    } else {
-        LightMap::empty()
-    })
+    Some(LightMap::build(plan, vertices, beams))
 }
 
-/// Contributions that sub-paths of one piece of work made.
+/// Findings that sub-paths of one piece of work made.
 #[derive(Default)]
-struct Seen {
+struct Findings {
     /// Light sub-paths with their starts.
     starts: Vec<(u32, LightEnd)>,
     /// By light sub-path.
@@ -378,7 +379,7 @@ struct Seen {
     specular: Thinned<Vec3, SPECULAR_OF_PIECE>,
 }
 
-impl Seen {
+impl Findings {
     /// Counts a contribution; whether it is to be kept.
     fn has_room(&mut self) -> bool {
         self.contributions += 1;
@@ -398,7 +399,7 @@ struct Contribution {
     /// Before weighting.
     value: f64,
     weight: f64,
-    /// Weight of all techniques that the choice of the emitter makes likelier together.
+    /// Sum of the weights of all techniques whose density grows with the probability of this emitter.
     together: f64,
     /// Light of its pixel, this included.
     pixel: f64,
@@ -422,10 +423,7 @@ impl Contribution {
     }
 }
 
-/// Techniques whose paths begin with a light sub-path.
-const OF_LIGHT: TechniqueSet = TechniqueSet::ALL.without(TechniqueSet::PT);
-
-impl<B> Observer<B> for Seen {
+impl<B> Observer<B> for Findings {
     type Densities = ByTechnique;
 
     fn light_end(&mut self, path: u32, end: &LightEnd) {
@@ -441,7 +439,8 @@ impl<B> Observer<B> for Seen {
     fn sample(&mut self, sample: &ObservedSample<B, ByTechnique>) {
         let (value, weight) = (f64::from(sample.value.mean()), sample.weight.value());
         let all = sample.weight.all;
-        let of_light: f64 = OF_LIGHT.iter().map(|technique| all.of[technique as usize]).sum();
+        let of_light: f64 =
+            TechniqueSet::LIGHT_PATHS.iter().map(|technique| all.of[technique as usize]).sum();
         let (technique, pixel) = (sample.technique, value * weight);
         let seen = |together| Contribution { technique, value, weight, together, pixel };
         self.light += pixel;

@@ -16,9 +16,6 @@ use crate::plan::Plan;
 use crate::radius_schedule::{LARGEST_RADIUS, MOST_MEAN_FREE_PATHS, Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
 
-/// The techniques with photon beams.
-pub(super) const BEAMS: TechniqueSet = TechniqueSet::EMPTY.with(Technique::Bp2d).with(Technique::Bb1d);
-
 /// Largest automatic first radius of surface merging, relative to the [size](size) of what the picture shows.
 const LARGEST_SURF_RADIUS: f32 = 3e-3;
 /// Largest automatic first radius of photon points around points, relative to that size.
@@ -34,8 +31,8 @@ const LEAST_GIVEN: f32 = 1e-12;
 /// Part of the render's time that the light sub-paths of an iteration may take: a quick look need not wait
 /// for a light sub-path per pixel.
 const LIGHT_TIME: f64 = 0.05;
-/// Photons within a kernel that more light sub-paths only repeat, while each of them costs time: where a
-/// kernel that is small for the scene holds all that is lit, an iteration would never end.
+/// Photons in the smallest automatic kernel from which on more light sub-paths are not worth their time.
+/// Where one kernel holds all that is lit, every query would visit every photon.
 const CROWD: f64 = 1024.0;
 
 /// A plan with all of `techniques`, and with a light sub-path per pixel, or as many as settings, memory and
@@ -99,8 +96,8 @@ pub(super) fn plan_with<S: Scene>(
     let uses = |set: TechniqueSet, paths: u32| if techniques.intersects(set) { paths } else { 0 };
     Plan {
         techniques,
-        light_paths: uses(TechniqueSet::ALL.without(TechniqueSet::PT), light_paths),
-        beam_paths: uses(BEAMS, beam_paths),
+        light_paths: uses(TechniqueSet::LIGHT_PATHS, light_paths),
+        beam_paths: uses(TechniqueSet::BEAMS, beam_paths),
         connections: settings.connections.unwrap_or(1.0),
         next_events: settings.next_events.unwrap_or(1.0),
         camera_factor: 1.0,
@@ -197,7 +194,9 @@ fn first_radii<S: Scene>(
         bp2d: radius(Technique::Bp2d, radii.bp2d, statistics.bp2d, 8.0, beam_paths, LARGEST_BEAM_RADIUS),
         bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
         field: statistics.radius_field,
-        most_mean_free_paths: radii.are_auto(techniques).then_some(MOST_MEAN_FREE_PATHS),
+        most_mean_free_paths: radii
+            .are_auto(techniques.intersection(TechniqueSet::VOLUME_MERGES))
+            .then_some(MOST_MEAN_FREE_PATHS),
         progressive: settings.progressive,
         floor,
     }

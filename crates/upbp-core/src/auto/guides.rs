@@ -17,17 +17,17 @@ use upbp_estimators::{
 const SPECULAR: f64 = 0.6;
 /// Part of all further guides that leads where the first one leads: the few starts that have brought light do
 /// not outline what they met, and what lies beside their cells is bright and rare.
-const FIRST: f64 = 0.3;
+const PART_OF_FIRST: f64 = 0.3;
 /// Points of specular surfaces that are enough.
 const MOST_POINTS: usize = 4096;
 /// Factor by which a guide has to multiply the starts that lead to the light, a geometric mean over this
 /// light. Half of the starts stay where they are, so that other light loses up to a factor of two, of which a
 /// small run may see nothing; but most of a lamp's light may be direct, where a guide changes little, and the
 /// caustic beside it is what light sub-paths are for.
-const WORTH: f64 = 1.25;
+const LEAST_GAIN: f64 = 1.25;
 /// Starts that brought light from which on they tell whether a guide is worth it. Fewer say that there was no
 /// time to find out.
-const FEW: usize = 8;
+const LEAST_STARTS: usize = 8;
 /// The most that one start may count of the light of all, as it is before any counts less: one that is bright
 /// because it is rare would draw most of the guided starts to its own cell.
 const BRIGHTEST: f64 = 0.03;
@@ -95,7 +95,7 @@ impl Starts {
 /// Whether techniques start light sub-paths, at an emitter that tells its random numbers.
 pub(super) fn can_guide<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> bool {
     let mut emitters = (0..scene.scene.emitters().len() as u32).map(EmitterId);
-    !techniques.without(TechniqueSet::PT).is_empty()
+    techniques.intersects(TechniqueSet::LIGHT_PATHS)
         && emitters.any(|emitter| scene.emission_axes(emitter).is_some())
 }
 
@@ -175,18 +175,18 @@ pub(super) fn next<S: Scene>(
     }
     let guide = |(emitter, (starts, first)): (u32, (Starts, &Starts))| {
         let emitter = EmitterId(emitter);
-        if starts.0.iter().filter(|start| start.light > 0.0).count() < FEW {
+        if starts.0.iter().filter(|start| start.light > 0.0).count() < LEAST_STARTS {
             let guide = scene.emitter_choice().guide(emitter);
-            return guide.filter(|guide| starts.light() == 0.0 || starts.gain(guide) > WORTH).cloned();
+            return guide.filter(|guide| starts.light() == 0.0 || starts.gain(guide) > LEAST_GAIN).cloned();
         }
         let axes = scene.emission_axes(emitter)?;
         let with_first = |mut starts: Starts| {
             starts.clip(BRIGHTEST);
-            starts.add(first, FIRST);
+            starts.add(first, PART_OF_FIRST);
             starts.fit(axes)
         };
         let [some, others] = starts.halves();
-        let is_worth = with_first(some).is_some_and(|guide| others.gain(&guide) > WORTH);
+        let is_worth = with_first(some).is_some_and(|guide| others.gain(&guide) > LEAST_GAIN);
         if is_worth { with_first(starts) } else { None }
     };
     (0..).zip(starts.into_iter().zip(first)).map(guide).collect()

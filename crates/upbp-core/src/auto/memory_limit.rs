@@ -71,13 +71,14 @@ impl Room {
         Ok(Self { film, estimate, output, total, limit, light_bytes })
     }
 
-    /// Checks that the iterations of a plan fit, and returns it.
+    /// Checks that the iterations of a plan fit, and returns it. They may need a tenth more than there is: a
+    /// plan that was made to fit is measured anew, and in another time, when its render goes on.
     ///
     /// # Errors
     /// [`RenderError::PlanMemory`].
     pub(crate) fn fits<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Result<Plan, RenderError> {
         let needed = self.iteration_bytes::<S>(plan, statistics);
-        if needed > self.total {
+        if needed > self.total.saturating_add(self.total / 10) {
             let needed = needed.div_ceil(1 << 20);
             return Err(RenderError::PlanMemory { needed, limit: self.limit });
         }

@@ -10,7 +10,7 @@
 //! and writes down every sample with the density of each technique there. From it follow the [variance] and
 //! the [cost] of an iteration of any other plan, and a [search] over [candidates](candidate) takes the plan
 //! with the least product of both. Predictions are noisy, so there is one rule for all steps of the search: a
-//! step must gain more than [a fixed part](search::GAIN) and more than its own standard error.
+//! step must gain more than [a fixed part](search::LEAST_GAIN) and more than its own standard error.
 //!
 //! The pilot render grows until no other candidate is likely to be better by more than that part and until it
 //! has as many light sub-paths as the full plan, or as there is room for, but takes at most
@@ -79,7 +79,7 @@ const TIME_FOR_PILOT: f64 = 0.4;
 /// Part of the light of light sub-paths that is much for techniques to find that are off then.
 const MUCH: f64 = 0.2;
 /// Part of that time that is kept for what may come after pilot renders, another choice of emitters.
-const TIME_AFTER_PILOT: f64 = emitters::PART + TIME_FOR_VERTICES;
+const TIME_AFTER_PILOT: f64 = emitters::TIME_FOR_EMITTERS + TIME_FOR_VERTICES;
 /// Part of that time that another look at the length of light sub-paths may take after that.
 const TIME_FOR_VERTICES: f64 = 0.05;
 
@@ -110,7 +110,7 @@ pub(crate) fn choose<S: Scene>(
     let support = TechniqueSupport::of(scene, settings, given.as_ref())?;
     let room = Room::of(scene, settings, support.techniques, given.is_some())?;
     let lanes = match &given {
-        Some(frozen) => lanes::of_plan(&frozen.plan, settings)?,
+        Some(frozen) => lanes::of_plan(scene, &frozen.plan, settings)?,
         None => lanes::choose(scene, settings),
     };
     if lanes.is_some() {
@@ -131,7 +131,7 @@ fn choose_in<S: Scene, L: Lanes>(
     budget: &mut Budget<'_>,
 ) -> Result<Choice, RenderError> {
     let is_auto = settings.techniques == Techniques::Auto;
-    let techniques = support.techniques;
+    let techniques = given.as_ref().map_or(support.techniques, |frozen| frozen.plan.techniques);
     let found = match &given {
         Some(_) => [0.0; TECHNIQUES],
         None => emitters::choose::<S, L>(scene, settings, techniques, lanes, &room, budget)?,
@@ -162,9 +162,11 @@ fn choose_in<S: Scene, L: Lanes>(
                 let on = plan.techniques;
                 let again = statistics::measure::<S, L>(scene, settings, on, lanes, few, &room, &allowance)?;
                 if again.vertices_per_path > 0.0 {
+                    plan.vertices_per_light_path = again.vertices_per_path;
+                }
+                if again.vertices_per_path + again.beams_per_path > 0.0 {
                     let paths = [plan.light_paths, plan.beam_paths];
                     [plan.light_paths, plan.beam_paths] = room.limited::<S>(paths, &again);
-                    plan.vertices_per_light_path = again.vertices_per_path;
                     statistics = again;
                 }
             }
@@ -215,7 +217,7 @@ fn best_plan<S: Scene, L: Lanes>(
         let found = search::best(&variance, candidates);
         plan = Some(found.plan);
         let pilot = variance.pilot();
-        let affordable = PLANNED * allowance.left_over(clock.lap()).min(pilot.room_taken.recip());
+        let affordable = PLANNED * allowance.time_ratio(clock.lap()).min(pilot.room_taken.recip());
         let at_most = |growth: u32| affordable.min(f64::from(growth)) as u32;
         if 2 * size.pixels < enough {
             let growth = at_most(GROWTH_AT_FIRST);

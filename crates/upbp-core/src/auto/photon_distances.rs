@@ -5,7 +5,7 @@ use rayon::prelude::*;
 /// The neighbour whose distance is measured, counted from the nearest.
 const RANK: usize = 8;
 /// The first radius that is tried, relative to the scene. The result does not depend on it.
-const FIRST: f32 = 1e-3;
+const FIRST_RADIUS: f32 = 1e-3;
 /// Larger than any scene; its square is finite.
 const ANYWHERE: f32 = 1e18;
 
@@ -45,8 +45,8 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
-    /// Median over the queries of the distance to the nearest but some of `count` elements, of which `around`
-    /// visits the distances of those within a radius.
+    /// Median over the queries of the distance within which there are a few of `count` elements; `around`
+    /// tells the distances of all within a radius.
     pub(crate) fn of<Q: Sync>(
         &self,
         queries: &[Q],
@@ -59,7 +59,7 @@ impl Nearest {
         if count == 0 {
             return None;
         }
-        let radii = || std::iter::successors(Some(FIRST), |r| (*r < 1.0).then_some(2.0 * r));
+        let radii = || std::iter::successors(Some(FIRST_RADIUS), |r| (*r < 1.0).then_some(2.0 * r));
         let distance_of = |query: &Q| {
             let mut found = Vec::new();
             for radius in radii().map(|r| r * self.scale).chain([ANYWHERE]) {

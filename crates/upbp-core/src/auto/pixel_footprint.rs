@@ -8,8 +8,8 @@ use super::photon_distances::median;
 
 /// Rays along each side of the film that tell how wide pixels are.
 const RAYS: u8 = 5;
-/// Part of the places that are farther than what radii are made for: what the picture hardly shows may not
-/// need kernels of its own.
+/// Part of the visible places that lie beyond the distance at which radii stop growing: so few need no
+/// kernels of their own.
 pub(super) const FAR: f32 = 0.05;
 /// Part of the places below the least width that radii follow. All camera sub-paths cross what is near the
 /// camera, where photons are as rare as elsewhere: radii that shrink towards it find none in thin media, and

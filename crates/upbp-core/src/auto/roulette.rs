@@ -36,5 +36,5 @@ pub(super) fn relative_pass_probability(number: usize, albedos: f32) -> f32 {
 /// The roulette that did best, in geometric mean over many scenes. Where light sub-paths come to meet them,
 /// long camera sub-paths tell less.
 pub(super) const fn usual_roulette(techniques: TechniqueSet) -> Roulette {
-    Roulette::Below(if techniques.without(TechniqueSet::PT).is_empty() { 0.5 } else { 0.7 })
+    Roulette::Below(if techniques.intersects(TechniqueSet::LIGHT_PATHS) { 0.7 } else { 0.5 })
 }

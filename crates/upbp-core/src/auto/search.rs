@@ -9,16 +9,19 @@ use crate::deadline::Stop;
 use crate::plan::Plan;
 
 /// Part of the product that a step must gain. Predictions are noisy, and the least of many is so by chance.
-pub(super) const GAIN: f64 = 0.05;
+pub(super) const LEAST_GAIN: f64 = 0.05;
 /// Part of the product that four times as many light sub-paths as usual must gain. They leave less time for
 /// camera sub-paths, of whose variance stratification over iterations takes away more than a prediction
 /// knows.
-const GAIN_OF_MORE: f64 = 0.1;
+const LEAST_GAIN_OF_MORE: f64 = 0.1;
+
+/// Cells of a pilot render from which on their groups tell how sure a difference is.
+const LEAST_CELLS: usize = 8 * GROUPS;
 
 /// The best candidate that small steps from some sensible ones lead to.
 pub(super) struct Found {
     pub(super) plan: Plan,
-    /// Whether no other candidate is likely to be better by more than [`GAIN`].
+    /// Whether no other candidate is likely to be better by more than [`LEAST_GAIN`].
     pub(super) is_clear: bool,
     /// Relative variance of a pixel in an iteration.
     pub(super) variance: f64,
@@ -40,11 +43,11 @@ impl Found {
 
 /// Searches from several starts, and compares the ends directly. Ties go to the plan without light sub-paths,
 /// then to the one with more of them: the variance that is lost by tracing fewer sits in rare samples, which
-/// a pilot render underestimates. One that met no light tells nothing, and everything may be needed to find
-/// some.
+/// a pilot render underestimates. One that met no light, or that has a handful of pixels, tells nothing, and
+/// everything may be needed to find some.
 pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let cost = Cost::of(variance.pilot());
-    if !variance.sees_light() {
+    if !variance.sees_light() || variance.pilot().cells < LEAST_CELLS {
         let plan = finished(candidates.usual());
         return Found { plan, is_clear: false, variance: f64::INFINITY, cost: cost.iteration(&plan) };
     }
@@ -59,8 +62,7 @@ pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let (gain, error) = least.gain_over(&camera);
     let best = if camera.plan.uses_light_paths() || !(gain <= error) { least } else { camera };
     let is_clear = !judge.known.iter().any(|other| other.may_beat(&best));
-    // After all else: a factor makes plans with light sub-paths look better, and predictions favour these
-    // already where they are compared with plans without.
+    // Last, so that a factor cannot tip the choice between plans with and without light sub-paths.
     let factors = judge.judge(&Candidates::camera_factors(&best.plan));
     let best = factors.into_iter().fold(best, |a, b| if b.product() < a.product() { b } else { a });
     let plan = finished(candidates.with_safeguard(best.plan, cost));
@@ -101,28 +103,28 @@ impl Judged {
         self.variance.iter().sum::<f64>() * self.cost
     }
 
-    /// Takes the other if its product is less: by [`GAIN`] for each time that it has a quarter of the light
-    /// sub-paths, up to the usual number, and by [`GAIN_OF_MORE`] for each time that it has four times as
-    /// many beyond it.
+    /// Takes the other if its product is less: by [`LEAST_GAIN`] for each time that it has a quarter of the
+    /// light sub-paths, up to the usual number, and by [`LEAST_GAIN_OF_MORE`] for each time that it has four
+    /// times as many beyond it.
     fn or_better(self, other: Self, usual: u32) -> Self {
         let [fewer, more] = log4_path_ratios(&self.plan, &other.plan, usual);
-        let needed = (1.0 - GAIN).powf(fewer) * (1.0 - GAIN_OF_MORE).powf(-more);
+        let needed = (1.0 - LEAST_GAIN).powf(fewer) * (1.0 - LEAST_GAIN_OF_MORE).powf(-more);
         if other.product() < needed * self.product() { other } else { self }
     }
 
-    /// Whether this gains more than the larger of [`GAIN`] and the standard error of what it gains.
+    /// Whether this gains more than the larger of [`LEAST_GAIN`] and the standard error of what it gains.
     fn beats(&self, other: &Self) -> bool {
         if other.product().is_infinite() {
             return self.product().is_finite();
         }
         let (gain, error) = self.gain_over(other);
-        gain > error.max(GAIN * other.product())
+        gain > error.max(LEAST_GAIN * other.product())
     }
 
-    /// Whether this would gain more than [`GAIN`] if it was better by its standard error.
+    /// Whether this would gain more than [`LEAST_GAIN`] if it was better by its standard error.
     fn may_beat(&self, other: &Self) -> bool {
         let (gain, error) = self.gain_over(other);
-        gain + error > GAIN * other.product()
+        gain + error > LEAST_GAIN * other.product()
     }
 
     /// The difference of both products, and its standard error.
@@ -219,14 +221,14 @@ mod tests {
             assert_eq!(better.cost, b.or_better(a, 1600).cost, "whichever comes first");
             better.cost
         };
-        let gain = 1.0 - GAIN;
+        let gain = 1.0 - LEAST_GAIN;
         let all = with(TechniqueSet::BPT, 1600, 1.0);
         for (fewer, needed) in [(400, gain), (100, gain * gain)] {
             assert_eq!(chosen(all, with(TechniqueSet::BPT, fewer, 1.01 * needed)), 1.0);
             assert_eq!(chosen(all, with(TechniqueSet::BPT, fewer, 0.99 * needed)), 0.99 * needed);
         }
         // So must more than usual.
-        let gain = 1.0 - GAIN_OF_MORE;
+        let gain = 1.0 - LEAST_GAIN_OF_MORE;
         for (more, needed) in [(6400, gain), (25600, gain * gain)] {
             for other in [all, with(TechniqueSet::PT, 100, 1.0)] {
                 assert_eq!(chosen(other, with(TechniqueSet::BPT, more, 1.01 * needed)), 1.0);

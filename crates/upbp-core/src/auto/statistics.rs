@@ -130,7 +130,7 @@ fn nominal_plan<S: Scene>(
     let choices = IterationChoices {
         seed: settings.seed,
         iteration: PilotRun::Statistics.iteration(),
-        techniques: techniques.without(TechniqueSet::EMPTY.with(Technique::LightTracing)),
+        techniques: techniques.without(TechniqueSet::only(Technique::LightTracing)),
         light_paths,
         beam_paths: (light_paths / PATHS_PER_BEAM_PATH).max(1),
         connections: 1.0,
@@ -140,13 +140,7 @@ fn nominal_plan<S: Scene>(
         vertices_per_light_path: 1.0,
         lengths: PathLengths { min: settings.min_length, max: settings.max_length },
         roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
-        kernels: Kernels {
-            surf: Kernel::disc(nominal),
-            pp3d: Kernel::ball(nominal),
-            pb2d: Kernel::parabolic_disc(nominal),
-            bp2d: Kernel::parabolic_disc(nominal),
-            bb1d: Kernel::parabolic_line(nominal),
-        },
+        kernels: Kernels::from_fn(|technique| Kernel::of(technique, nominal)),
         radius_field: RadiusField::Uniform,
         mean_free_paths: NO_LIMIT,
         heuristic: Heuristic::Balance,
@@ -207,8 +201,9 @@ impl TracedPaths {
         for (paths, vertices) in
             [(PIECE as u32, most_vertices), (FEW_LIGHT_PATHS, most_vertices), (LIGHT_PATHS, ENOUGH_VERTICES)]
         {
-            let enough =
-                vertices.min(most_vertices) / found.photons.len().max(1) as f64 * f64::from(found.paths);
+            // Where no technique uses vertices, beams alone are stored.
+            let stored = found.photons.len().max(found.beams.len()).max(1);
+            let enough = vertices.min(most_vertices) / stored as f64 * f64::from(found.paths);
             let paths = (enough as u32).min(paths).min(most);
             if paths > found.paths {
                 found = trace(paths)?;
@@ -305,11 +300,11 @@ struct Queries {
     media: Vec<Vec3>,
     edges: Vec<Ray>,
     /// The first vertex of each sub-path that scatters in more than one direction.
-    first: Vec<Seen>,
+    first: Vec<FirstVertex>,
 }
 
 /// A vertex that a pixel sees.
-struct Seen {
+struct FirstVertex {
     place: Vec3,
     /// Width of the pixel there, scene units.
     footprint: f32,
@@ -321,7 +316,7 @@ struct QueryRecorder {
     surfaces: Thinned<Vec3, QUERIES_OF_PIECE>,
     media: Thinned<Vec3, QUERIES_OF_PIECE>,
     edges: Thinned<Ray, QUERIES_OF_PIECE>,
-    first: Vec<Seen>,
+    first: Vec<FirstVertex>,
     last: Vec3,
     /// Length of the sub-path so far.
     travelled: f32,
@@ -377,7 +372,7 @@ impl<B> Observer<B> for QueryRecorder {
             && let Some(footprint) = self.pixel.take().map(|pixel| pixel * self.travelled)
             && footprint.is_finite()
         {
-            self.first.push(Seen { place: vertex.position, footprint });
+            self.first.push(FirstVertex { place: vertex.position, footprint });
         }
     }
 }

@@ -64,7 +64,7 @@ impl TechniqueSupport {
             emitting_media: emits_without_emitter(prepared),
             reasons: Vec::new(),
         };
-        let hit = TechniqueSet::EMPTY.with(Technique::Hit);
+        let hit = TechniqueSet::only(Technique::Hit);
         // Without vertices to connect.
         let (at_camera, remain) = if prepared.has_lens_emitters() {
             (hit.with(Technique::Nee), "only emission hits and next events at the lens remain")
@@ -77,7 +77,7 @@ impl TechniqueSupport {
                 .drop("no medium scatters: photons and beams in media are off", TechniqueSet::VOLUME_MERGES);
         }
         if !scene.has_connectible_surfaces() {
-            let surf = TechniqueSet::EMPTY.with(Technique::Surf);
+            let surf = TechniqueSet::only(Technique::Surf);
             support.drop("all surfaces are specular: surface merging is off", surf);
             if !scattering {
                 let reason = format!("nothing but specular surfaces: {remain}");
@@ -100,7 +100,7 @@ impl TechniqueSupport {
         } else if max_length < 3 {
             support.drop(
                 "paths of up to two edges: vertices are not connected",
-                TechniqueSet::EMPTY.with(Technique::Connect),
+                TechniqueSet::only(Technique::Connect),
             );
         }
         support

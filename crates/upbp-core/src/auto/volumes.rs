@@ -6,6 +6,8 @@
 //! compares the variance that the light of each volume has with that of hits alone, on the same sub-paths
 //! (`docs/theory.md`, section 6.12).
 
+use std::collections::BTreeSet;
+
 use upbp_estimators::mis::ByTechnique;
 use upbp_estimators::observer::{Completion, ObservedSample, Observer};
 use upbp_estimators::path::Context;
@@ -30,14 +32,14 @@ const BLOCKS: u32 = 8;
 const DARK: f64 = 0.1;
 /// The variance of hits alone, relative to that with next events, up to which a volume is left to hits: a
 /// next event costs as much as a step of the walk.
-const GAIN: f64 = 2.0;
+const MOST_BY_HITS: f64 = 2.0;
 /// Camera sub-paths that must have met a volume, or nothing is known of the variance of hits.
-const FEW: f64 = 64.0;
+const LEAST_MET: f64 = 64.0;
 /// Part of all camera sub-paths that must have, where light may come by specular surfaces: there light
 /// sub-paths may find what next events cannot.
 const SELDOM: f64 = 0.125;
 /// Part of the time of a preparation that this may take.
-const PART: f64 = 0.05;
+const TIME_FOR_VOLUMES: f64 = 0.05;
 
 /// Leaves volumes that emit to camera sub-paths, where these find their light about as well.
 ///
@@ -49,7 +51,7 @@ pub(crate) fn choose<S: Scene>(
     techniques: TechniqueSet,
     budget: &Budget<'_>,
 ) -> Result<(), RenderError> {
-    let hit = TechniqueSet::EMPTY.with(Technique::Hit);
+    let hit = TechniqueSet::only(Technique::Hit);
     if !scene.has_volume_emitters() || !techniques.intersects(hit) {
         return Ok(());
     }
@@ -62,36 +64,38 @@ pub(crate) fn choose<S: Scene>(
     let plan = pilot_plan(scene, settings, &plan);
     let run = |part: f64, halt: &Halt<'_>| {
         let paths = (part * f64::from(PATHS)).ceil() as u32;
-        let passes = (0..PASSES).map(|pass| look(scene, &plan, pass, paths, halt));
-        Some(Looks { paths, passes: passes.collect::<Option<_>>()? })
+        let passes = (0..PASSES).map(|pass| trace_pass(scene, &plan, pass, paths, halt));
+        Some(Walks { paths, passes: passes.collect::<Option<_>>()? })
     };
-    let looks = budget.part(PART).largest(run).ok_or(RenderError::Cancelled)?;
-    let (width, height) = scene.scene.camera().resolution();
-    let reductions = looks.relative_to(PixelRect { x: 0, y: 0, width, height });
-    let least =
-        if scene.scene.has_specular_surfaces() { SELDOM * f64::from(PASSES * looks.paths) } else { FEW };
-    scene.leave_out_volumes(|emitter| looks.are_hits_enough(emitter, &reductions, least));
+    let walks = budget.part(TIME_FOR_VOLUMES).largest(run).ok_or(RenderError::Cancelled)?;
+    let reductions = walks.relative_to(PixelRect::whole(scene.scene.camera().resolution()));
+    let least = if scene.scene.has_specular_surfaces() {
+        SELDOM * f64::from(PASSES * walks.paths)
+    } else {
+        LEAST_MET
+    };
+    scene.leave_out_volumes(|emitter| walks.are_hits_enough(emitter, &reductions, least));
     Ok(())
 }
 
 /// Traces the camera sub-paths of a pass.
-fn look<S: Scene>(
+fn trace_pass<S: Scene>(
     scene: &PreparedScene<'_, S>,
     plan: &IterationPlan,
     pass: u32,
     paths: u32,
     halt: &Halt<'_>,
-) -> Option<Vec<Seen>> {
+) -> Option<Vec<WalkLight>> {
     let plan = &IterationPlan { iteration: PilotRun::Volumes { pass }.iteration(), ..plan.clone() };
     let context = Context { prepared: scene, plan };
-    let (width, height) = scene.scene.camera().resolution();
-    let film = PixelRect { x: 0, y: 0, width, height };
+    let film = PixelRect::whole(scene.scene.camera().resolution());
     let map = LightMap::<_, _, f64>::empty();
-    let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut Vec<Seen>| {
-        let mut seen = Seen::default();
+    let volumes = &scene.volume_emitters().collect::<BTreeSet<_>>();
+    let pieces = in_pieces(paths, halt, |index, scratch, piece: &mut Vec<WalkLight>| {
+        let mut recorder = LightRecorder { volumes, seen: WalkLight::default() };
         let (index, counters) = (u64::from(index), &mut Counters::default());
-        camera_path(&context, &map, pixel(film, index), index, scratch, counters, &mut seen);
-        piece.push(seen);
+        camera_path(&context, &map, pixel(film, index), index, scratch, counters, &mut recorder);
+        piece.push(recorder.seen);
         true
     })?;
     Some(pieces.into_iter().flatten().collect())
@@ -112,36 +116,46 @@ struct Light {
 
 /// Light that a camera sub-path has seen.
 #[derive(Default)]
-struct Seen {
+struct WalkLight {
     all: f64,
-    /// By emitter, in the order in which they were seen.
+    /// By emitting volume, in the order in which they were seen.
     lights: Vec<(EmitterId, Light)>,
 }
 
-impl Seen {
+impl WalkLight {
     fn of(&self, emitter: EmitterId) -> Light {
         let found = self.lights.iter().find(|(other, _)| *other == emitter);
         found.map_or(Light::default(), |(_, light)| *light)
     }
 }
 
-impl<B> Observer<B> for Seen {
+/// Writes down the light that a camera sub-path sees.
+struct LightRecorder<'v> {
+    volumes: &'v BTreeSet<EmitterId>,
+    seen: WalkLight,
+}
+
+impl<B> Observer<B> for LightRecorder<'_> {
     type Densities = ByTechnique;
 
     fn sample(&mut self, sample: &ObservedSample<B, ByTechnique>) {
         let (value, weight) = (f64::from(sample.value.mean()), sample.weight.value());
-        self.all += value * weight;
+        self.seen.all += value * weight;
         let (emitter, hit) = match sample.completion {
             Completion::Hit(end) => (end.emitter, value),
             // Next events have the rest of the weight.
             Completion::Nee { light, .. } if weight < 1.0 => (light.emitter, value * weight / (1.0 - weight)),
             _ => return,
         };
-        let index = self.lights.iter().position(|(other, _)| *other == emitter).unwrap_or_else(|| {
-            self.lights.push((emitter, Light::default()));
-            self.lights.len() - 1
+        if !self.volumes.contains(&emitter) {
+            return;
+        }
+        let lights = &mut self.seen.lights;
+        let index = lights.iter().position(|(other, _)| *other == emitter).unwrap_or_else(|| {
+            lights.push((emitter, Light::default()));
+            lights.len() - 1
         });
-        let light = &mut self.lights[index].1;
+        let light = &mut lights[index].1;
         light.shared += value * weight;
         light.expected_squares += value * weight * hit;
         if sample.technique == Technique::Hit {
@@ -152,12 +166,12 @@ impl<B> Observer<B> for Seen {
 }
 
 /// Camera sub-paths, by pass and pixel.
-struct Looks {
+struct Walks {
     paths: u32,
-    passes: Vec<Vec<Seen>>,
+    passes: Vec<Vec<WalkLight>>,
 }
 
-impl Looks {
+impl Walks {
     /// The factor by which the light at each pixel becomes relative to the radiance around.
     fn relative_to(&self, film: PixelRect) -> Vec<f64> {
         let block = |index: usize| {
@@ -188,7 +202,7 @@ impl Looks {
         for (index, reduction) in reductions.iter().enumerate() {
             let square = reduction * reduction;
             let lights = [0, 1].map(|pass: usize| self.passes[pass][index].of(emitter));
-            // Two independent looks at a pixel: half the square of their difference is their variance.
+            // Two independent walks at a pixel: half the square of their difference is their variance.
             let variance = |of: fn(&Light) -> f64| 0.5 * square * (of(&lights[0]) - of(&lights[1])).powi(2);
             shared += variance(|light| light.shared);
             hits += variance(|light| light.hits);
@@ -201,7 +215,7 @@ impl Looks {
         // Hits that are as rare as they are bright are missing in the squares of a few.
         let hits = hits + unseen.max(0.0);
         let met = if squares > 0.0 { sum * sum / squares } else { 0.0 };
-        met >= least && hits <= GAIN * shared
+        met >= least && hits <= MOST_BY_HITS * shared
     }
 }
 
@@ -211,10 +225,10 @@ mod tests {
 
     const LAMP: EmitterId = EmitterId(2);
 
-    fn looks(of: impl Fn(usize, usize) -> Light) -> Looks {
-        let seen = |pass, index| Seen { all: 1.0, lights: vec![(LAMP, of(pass, index))] };
+    fn walks(of: impl Fn(usize, usize) -> Light) -> Walks {
+        let seen = |pass, index| WalkLight { all: 1.0, lights: vec![(LAMP, of(pass, index))] };
         let passes = (0..2).map(|pass| (0..1000).map(|index| seen(pass, index)).collect());
-        Looks { paths: 1000, passes: passes.collect() }
+        Walks { paths: 1000, passes: passes.collect() }
     }
 
     /// A hit of the given value.
@@ -222,36 +236,36 @@ mod tests {
         Light { shared, hits: value, squares: value * value, expected_squares: value * value }
     }
 
-    fn are_enough(looks: &Looks) -> bool {
-        looks.are_hits_enough(LAMP, &[1.0; 1000], FEW)
+    fn are_enough(walks: &Walks) -> bool {
+        walks.are_hits_enough(LAMP, &[1.0; 1000], LEAST_MET)
     }
 
     #[test]
     fn a_volume_is_left_to_hits_that_are_even() {
         let noise = |pass: usize, index: usize| ((pass + 7 * index) % 5) as f64;
-        assert!(are_enough(&looks(|pass, index| hit(1.0 + noise(pass, index), 1.0 + noise(pass, index)))));
+        assert!(are_enough(&walks(|pass, index| hit(1.0 + noise(pass, index), 1.0 + noise(pass, index)))));
         // Next events make it much more even.
-        assert!(!are_enough(&looks(|pass, index| hit(
+        assert!(!are_enough(&walks(|pass, index| hit(
             1.0 + noise(pass, index),
             3.0 + 0.5 * noise(pass, index)
         ))));
         // Every hundredth path meets it.
         let spark =
             |pass: usize, index: usize| if (index + 50 * pass).is_multiple_of(100) { 100.0 } else { 0.0 };
-        assert!(!are_enough(&looks(|pass, index| hit(spark(pass, index), spark(pass, index)))));
+        assert!(!are_enough(&walks(|pass, index| hit(spark(pass, index), spark(pass, index)))));
     }
 
     #[test]
     fn hits_that_were_never_seen_count_by_next_events() {
         let even = Light { shared: 1.0, hits: 1.0, squares: 1.0, expected_squares: 1.0 };
         let noisy = |pass: usize, light: Light| Light { shared: 1.0 + pass as f64, ..light };
-        assert!(are_enough(&looks(|pass, _| noisy(pass, even))));
+        assert!(are_enough(&walks(|pass, _| noisy(pass, even))));
         let bright = Light { expected_squares: 50.0, ..even };
-        assert!(!are_enough(&looks(|pass, _| noisy(pass, bright))));
+        assert!(!are_enough(&walks(|pass, _| noisy(pass, bright))));
     }
 
     #[test]
     fn what_was_not_seen_is_kept() {
-        assert!(!are_enough(&looks(|_, _| Light::default())));
+        assert!(!are_enough(&walks(|_, _| Light::default())));
     }
 }

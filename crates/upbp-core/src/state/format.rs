@@ -132,10 +132,7 @@ impl State {
             ron::from_str(text).map_err(|error| damaged("header", &error))?;
 
         let rect = identity.crop;
-        let inside = |start: u32, size: u32, whole: u32| {
-            size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
-        };
-        if !inside(rect.x, rect.width, identity.film.0) || !inside(rect.y, rect.height, identity.film.1) {
+        if !rect.is_part_of(identity.film) {
             return Err(damaged("header", &"the crop is not inside of the film"));
         }
         let numbers = iterations.len() + begun.len() as u64;

@@ -53,6 +53,23 @@ pub struct PixelRect {
     pub height: u32,
 }
 
+impl PixelRect {
+    /// The whole film of some width and height.
+    #[must_use]
+    pub const fn whole((width, height): (u32, u32)) -> Self {
+        Self { x: 0, y: 0, width, height }
+    }
+
+    /// Whether this is a part of a film of some width and height, and not empty.
+    #[must_use]
+    pub fn is_part_of(&self, (width, height): (u32, u32)) -> bool {
+        let is_within = |start: u32, size: u32, whole: u32| {
+            size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
+        };
+        is_within(self.x, self.width, width) && is_within(self.y, self.height, height)
+    }
+}
+
 /// A camera with an ideal lens: the value of a pixel is the mean radiance over its square and the lens.
 pub trait Camera: Send + Sync {
     /// Width and height of the film in pixels.
@@ -60,8 +77,7 @@ pub trait Camera: Send + Sync {
 
     /// The part of the film that is rendered; images have its size. Within the film, not empty.
     fn crop(&self) -> PixelRect {
-        let (width, height) = self.resolution();
-        PixelRect { x: 0, y: 0, width, height }
+        PixelRect::whole(self.resolution())
     }
 
     /// The ray through `film` (in pixels). `u_lens` is uniform in `[0, 1)²`, for the lens point. `None` is a

@@ -26,14 +26,16 @@ use crate::settings::CheckedSettings;
 use grid::Grid;
 use recorder::{ByRoulette, PerTechnique, Recorder, Sample, TECHNIQUES, add, passed};
 
-/// Looks at each pixel: enough to tell what they have in common.
+/// Times that a pilot render samples each of its pixels: products of two independent samples tell the square
+/// of the mean.
 pub(super) const PASSES: u32 = 2;
-/// Splats that are asked what they have in common with others of their light sub-path, about.
+/// Splats that are paired with another one of their light sub-path, about, to tell what neighbouring pixels
+/// have in common.
 const ASKED_SPLATS: usize = 1 << 16;
 /// Samples, at most, of 64 bytes each.
-const SAMPLES: u64 = 1 << 20;
+const MOST_SAMPLES: u64 = 1 << 20;
 /// Light vertices of a pass, at most.
-const LIGHT_VERTICES: f64 = 5e5;
+const MOST_LIGHT_VERTICES: f64 = 5e5;
 
 /// Samples and light vertices that a pilot render may have.
 #[derive(Clone, Copy, Debug)]
@@ -48,8 +50,9 @@ impl Limits {
     /// No more than useful, and than there is room for.
     pub(super) fn of<S: Scene, L: Lanes>(room: &memory_limit::Room) -> Self {
         Self {
-            samples: room.items::<Sample>().min(SAMPLES) as usize,
-            vertices: (room.items::<LightVertex<S::Bsdf, mis::ByTechnique, L>>() as f64).min(LIGHT_VERTICES),
+            samples: room.items::<Sample>().min(MOST_SAMPLES) as usize,
+            vertices: (room.items::<LightVertex<S::Bsdf, mis::ByTechnique, L>>() as f64)
+                .min(MOST_LIGHT_VERTICES),
         }
     }
 }
@@ -59,8 +62,8 @@ impl Limits {
 pub(super) struct Size {
     /// Pixels that it looks at.
     pub(super) pixels: u32,
-    /// Light sub-paths for each of them. What is rare to photons, as a few that are bright in front of the
-    /// camera, is all that tells some plans from others.
+    /// Light sub-paths for each of them. Some plans differ in rare bright photons only, as a few in front of
+    /// the camera are.
     pub(super) light_paths: u32,
 }
 
@@ -226,8 +229,7 @@ impl PilotRender {
     pub(super) const fn thinning(&self, technique: Technique) -> f64 {
         match technique {
             Technique::Hit | Technique::Nee | Technique::Connect => 1.0,
-            Technique::LightTracing | Technique::Surf | Technique::Pp3d | Technique::Pb2d => self.thinning[0],
-            Technique::Bp2d | Technique::Bb1d => self.thinning[1],
+            _ => self.thinning[technique.uses_beams() as usize],
         }
     }
 
@@ -377,7 +379,7 @@ impl Pass {
         halt: &Halt<'_>,
     ) -> Option<Self> {
         let plan: &IterationPlan = context.plan;
-        let paths = if plan.needs_light_paths() { plan.light_paths } else { 0 };
+        let paths = plan.traced_light_paths();
         let pieces =
             in_pieces(paths, halt, |index, scratch, piece: &mut (Recorder, LightChunk<_, _, L>)| {
                 let (recorder, out) = piece;
@@ -408,11 +410,7 @@ impl Pass {
             pass.splats.extend(cells.zip(recorder.samples.iter().copied()));
             pass.light.push(recorder);
         }
-        let map = if plan.stores_vertices() || plan.stores_beams() {
-            LightMap::build(plan, vertices, beams)
-        } else {
-            LightMap::empty()
-        };
+        let map = LightMap::build(plan, vertices, beams);
         pass.points = map.photon_points();
         let pieces = in_pieces(grid.cells(), halt, |cell, scratch, piece: &mut (Recorder, Counters)| {
             let (recorder, counters) = piece;

@@ -16,7 +16,6 @@ use glam::DVec3;
 
 use upbp_estimators::{Technique, TechniqueSet};
 
-use super::full_plan::BEAMS;
 use super::pilot_render::recorder::{PerTechnique, Sample, TECHNIQUES};
 use super::pilot_render::{PilotRender, Shared};
 use crate::plan::Plan;
@@ -26,10 +25,10 @@ use sample_pairs::{Excess, Looks, View, density_of_pilot, mean_photons};
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
 
-/// Times as rarely as a pilot render that a plan may find a path and be charged for just that. Paths that it
-/// finds more rarely yet are its rarest and brightest samples: a mean over those that a pilot render happened
-/// to meet is mostly too low, as a heavy tail's is, so that they are charged for the square root of the rest
-/// too, unless there are so many that the plan [would have met some itself](Doubt).
+/// A path that a plan finds at least `1 / TRUSTED` times as often as the pilot render is charged its plain
+/// second moment. Of rarer ones the pilot render mostly met too few, as of any heavy tail, so that the charge
+/// grows with the square root of the rest of the ratio, unless there are so many that the plan
+/// [would have met some itself](RareCharges).
 const TRUSTED: f32 = 4.0;
 
 /// Parts that a variance is given in, so that its own error can be told.
@@ -61,7 +60,7 @@ impl Counts {
             active: [1.0; TECHNIQUES],
             camera_factor: f64::from(plan.camera_factor),
             roulette: pilot.roulette(plan),
-            light_paths: f64::from(if plan.techniques.intersects(BEAMS) {
+            light_paths: f64::from(if plan.techniques.intersects(TechniqueSet::BEAMS) {
                 plan.beam_paths
             } else {
                 plan.light_paths
@@ -177,9 +176,9 @@ impl Variance {
         let pilot = &self.pilot;
         let mut view = View::new(pilot, &self.looks, counts);
         let mut groups = [Moments::default(); GROUPS];
-        let mut doubt = Doubt::default();
+        let mut charges = RareCharges::default();
         for cell in 0..pilot.cells {
-            groups[group(cell)].add(&self.of_cell(cell, &mut view, &mut doubt));
+            groups[group(cell)].add(&self.of_cell(cell, &mut view, &mut charges));
         }
         let mut variance = variances(&groups, counts.light_paths).map(|sum| sum / pilot.cells as f64);
         let mean_photons = mean_photons(pilot);
@@ -189,14 +188,14 @@ impl Variance {
             let square = pilot.second_moment(splat) as f32;
             variance[group] += pilot.per_splat() * f64::from(share.single(square));
             if let Some(excess) = share.excess(square, density_of_pilot(&splat.shares, &mean_photons)) {
-                doubt.add(group, pilot.per_splat(), &excess);
+                charges.add(group, pilot.per_splat(), &excess);
             }
         }
-        [variance, doubt.charges()]
+        [variance, charges.charges()]
     }
 
     /// Moments of the samples of a cell.
-    fn of_cell(&self, cell: usize, view: &mut View<'_>, doubt: &mut Doubt) -> Moments {
+    fn of_cell(&self, cell: usize, view: &mut View<'_>, charges: &mut RareCharges) -> Moments {
         let passes = self.pilot.passes as f64;
         let mut moments = Moments::default();
         let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
@@ -205,7 +204,7 @@ impl Variance {
             moments.single += look.single / passes;
             moments.light += look.light / passes;
             moments.pairs += look.products / passes;
-            doubt.add(group(cell), 1.0 / (passes * self.pilot.cells as f64), &look.excess);
+            charges.add(group(cell), 1.0 / (passes * self.pilot.cells as f64), &look.excess);
             sum += look.sum;
             squares += look.sum.length_squared();
         }
@@ -271,13 +270,13 @@ fn variances(groups: &[Moments; GROUPS], light_paths: f64) -> [f64; GROUPS] {
 /// If there are so many that the plan itself would have met some in the place of the pilot render, their mean
 /// says what there is.
 #[derive(Default)]
-struct Doubt {
+struct RareCharges {
     charges: [f64; GROUPS],
     /// Sum of squares of the charges for what one sub-path found, each times how rarely the plan finds it.
     squares: f64,
 }
 
-impl Doubt {
+impl RareCharges {
     /// Charges a group for what one sub-path found, `weight` its part in the picture.
     fn add(&mut self, group: usize, weight: f64, excess: &Excess) {
         self.charges[group] += weight * excess.charge;

@@ -13,19 +13,19 @@ use crate::auto::roulette::{COUNT, relative_pass_probability};
 /// The samples of a pilot render, ready for the predictions of many plans.
 pub(super) struct Looks {
     /// By look, those after most albedos first.
-    seen: Vec<Seen>,
+    samples: Vec<ReadySample>,
     /// Index behind the last of each look, and its number of light sub-paths with several photons.
     ends: Vec<(u32, u32)>,
 }
 
 /// A sample, with all that no plan changes.
-struct Seen {
+struct ReadySample {
     technique: Technique,
     /// The number, in its look and from 1, of a light sub-path with several photons.
     light_path: Option<NonZeroU32>,
     albedos: f32,
     /// Weight relative to that in the pilot render, by the number of a roulette: walks get to it less often.
-    rarity: [f32; COUNT],
+    per_walk: [f32; COUNT],
     value: Vec3,
     /// Square of the value, of as many samples as the plan has.
     square: f32,
@@ -38,20 +38,20 @@ struct Seen {
 impl Looks {
     /// Takes the samples of a pilot.
     pub(super) fn new(pilot: &PilotRender) -> Self {
-        let mut looks = Self { seen: Vec::with_capacity(pilot.samples.len()), ends: Vec::new() };
+        let mut looks = Self { samples: Vec::with_capacity(pilot.samples.len()), ends: Vec::new() };
         let mean_photons = mean_photons(pilot);
         let of_one_path = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
         for look in 0..pilot.cells * pilot.passes {
-            let start = looks.seen.len();
+            let start = looks.samples.len();
             let mut light_paths = 0;
             for photons in pilot.look(look / pilot.passes, look % pilot.passes).chunk_by(of_one_path) {
                 light_paths += u32::from(photons.len() > 1);
                 let light_path = if photons.len() > 1 { NonZeroU32::new(light_paths) } else { None };
-                looks.seen.extend(photons.iter().map(|sample| Seen {
+                looks.samples.extend(photons.iter().map(|sample| ReadySample {
                     technique: sample.technique,
                     light_path,
                     albedos: sample.albedos,
-                    rarity: std::array::from_fn(|number| {
+                    per_walk: std::array::from_fn(|number| {
                         relative_pass_probability(number, sample.albedos).recip()
                     }),
                     value: sample.value,
@@ -60,22 +60,22 @@ impl Looks {
                     shares: sample.shares,
                 }));
             }
-            looks.seen[start..].sort_by(|a, b| a.albedos.total_cmp(&b.albedos));
-            looks.ends.push((looks.seen.len() as u32, light_paths));
+            looks.samples[start..].sort_by(|a, b| a.albedos.total_cmp(&b.albedos));
+            looks.ends.push((looks.samples.len() as u32, light_paths));
         }
         looks
     }
 
     /// Whether there are no samples at all.
     pub(super) const fn is_empty(&self) -> bool {
-        self.seen.is_empty()
+        self.samples.is_empty()
     }
 
     /// The samples of a look, and its number of light sub-paths.
-    fn of(&self, look: usize) -> (&[Seen], u32) {
+    fn of(&self, look: usize) -> (&[ReadySample], u32) {
         let start = if look == 0 { 0 } else { self.ends[look - 1].0 };
         let (end, light_paths) = self.ends[look];
-        (&self.seen[start as usize..end as usize], light_paths)
+        (&self.samples[start as usize..end as usize], light_paths)
     }
 }
 
@@ -104,8 +104,7 @@ pub(super) struct View<'a> {
     weighted: [f32; TECHNIQUES],
     /// The factor of emission hits, next events and connections.
     camera_factor: f32,
-    /// Pairs of samples of one camera sub-path that count beside those of independent samples: it makes the
-    /// queries for both or for none.
+    /// Extra weight of pairs of samples of one camera sub-path, which makes the queries for both or for none.
     common: [f32; TECHNIQUES],
     /// Pairs of photons of one light sub-path that the plan has, less those of the pilot render: by points
     /// and by beams.
@@ -152,13 +151,13 @@ impl<'a> View<'a> {
             self.by_technique.clear();
             self.by_technique.resize(light_paths as usize, all_by_technique);
         }
-        for seen in samples {
-            let i = seen.technique as usize;
-            let share = self.share(&seen.shares);
-            let rarity = seen.rarity[self.roulette];
-            result.single += f64::from(rarity * share.single(seen.square));
-            result.light += f64::from(rarity * share.light(seen.square));
-            if let Some(excess) = share.excess(rarity * seen.square, seen.of_pilot) {
+        for sample in samples {
+            let i = sample.technique as usize;
+            let share = self.share(&sample.shares);
+            let per_walk = sample.per_walk[self.roulette];
+            result.single += f64::from(per_walk * share.single(sample.square));
+            result.light += f64::from(per_walk * share.light(sample.square));
+            if let Some(excess) = share.excess(per_walk * sample.square, sample.of_pilot) {
                 result.excess.add(&excess);
             }
             let weight = self.weighted[i] * share.inverse;
@@ -166,15 +165,15 @@ impl<'a> View<'a> {
             if !(weight > 0.0) {
                 continue;
             }
-            let y = seen.value * weight;
-            let own = class(seen.technique);
+            let y = sample.value * weight;
+            let own = usize::from(sample.technique.uses_beams());
             let mut others = all[0] + all[1];
             all[own] += y;
             if PERIODIC {
                 others += self.common[i] * all_by_technique[i];
                 all_by_technique[i] += y;
             }
-            if let Some(path) = seen.light_path {
+            if let Some(path) = sample.light_path {
                 let path = path.get() as usize - 1;
                 let found = &mut self.by_class[path];
                 others += self.more[0] * found[0] + self.more[own] * found[1];
@@ -185,9 +184,9 @@ impl<'a> View<'a> {
                     *found += y;
                 }
             }
-            // A pair is there as often as walks get to the deeper of both, which came before, and each weighs
-            // as if it was as often as walks get to it: what is left is how rare the other is.
-            result.products += f64::from(2.0 * rarity * y.dot(others));
+            // The deepest come first. A pair exists as often as walks reach its deeper vertex, which cancels
+            // the weight of the deeper sample; that of the other one remains.
+            result.products += f64::from(2.0 * per_walk * y.dot(others));
         }
         result.sum = (all[0] + all[1]).as_dvec3();
         result
@@ -284,9 +283,4 @@ pub(super) fn mean_photons(pilot: &PilotRender) -> [f32; TECHNIQUES] {
 /// Density of a path with the pilot render's plan, mean over iterations, relative to the first iteration.
 pub(super) fn density_of_pilot(shares: &[f32; TECHNIQUES], mean_photons: &[f32; TECHNIQUES]) -> f32 {
     shares.iter().zip(mean_photons).map(|(share, photons)| share * photons).sum()
-}
-
-/// Class of the light sub-paths that a technique uses: 1 for those with beams.
-pub(super) const fn class(technique: Technique) -> usize {
-    matches!(technique, Technique::Bp2d | Technique::Bb1d) as usize
 }

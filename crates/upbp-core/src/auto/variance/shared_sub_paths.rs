@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::sample_pairs::{View, class};
+use super::sample_pairs::View;
 use crate::auto::pilot_render::Shared;
 use crate::auto::pilot_render::recorder::Sample;
 
@@ -26,7 +26,7 @@ impl View<'_> {
             let weight = self.weight(sample.technique, &sample.shares);
             // Neither without samples nor without a number.
             if weight > 0.0 {
-                sums[class(sample.technique)] += sample.value * weight;
+                sums[usize::from(sample.technique.uses_beams())] += sample.value * weight;
             }
         }
         sums

@@ -381,7 +381,7 @@ fn by_splats(rare: u32) -> impl Fn(u32) -> f64 {
     pilot.plan = planned(16);
     let variance = Variance::of(pilot);
     move |light_paths| {
-        let techniques = TechniqueSet::EMPTY.with(Technique::LightTracing);
+        let techniques = TechniqueSet::only(Technique::LightTracing);
         variance.over_scales(&Plan { techniques, light_paths, ..planned(16) }).iter().sum::<f64>()
     }
 }
