@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use upbp_core::{Content, Output, Settings, Start, Stop, ToneMapping, check_outputs, write_exr, write_png};
+use upbp_core::{
+    Content, Output, Settings, Start, Stop, ToneMapping, check_outputs, describe, write_exr, write_png,
+};
 use upbp_scene::ReadyScene;
 
 /// Ends after a minute, or when more iterations would hardly be seen.
@@ -30,7 +32,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}\n\nUsage: cornell_media [SCENE.ron [OUT.exr]]");
+            eprintln!("error: {}\n\nUsage: cornell_media [SCENE.ron [OUT.exr]]", describe(&*error));
             ExitCode::from(2)
         }
     }

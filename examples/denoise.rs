@@ -9,12 +9,11 @@ use std::process::{Command, ExitCode};
 use std::{env, fs, io};
 
 use exr::prelude::{AnyChannels, FlatSamples, read_first_flat_layer_from_file};
-use upbp_core::{Image, ToneMapping, write_image, write_png};
+use upbp_core::{Content, Image, Output, ToneMapping, check_outputs, describe, write_image, write_png};
 
 fn main() -> ExitCode {
     let arguments: Vec<_> = env::args_os().skip(1).map(PathBuf::from).collect();
     let result = match arguments.as_slice() {
-        [input, output] if is_same(input, output) => Err("the image would be written over".into()),
         [_, output] if output.extension().is_none_or(|extension| extension != "exr") => {
             Err("the image to write is an OpenEXR file: its name ends in .exr".into())
         }
@@ -24,18 +23,19 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}\n\nUsage: denoise IN.exr OUT.exr");
+            eprintln!("error: {}\n\nUsage: denoise IN.exr OUT.exr", describe(&*error));
             ExitCode::from(2)
         }
     }
 }
 
-/// Whether two paths lead to one file.
-fn is_same(a: &Path, b: &Path) -> bool {
-    matches!([a, b].map(fs::canonicalize), [Ok(a), Ok(b)] if a == b)
-}
-
 fn denoise(input: &Path, output: &Path) -> Result<(), Box<dyn Error>> {
+    let png = output.with_extension("png");
+    let outputs = [
+        Output { role: "the image", path: output, content: Content::Exr },
+        Output { role: "the PNG beside it", path: &png, content: Content::Png },
+    ];
+    check_outputs(&outputs, &[("the noisy image", input)])?;
     let file = read_first_flat_layer_from_file(input)
         .map_err(|error| format!("{}: {error}", input.display()))?
         .layer_data;
@@ -73,7 +73,6 @@ fn denoise(input: &Path, output: &Path) -> Result<(), Box<dyn Error>> {
     fs::remove_dir_all(&folder)?;
     let image = result?;
     write_image(output, &image)?;
-    let png = output.with_extension("png");
     write_png(&png, &image, ToneMapping::default())?;
     println!("wrote {} and {}", output.display(), png.display());
     Ok(())

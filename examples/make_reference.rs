@@ -62,6 +62,13 @@ struct Set {
     radius: Radius,
 }
 
+impl Set {
+    fn settings(&self, seed: u64) -> Settings {
+        let (techniques, radii) = (self.techniques.into(), Radii::all(self.radius));
+        Settings { techniques, radii, seed, ..Settings::default() }
+    }
+}
+
 impl FromStr for Set {
     type Err = Box<dyn Error + Send + Sync>;
 
@@ -70,7 +77,9 @@ impl FromStr for Set {
             Some((techniques, radius)) => (techniques, Radius::Scene(radius.parse()?)),
             None => (text, Radius::Auto),
         };
-        Ok(Self { name: text.to_owned(), techniques: techniques.parse()?, radius })
+        let set = Self { name: text.to_owned(), techniques: techniques.parse()?, radius };
+        set.settings(0).validate()?;
+        Ok(set)
     }
 }
 
@@ -150,16 +159,9 @@ struct Batches {
 
 impl Batches {
     fn render(scene: &ReadyScene, set: &Set, count: u32, options: &Options) -> Result<Self, Box<dyn Error>> {
-        let Set { techniques, radius, .. } = *set;
-        let radii = Radii::all(radius);
         let (mut images, mut iterations, mut seconds) = (Vec::new(), 0, 0.0);
         for batch in 0..u64::from(count) {
-            let settings = Settings {
-                techniques: techniques.into(),
-                radii,
-                seed: options.seed + batch,
-                ..Settings::default()
-            };
+            let settings = set.settings(options.seed + batch);
             let mut renderer = scene.renderer(settings.validate()?)?;
             let stop = Stop { seconds: Some(options.time), ..Stop::default() };
             renderer.render(&stop, |_| ControlFlow::Continue(()));

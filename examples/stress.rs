@@ -12,6 +12,7 @@ use std::time::Instant;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use upbp_core::describe;
 use upbp_testing::stress::{Case, all, in_parallel};
 
 /// Renders scenes at the ends of what a description can say.
@@ -37,7 +38,7 @@ fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", describe(&*error));
             ExitCode::from(2)
         }
     }

@@ -19,7 +19,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use upbp_core::{
     Content, Output, Radii, Radius, Renderer, Settings, Stop, Technique, TechniqueSet, check_outputs,
-    write_text,
+    describe, write_text,
 };
 use upbp_scene::ReadyScene;
 use upbp_testing::Estimate;
@@ -88,7 +88,7 @@ fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", describe(&*error));
             ExitCode::from(2)
         }
     }

@@ -24,8 +24,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use upbp_core::{
-    Content, ErrorPoint, Output, OutputError, Settings, TechniqueSet, ToneMapping, check_outputs, write_png,
-    write_text,
+    Content, ErrorPoint, Output, OutputError, RenderError, Settings, TechniqueSet, ToneMapping,
+    check_outputs, describe, write_png, write_text,
 };
 
 use analysis::Curve;
@@ -52,14 +52,6 @@ fn main() -> ExitCode {
             eprintln!("error: {message}");
             ExitCode::from(BAD_INPUT)
         }
-    }
-}
-
-/// An error with all its causes.
-fn describe(error: &dyn Error) -> String {
-    match error.source() {
-        Some(cause) => format!("{error}\n  because: {}", describe(cause)),
-        None => error.to_string(),
     }
 }
 
@@ -109,7 +101,7 @@ type Series = Vec<(u64, Vec<ErrorPoint>)>;
 
 /// Renders a scene with all sets and seeds; a series for each set. A scene may not have what a set needs, so
 /// that two sets are the same in it: those are rendered once. The choice of the program costs time of its own
-/// and is always rendered.
+/// and is always rendered. A set that finds no light has no points.
 fn series(
     subject: &Subject,
     sets: &[NamedSet],
@@ -121,21 +113,27 @@ fn series(
     for &seed in seeds {
         let mut renderers = Vec::new();
         // Which of them is that of each set.
-        let mut places: Vec<(Option<TechniqueSet>, usize)> = Vec::new();
+        let mut places: Vec<(Option<TechniqueSet>, Option<usize>)> = Vec::new();
         for set in sets {
             let settings = Settings { techniques: set.techniques, seed, ..settings.clone() };
-            let renderer = measure::prepare(subject, settings, seconds)?;
+            let renderer = match measure::prepare(subject, settings, seconds) {
+                Err(RenderError::NoLight { .. }) if !set.is_auto() => {
+                    places.push((None, None));
+                    continue;
+                }
+                renderer => renderer.map_err(|error| format!("{}: {error}", subject.name))?,
+            };
             let fixed = (!set.is_auto()).then(|| renderer.support().techniques);
             let same = places.iter().find(|(other, _)| fixed.is_some() && *other == fixed);
-            let place = same.map_or(renderers.len(), |(_, place)| *place);
-            if place == renderers.len() {
+            let place = same.map_or(Some(renderers.len()), |(_, place)| *place);
+            if same.is_none() {
                 renderers.push(renderer);
             }
             places.push((fixed, place));
         }
         let points = measure::measure(subject, renderers, seconds);
         for (series, (_, place)) in series.iter_mut().zip(places) {
-            series.push((seed, points[place].clone()));
+            series.push((seed, place.map_or_else(Vec::new, |place| points[place].clone())));
         }
     }
     Ok(series)

@@ -1,8 +1,6 @@
 //! Renders: their errors over time.
 
-use std::error::Error;
-
-use upbp_core::{ErrorPoint, Renderer, Settings, Start, Stop};
+use upbp_core::{ErrorPoint, RenderError, Renderer, Settings, Start, Stop};
 
 use crate::subject::Subject;
 
@@ -16,12 +14,11 @@ pub(crate) fn prepare(
     subject: &Subject,
     settings: Settings,
     seconds: f64,
-) -> Result<Renderer<'_>, Box<dyn Error>> {
+) -> Result<Renderer<'_>, RenderError> {
     let stop = Stop { seconds: Some(seconds), ..Stop::default() };
     // For the check of its size: errors are taken below.
     let start = Start { stop, reference: Some(subject.reference.clone()), ..Start::default() };
-    let renderer = subject.scene.start_renderer(settings.validate()?, start);
-    Ok(renderer.map_err(|error| format!("{}: {error}", subject.name))?)
+    subject.scene.start_renderer(settings.validate()?, start)
 }
 
 /// Renders each for some time and takes errors after iterations at geometric distances, and after the last

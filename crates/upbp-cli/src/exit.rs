@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use upbp_core::OutputError;
+use upbp_core::{OutputError, describe};
 
 /// A reason for not doing what the command line asks for.
 pub(crate) enum Failure {
@@ -77,14 +77,6 @@ pub(crate) fn list(title: &str, rows: &[(impl AsRef<str>, &str)]) -> String {
         }
     }
     text
-}
-
-/// Describes an error with all its causes.
-pub(crate) fn describe(error: &dyn Error) -> String {
-    match error.source() {
-        Some(cause) => format!("{error}\n  because: {}", describe(cause)),
-        None => error.to_string(),
-    }
 }
 
 /// Prints a failure, and gives the exit code.

@@ -1,10 +1,21 @@
 //! Errors, with messages for people.
 
+use std::error::Error;
 use std::fmt;
 use std::path::PathBuf;
 
 use upbp_estimators::PrepareError;
 use upbp_estimators::TechniqueSet;
+
+/// Describes an error with all its causes, each on a line of its own: the messages of this library do not
+/// repeat those of their [sources](Error::source).
+#[must_use]
+pub fn describe(error: &dyn Error) -> String {
+    match error.source() {
+        Some(cause) => format!("{error}\n  because: {}", describe(cause)),
+        None => error.to_string(),
+    }
+}
 
 /// A setting that makes no sense.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -32,7 +43,7 @@ pub struct TextError {
 
 impl From<ron::error::SpannedError> for TextError {
     fn from(error: ron::error::SpannedError) -> Self {
-        use ron::Error;
+        use ron::error::Error;
         let message = match &error.code {
             // Those of the parser speak of its own language.
             Error::InvalidIdentifier(_) | Error::SuggestRawIdentifier(_) | Error::ExpectedIdentifier => {

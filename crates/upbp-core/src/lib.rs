@@ -21,7 +21,7 @@ pub use upbp_media as media;
 
 pub use auto::technique_support::TechniqueSupport;
 pub use deadline::{Canceller, Preparing, Stop};
-pub use error::{MemoryLimit, OutputError, RenderError, SettingsError, StateError, TextError};
+pub use error::{MemoryLimit, OutputError, RenderError, SettingsError, StateError, TextError, describe};
 pub use files::{
     Content, Output, abandon_files, check_outputs, open_exr, open_file, read_text, remove_leftovers,
     write_text,

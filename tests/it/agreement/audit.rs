@@ -146,11 +146,14 @@ impl<'a> Auditor<'a> {
         if matches!(sample.completion, Completion::Emission) {
             // In closed form only where nothing else makes the path.
             let is_alone = self.camera_vertices.iter().all(|vertex| vertex.delta);
-            assert!(found == 1.0 && is_alone && self.plan.lengths.contain(sample.camera_depth), "{sample:?}");
+            assert!(
+                found == 1.0 && is_alone && self.plan.lengths.contains(sample.camera_depth),
+                "{sample:?}"
+            );
             return;
         }
         let (trace, strategy) = self.trace(sample);
-        assert!(self.plan.lengths.contain(trace.length() as u32), "{sample:?}");
+        assert!(self.plan.lengths.contains(trace.length() as u32), "{sample:?}");
         let in_lanes = plan_in_lanes(self.plan);
         let Ok(path) = trace.rebuild(self.scene, self.plan, in_lanes) else {
             self.comparisons[technique].doubtful += 1;

@@ -235,7 +235,7 @@ impl Options {
         let Method { light_paths, beams, fixed_radius, .. } = self.method;
         let any = |has: fn(Technique) -> bool| techniques.iter().any(has);
         let (has_light_paths, has_layers) =
-            (!techniques.without(TechniqueSet::PT).is_empty(), self.images().have_layers());
+            (techniques.intersects(TechniqueSet::LIGHT_PATHS), self.images().have_layers());
         for (is_idle, option, reason) in [
             (light_paths.is_some() && !has_light_paths, "--light-paths", is_without("light sub-paths")),
             (beams.is_some() && !any(Technique::uses_beams), "--beams", is_without("photon beams")),

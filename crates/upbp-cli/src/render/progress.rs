@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use upbp_core::{Progress, Renderer, State, Stop, StopReason};
+use upbp_core::{Progress, Renderer, State, Stop, StopReason, describe};
 
 use super::bar::Bar;
-use crate::exit::{complain, describe};
+use crate::exit::complain;
 
 /// Work to be done after each iteration, and about once a second within long ones.
 pub(crate) struct Beside<'a> {

@@ -33,8 +33,10 @@ pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
 }
 
 /// Writes a file beside its place, forces it to the disk and moves it there: whoever looks, whenever the
-/// process or the machine stops, finds the old file or the new one. A read-only file stays. What is no
-/// regular file, such as a pipe, is written to directly.
+/// process or the machine stops, finds the old file or the new one, which has the permissions of the old. A
+/// read-only file stays. What is no regular file, such as a pipe, is written to directly, and so is, once the
+/// content is complete, a file that can be written and not replaced: one that is a mount point, or another
+/// user's in a folder like `/tmp`.
 pub(crate) fn write_whole(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<File>) -> Result<(), OutputError>,
@@ -48,6 +50,10 @@ pub(crate) fn write_whole(
     let target = target(path).map_err(fail)?;
     check_not_protected(&target).map_err(fail)?;
     let (unfinished, file) = Unfinished::beside(&target).map_err(fail)?;
+    if let Ok(old) = fs::metadata(&target) {
+        // Best effort: not all file systems have any.
+        let _ = file.set_permissions(old.permissions());
+    }
     let mut writer = BufWriter::new(file);
     content(&mut writer)?;
     let file = writer.into_inner().map_err(|error| fail(error.into_error()))?;
@@ -157,9 +163,17 @@ impl Unfinished {
     }
 
     fn move_to(self, target: &Path) -> io::Result<()> {
+        use io::ErrorKind::{PermissionDenied, ResourceBusy};
         // Not while all are abandoned.
         let _files = unfinished_files();
-        fs::rename(&self.0, target)
+        match fs::rename(&self.0, target) {
+            Err(error) if matches!(error.kind(), ResourceBusy | PermissionDenied) && target.is_file() => {
+                let mut old = OpenOptions::new().write(true).truncate(true).open(target)?;
+                io::copy(&mut File::open(&self.0)?, &mut old)?;
+                old.sync_all()
+            }
+            moved => moved,
+        }
     }
 }
 

@@ -75,21 +75,8 @@ impl IterationSet {
 
     /// Adds an index below [`MAX_ITERATIONS`].
     pub(crate) fn insert(&mut self, index: u64) {
-        if self.contains(index) {
-            return;
-        }
-        let at = self.following(index);
-        let extends = at > 0 && self.ranges[at - 1].end == index;
-        let precedes = self.ranges.get(at).is_some_and(|own| own.start == index + 1);
-        match (extends, precedes) {
-            (true, true) => {
-                self.ranges[at - 1].end = self.ranges[at].end;
-                self.ranges.remove(at);
-            }
-            (true, false) => self.ranges[at - 1].end += 1,
-            (false, true) => self.ranges[at].start = index,
-            (false, false) => self.ranges.insert(at, index..index + 1),
-        }
+        let own = index..index + 1;
+        self.union(&Self { ranges: [own].into() });
     }
 
     /// Adds the indices of another set.

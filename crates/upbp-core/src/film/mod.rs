@@ -408,9 +408,8 @@ impl Film {
     #[must_use]
     pub fn error_map(&self) -> Option<ErrorMap> {
         let halves = self.halves()?;
-        // Pixels of a part may have one more.
-        let odd: u64 = self.iterations.ranges().iter().map(|range| range.end / 2 - range.start / 2).sum();
-        let iterations = [self.iterations() - odd, odd];
+        // Those of the last set: other pixels may have more, of parts.
+        let iterations = self.counts()[SETS as usize - 1].map(|count| count as u64);
         let seen = [0, 1]
             .map(|h| self.collect(|i, counts| exact_sum::values(&self.seen[h][i]).map(|v| v / counts[h])));
         let half = |h: usize| HalfImage {

@@ -84,8 +84,8 @@ pub fn write_image(path: &Path, image: &Picture) -> std::result::Result<(), Outp
     check_size(path, image)?;
     let mut channels = SmallVec::new();
     push(&mut channels, "", image);
-    let rect = PixelRect { x: 0, y: 0, width: image.width, height: image.height };
-    encode(path, rect, (image.width, image.height), LayerAttributes::default(), channels)
+    let size = (image.width, image.height);
+    encode(path, PixelRect::whole(size), size, LayerAttributes::default(), channels)
 }
 
 /// Writes the pixels of `part` of a `film` of some width and height.

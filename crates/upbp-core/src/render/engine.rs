@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use upbp_estimators::path::Context;
 use upbp_estimators::scene::{PixelRect, Scene};
-use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, StreamKind};
+use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene};
 use upbp_media::Lanes;
 
 use super::passes::{Buffers, Lists, add_splats, blacken, camera_pass, light_pass};
@@ -122,11 +122,11 @@ fn trace_light<S: Scene, L: Lanes>(
     let stores = plan.stores_vertices() || plan.stores_beams();
     let expected = LightCounts::expected(statistics, plan.light_paths, plan.beam_paths);
     let expected = if stores { expected } else { LightCounts::default() };
-    let counters = light_pass(context, StreamKind::Light, &expected, &mut lists, halt, |splats| {
+    let counters = light_pass(context, &expected, &mut lists, halt, |splats| {
         add_splats(rect, splats, pixels);
     })?;
     times.light = clock.lap();
-    let map = if stores { LightMap::build(plan, lists.vertices, lists.beams) } else { LightMap::empty() };
+    let map = LightMap::build(plan, lists.vertices, lists.beams);
     times.build = clock.lap();
     let map_bytes = map.memory_bytes() as u64;
     Some((map, LightDone { counters, map_bytes, times }))

@@ -26,7 +26,7 @@ const LIGHT_CHUNK: u32 = 64;
 /// Vertices or beams that a piece of work is expected to leave at most, unless one sub-path leaves more: few
 /// long sub-paths are work for all threads, too.
 const LIGHT_CHUNK_ITEMS: f64 = 4096.0;
-/// Pixels per piece of work.
+/// Most pixels per piece of work.
 const CAMERA_CHUNK: usize = 64;
 
 /// Lists that are used again in the next iteration: the allocator need not find a use for what was given back
@@ -57,13 +57,12 @@ impl<B, L: Lanes> Lists<B, L> {
 /// more than a fraction of all in two places.
 pub(crate) fn light_pass<S: Scene, L: Lanes>(
     context: &Context<'_, S>,
-    kind: StreamKind,
     expected: &LightCounts,
     lists: &mut Lists<S::Bsdf, L>,
     halt: &Halt<'_>,
     mut take_splats: impl FnMut(&[Splat]),
 ) -> Option<Counters> {
-    let paths = if context.plan.needs_light_paths() { context.plan.light_paths } else { 0 };
+    let paths = context.plan.traced_light_paths();
     let items = expected.vertices.max(expected.beams) / f64::from(paths.max(1));
     let chunk = ((LIGHT_CHUNK_ITEMS / items) as u32).clamp(1, LIGHT_CHUNK);
     let chunks = paths.div_ceil(chunk);
@@ -87,7 +86,7 @@ pub(crate) fn light_pass<S: Scene, L: Lanes>(
                     if halt.now() {
                         return false;
                     }
-                    trace_light_path(context, kind, index, scratch, out, &mut NoObserver);
+                    trace_light_path(context, StreamKind::Light, index, scratch, out, &mut NoObserver);
                 }
                 true
             });
@@ -124,15 +123,17 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
     halt: &Halt<'_>,
 ) -> Option<Counters> {
     let width = rect.width as usize;
+    // A small crop is work for all threads, too.
+    let chunk_size = (pixels.len() / (16 * rayon::current_num_threads())).clamp(1, CAMERA_CHUNK);
     // None of them if there is no room for any.
-    let features = features.chunks_mut(CAMERA_CHUNK).chain(repeat_with(Default::default));
-    let chunks = pixels.chunks_mut(CAMERA_CHUNK).zip(features).enumerate();
+    let features = features.chunks_mut(chunk_size).chain(repeat_with(Default::default));
+    let chunks = pixels.chunks_mut(chunk_size).zip(features).enumerate();
     // Integers: the same in whatever order they are added.
     let sum = Mutex::new(Counters::default());
     let done = do_all(chunks, |scratch: &mut Scratch<S::Bsdf, L>, (chunk, (pixels, features))| {
         let (mut counters, mut traced) = (Counters::default(), false);
         for (i, pixel) in pixels.iter_mut().enumerate() {
-            let place = chunk * CAMERA_CHUNK + i;
+            let place = chunk * chunk_size + i;
             let (column, row) = (place % width, place / width);
             if !sets.contains(&set_of(column, row)) {
                 continue;

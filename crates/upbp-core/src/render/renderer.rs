@@ -14,6 +14,7 @@ use super::stop::{Progress, StopReason};
 use crate::auto::technique_support::TechniqueSupport;
 use crate::deadline::{Canceller, Clock, Halt, Stop};
 use crate::error::{RenderError, StateError};
+use crate::film::pixel_sets::SETS;
 use crate::film::{ErrorEstimate, Film, Image, MAX_ITERATIONS, Pixel};
 use crate::report::Report;
 use crate::settings::CheckedSettings;
@@ -34,8 +35,10 @@ pub struct Renderer<'a> {
     pixels: Vec<Pixel>,
     /// One per pixel, or none if the film keeps none.
     features: Vec<Features>,
-    /// Time that the camera sub-paths of a set of pixels took, if known.
-    set_time: Option<Duration>,
+    /// Sets of pixels that were last traced together, or would have been if the iteration had so many left.
+    portion: u32,
+    /// Time that the camera sub-paths of a set of pixels took there.
+    set_time: Duration,
     /// Time that adding an iteration to the film takes.
     film_time: Duration,
     /// Estimate of the error when it was last due.
@@ -102,7 +105,8 @@ impl<'a> Renderer<'a> {
             range: 0..MAX_ITERATIONS,
             pixels: Vec::new(),
             features: Vec::new(),
-            set_time: None,
+            portion: 0,
+            set_time: Duration::ZERO,
             film_time: Duration::from_nanos(SUM.saturating_mul(sums)),
             estimated_error: ErrorEstimate::UNKNOWN,
             reference,
@@ -200,8 +204,10 @@ impl<'a> Renderer<'a> {
         while done < missing.end {
             // Half of what is left: a portion that does not end in time is lost.
             let portion = halt.time_left().map_or(PORTION, |left| PORTION.min(left / 2));
-            let fit = self.set_time.map_or(1.0, |time| portion.as_secs_f64() / time.as_secs_f64().max(1e-9));
-            let sets = done..done.saturating_add((fit as u32).max(1)).min(missing.end);
+            let fit = (portion.as_secs_f64() / self.set_time.as_secs_f64().max(1e-9)) as u32;
+            // What one set took tells little of others, which may have more pixels, and dearer ones.
+            self.portion = fit.clamp(1, (2 * self.portion).clamp(1, SETS));
+            let sets = done..(done + self.portion).min(missing.end);
             let camera_halt = if is_first && done == 0 { &unlimited } else { &halt };
             let buffers = Buffers { pixels: &mut self.pixels, features: &mut self.features };
             let traced = self.engine.trace_camera(&plan, rect, &sets, buffers, camera_halt);
@@ -209,7 +215,7 @@ impl<'a> Renderer<'a> {
             times.camera += time;
             let Some(own) = traced else { break };
             counters.add(&own);
-            self.set_time = Some(time / sets.len() as u32);
+            self.set_time = time / sets.len() as u32;
             done = sets.end;
             if done < missing.end && self.is_to_be_shown(shown) {
                 self.add_part(
@@ -250,9 +256,9 @@ impl<'a> Renderer<'a> {
     }
 
     /// Whether what is done of an iteration is to be shown, if something last was at this moment: once a
-    /// second, unless adding it to the film would take much of the time.
+    /// second, or less often if adding it to the film would take much of the time.
     fn is_to_be_shown(&self, last: Instant) -> bool {
-        last.elapsed() >= Duration::from_secs(1).max(20 * self.film_time)
+        last.elapsed() >= (20 * self.film_time).clamp(Duration::from_secs(1), Duration::from_secs(30))
     }
 
     /// The reason for an iteration that is not done.
