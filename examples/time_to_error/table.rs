@@ -36,7 +36,8 @@ pub(crate) fn head(errors: &[f64]) -> String {
 /// A row of the table.
 pub(crate) fn row(scene: &str, curve: &Curve, errors: &[f64]) -> String {
     let (iterations, seconds, error) = curve.end();
-    let number = |value: Option<f64>| value.map_or_else(|| "in the noise".to_owned(), |v| format!("{v:.2e}"));
+    let none = if iterations > 0.0 { "in the noise" } else { "no light" };
+    let number = |value: Option<f64>| value.map_or_else(|| none.to_owned(), |v| format!("{v:.2e}"));
     let slope = curve.slope().map_or_else(|| "–".to_owned(), |slope| format!("{slope:.2}"));
     let mut row = format!(
         "| {scene} | {} | {iterations:.0} | {:.3} | {} | {} | {slope} |",

@@ -100,7 +100,10 @@ impl Plan {
         } else if let Some((technique, _)) =
             radii_of.find(|(technique, radius)| self.techniques.has(*technique) && !(*radius > 0.0))
         {
-            Err(format!("radii.{}: expected a number above 0, since the plan has it", technique.name()))
+            Err(format!(
+                "radii.{0}: expected a number above 0, since {0} is one of its techniques",
+                technique.name()
+            ))
         } else if !radii.field.is_valid(lengths.into_iter().fold(0.0, f32::max)) {
             Err(format!(
                 "radii.field: expected positive factors, of which the greatest is at most {} times the least, \

@@ -16,7 +16,8 @@ pub(crate) const MOST_MEAN_FREE_PATHS: f32 = 0.3;
 pub enum Radius {
     /// A radius that a few sub-paths tell: as many photons in a kernel as smooth well, within bounds relative
     /// to what the picture shows, over the scene as the width of a pixel, and in a medium at most some of its
-    /// mean free paths. All techniques have the same radius everywhere if one of them has another setting.
+    /// mean free paths. None follows the width of a pixel if one of them has another setting, nor mean free
+    /// paths if that is one with photons in media.
     #[default]
     Auto,
     /// A fraction of the radius of the scene's bounding sphere; what comes of it is bounded as an

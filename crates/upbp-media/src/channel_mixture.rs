@@ -8,8 +8,8 @@
 
 use crate::Spectrum;
 
-/// Least probability, before normalisation, of a channel that [needs](is_needed) one: the inverse of what is
-/// left of it bounds the throughput of a passed segment.
+/// Least probability, before normalisation, of a channel that [needs](is_needed) one; after it, the inverse
+/// bounds the throughput of a passed segment.
 const FLOOR: f64 = 0.05;
 
 /// Points of the quadrature over distances.

@@ -2,8 +2,9 @@
 //!
 //! Distances are drawn from a mixture of the channels' exponentials, anew on every segment: `S = Σ α_c
 //! e^{−σ_c ℓ}`, `p = Σ α_c σ_c e^{−σ_c ℓ}`. The estimate divides by the mixture, so that the throughput of a
-//! segment never exceeds `1/α_c`, whatever the ratio of the channels. The probabilities `α` are those of
-//! `channel_mixture.rs`. A purely absorbing medium is passed with probability one.
+//! segment never exceeds `1/α_c`, whatever the ratio of the channels, nor in a channel that is not drawn that
+//! of the one that gets farthest. The probabilities `α` are those of `channel_mixture.rs`. A purely absorbing
+//! medium is passed with probability one.
 //!
 //! Source: `docs/theory.md`, section 1.4, policy B. Oracles: quadrature and
 //! `tests::grey_equals_the_mixture_of_three_equal_channels`.

@@ -149,8 +149,8 @@ impl Candidates {
         factors.iter().map(|&camera_factor| Plan { camera_factor, ..*from }).collect()
     }
 
-    /// A plan with beams from no more light sub-paths than it has, and from as many as were asked for if it
-    /// has so many.
+    /// A plan with beams from no more light sub-paths than it has, and from as many as the full plan if their
+    /// number is fixed and it has so many.
     fn possible(&self, plan: Plan) -> Plan {
         let most = if plan.techniques.intersects(TechniqueSet::BEAMS) { plan.light_paths } else { u32::MAX };
         let beam_paths = if let [only] = self.beam_paths[..] { only } else { plan.beam_paths };

@@ -92,7 +92,9 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let vertices =
         LIGHT_VERTICES.min(room.items::<LightVertex<S::Bsdf, ByTechnique, L>>() as f64 / most_times);
     let most = if is_guided { GUIDED_LIGHT_PATHS } else { ROUND_LIGHT_PATHS };
-    let light_paths = (vertices / statistics.vertices_per_path.max(1.0)).clamp(1.0, f64::from(most));
+    // Where no technique uses vertices, beams alone are stored.
+    let stored = statistics.vertices_per_path.max(statistics.beams_per_path / f64::from(PATHS_PER_BEAM_PATH));
+    let light_paths = (vertices / stored.max(1.0)).clamp(1.0, f64::from(most));
     let enough = CONTRIBUTIONS.min(room.items::<NextEvent>() as f64);
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
     let camera_paths = CAMERA_PATHS * if is_much { MORE_CAMERA_PATHS } else { 1 };

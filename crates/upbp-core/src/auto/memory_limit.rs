@@ -71,14 +71,16 @@ impl Room {
         Ok(Self { film, estimate, output, total, limit, light_bytes })
     }
 
-    /// Checks that the iterations of a plan fit, and returns it. They may need a tenth more than there is: a
-    /// plan that was made to fit is measured anew, and in another time, when its render goes on.
+    /// Checks that the iterations of a plan fit, and returns it. They may need a tenth more than a setting
+    /// allows: a plan that was made to fit is measured anew, and in another time, when its render goes on.
     ///
     /// # Errors
     /// [`RenderError::PlanMemory`].
     pub(crate) fn fits<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Result<Plan, RenderError> {
         let needed = self.iteration_bytes::<S>(plan, statistics);
-        if needed > self.total.saturating_add(self.total / 10) {
+        // Of what is free there is no more, and a plan was made for half of it.
+        let more = if matches!(self.limit, MemoryLimit::Free(_)) { 0 } else { self.total / 10 };
+        if needed > self.total.saturating_add(more) {
             let needed = needed.div_ceil(1 << 20);
             return Err(RenderError::PlanMemory { needed, limit: self.limit });
         }

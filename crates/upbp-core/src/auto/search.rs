@@ -16,7 +16,7 @@ pub(super) const LEAST_GAIN: f64 = 0.05;
 const LEAST_GAIN_OF_MORE: f64 = 0.1;
 
 /// Cells of a pilot render from which on their groups tell how sure a difference is.
-const LEAST_CELLS: usize = 8 * GROUPS;
+const LEAST_CELLS: usize = 2 * GROUPS;
 
 /// The best candidate that small steps from some sensible ones lead to.
 pub(super) struct Found {

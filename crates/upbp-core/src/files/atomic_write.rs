@@ -165,16 +165,28 @@ impl Unfinished {
     fn move_to(self, target: &Path) -> io::Result<()> {
         use io::ErrorKind::{PermissionDenied, ResourceBusy};
         // Not while all are abandoned.
-        let _files = unfinished_files();
+        let mut files = unfinished_files();
         match fs::rename(&self.0, target) {
             Err(error) if matches!(error.kind(), ResourceBusy | PermissionDenied) && target.is_file() => {
-                let mut old = OpenOptions::new().write(true).truncate(true).open(target)?;
-                io::copy(&mut File::open(&self.0)?, &mut old)?;
-                old.sync_all()
+                write_in_place(&self.0, target).map_err(|error| {
+                    // The old content may be gone: the new one stays where it is.
+                    files.retain(|path| *path != self.0);
+                    let message = format!("{error}; all of it is in `{}`", self.0.display());
+                    std::mem::forget(self);
+                    io::Error::new(error.kind(), message)
+                })
             }
             moved => moved,
         }
     }
+}
+
+/// Gives a file the content of another one, and keeps what it is.
+fn write_in_place(from: &Path, target: &Path) -> io::Result<()> {
+    let mut new = File::open(from)?;
+    let mut old = OpenOptions::new().write(true).truncate(true).open(target)?;
+    io::copy(&mut new, &mut old)?;
+    old.sync_all()
 }
 
 impl Drop for Unfinished {
@@ -285,6 +297,25 @@ mod tests {
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(files(&folder), ["a.txt"]);
         fs::set_permissions(&path, writable).unwrap();
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_are_passed_on() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = std::env::temp_dir().join(format!("upbp-permissions-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("a.txt");
+        write_text(&path, "old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
+        write_text(&path, "new").unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        // What cannot be replaced gets the content, and is the same file as before.
+        let other = folder.join("b.txt");
+        fs::write(&other, "a longer text").unwrap();
+        write_in_place(&path, &other).unwrap();
+        assert_eq!(fs::read_to_string(&other).unwrap(), "new");
         fs::remove_dir_all(&folder).unwrap();
     }
 

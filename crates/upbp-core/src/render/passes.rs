@@ -1,7 +1,8 @@
 //! The passes of one iteration, in parallel, with a result that does not depend on the number of threads.
 //!
-//! Work is cut into pieces whose size does not depend on the number of threads, and what pieces return is put
-//! together in their order: a reduction by work stealing would change the last bits with the schedule.
+//! Light sub-paths are cut into pieces whose size does not depend on the number of threads, and what pieces
+//! return is put together in their order: a reduction by work stealing would change the last bits with the
+//! schedule. Pixels are independent of each other, however they are cut.
 
 use std::iter::repeat_with;
 use std::ops::Range;

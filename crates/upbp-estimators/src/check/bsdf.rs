@@ -50,6 +50,8 @@ fn check_bsdf_from(bsdf: &impl Bsdf, interface: Interface, from: Vec3, seed: u64
     let mut observed = vec![0_u32; THETA_CELLS * PHI_CELLS];
     // Dirac lobes on the side of `from` and on the other: number of draws and their probability.
     let mut dirac = [(0_u32, 0.0_f32); 2];
+    // By side and walk.
+    let mut is_checked = [[false; 2]; 2];
     let mut rest = 0_u32;
     for draw in 0..DRAWS {
         let (u_lobe, u) = (random.next(), random.pair());
@@ -61,9 +63,9 @@ fn check_bsdf_from(bsdf: &impl Bsdf, interface: Interface, from: Vec3, seed: u64
         check_bsdf_sample(bsdf, interface, from, walk, &sample)?;
         if sample.delta {
             rest += 1;
-            let lobe = &mut dirac[usize::from(sample.to.z * from.z < 0.0)];
-            // Once for each walk.
-            if lobe.0 == 0 || (lobe.0 == 1 && draw % 2 == 1) {
+            let side = usize::from(sample.to.z * from.z < 0.0);
+            let lobe = &mut dirac[side];
+            if !std::mem::replace(&mut is_checked[side][draw % 2], true) {
                 check_dirac_reverse(bsdf, interface, from, walk, &sample, &mut random)?;
             }
             *lobe = (lobe.0 + 1, sample.pdf);

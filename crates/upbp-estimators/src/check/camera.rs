@@ -57,7 +57,7 @@ pub fn check_camera(camera: &impl Camera) -> Check {
     Ok(())
 }
 
-/// From which on a point of a ray is told from its origin well enough, by the digits of its coordinates.
+/// Least distance at which rounding of coordinates does not turn the direction from the lens to a point.
 fn least_distance(ray: &CameraRay) -> f32 {
     0.02 * ray.origin.length()
 }

@@ -92,7 +92,10 @@ fn check_lights(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random
             let is_judged = hit.as_ref().is_some_and(|hit| hit.geometric_normal.dot(direction).abs() > 1e-2);
             let is_there = !is_judged || stops_on_surface(scene, &ray);
             require(is_there, "no light is on a surface that another body hides", (index, ray))?;
-            let shines = hit.as_ref().filter(|_| is_judged).is_none_or(|hit| {
+            // Another part of a hollow lamp may be in front of it.
+            let is_start = |position: Vec3| position.distance(emission.point.position) <= 1e-2 * before;
+            let start = hit.as_ref().filter(|hit| is_judged && is_start(hit.position));
+            let shines = start.is_none_or(|hit| {
                 let point = EmitterPoint { position: hit.position, normal: hit.geometric_normal };
                 let seen = emitter.hit(bounds, &point, emission.direction, origin);
                 seen.is_some_and(|seen| !seen.radiance.is_black())

@@ -90,6 +90,9 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             Arrival::Vertex(arrived) => arrived,
             Arrival::Escaped => {
                 techniques::environment(context, edge_trace, &edge, &mut out);
+                if !scattered_before {
+                    walk.features = Features::NONE;
+                }
                 break;
             }
             Arrival::Absorbed => break,

@@ -3,7 +3,6 @@
 //! A path meets all that coincides as one: [`Scene::trace`](upbp_estimators::scene::Scene::trace) tells it of
 //! one surface, with the other boundaries as crossings at the same distance.
 
-use glam::Vec3;
 use upbp_accel::{Candidate, RAY_OFFSET, Ray, Shape, Visit};
 use upbp_estimators::scene::{Crossing, Hit};
 
@@ -14,9 +13,8 @@ use crate::material::Material;
 /// nearer than this to a surface, so that none that does not coincide with it is skipped. What one that
 /// leaves meets again was crossed already, which changes nothing.
 pub(crate) const COINCIDENT: f32 = 1.25 * RAY_OFFSET;
-/// Distance between planes of triangles that are meant to coincide, relative to the coordinates of a corner
-/// along the normal: roundings of the corners. It counts where the plane passes near the origin, far from the
-/// corners.
+/// Distance between planes of triangles that are meant to coincide, relative to the largest coordinate of a
+/// corner: roundings of the corners. It counts where the plane passes near the origin, far from the corners.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 /// Distance behind an opaque surface at which a lamp is meant to be in its plane, relative to the largest
 /// coordinate of the place. Rays start from a lamp farther off than this, or its light would not get out.
@@ -44,10 +42,8 @@ impl ReadyScene {
     pub(super) fn width(&self, ray: &Ray, candidate: &Candidate, hit: &Hit<Material>) -> f32 {
         let largest_corner = match self.geometry.shape(candidate.shape) {
             Shape::Mesh(mesh) => {
-                // Roundings along the plane do not move it.
-                let normal = hit.geometric_normal.abs();
-                let along_normal = |corner: Vec3| corner.abs().dot(normal).min(corner.abs().max_element());
-                mesh.corners(candidate.primitive).map(along_normal).into_iter().fold(0.0, f32::max)
+                let corners = mesh.corners(candidate.primitive);
+                corners.map(|corner| corner.abs().max_element()).into_iter().fold(0.0, f32::max)
             }
             Shape::Sphere(_) | Shape::Box(_) | Shape::Quad(_) => 0.0,
         };

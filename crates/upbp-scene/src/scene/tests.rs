@@ -318,23 +318,6 @@ fn what_is_nearer_than_a_ray_starts_from_a_surface_coincides() {
 }
 
 #[test]
-fn large_triangles_swallow_nothing_near_their_plane() {
-    // A sea whose corners are far away, a rock just below its surface, and a bubble just above.
-    let sea = "(geometry: Box(min: (-1e5, -1e3, -1e5), max: (1e5, 0, 1e5), rotate: [(axis: (0, 1, 0), degrees: 30)]), \
-               material: \"water\"),";
-    let rock = "(geometry: Quad(origin: (-9, -0.01, -9), edge_u: (0, 0, 18), edge_v: (18, 0, 0)), material: \"wall\"),";
-    let bubble = "(geometry: Box(min: (-9, 0.01, -9), max: (9, 0.02, 9)), material: \"null\"),";
-    let scene = scene(MEDIA, &[sea, rock, bubble].concat());
-    let direction = Vec3::new(0.9, -0.2, 0.1).normalize();
-    let ray = Ray { origin: Vec3::new(-2.0, 0.4, 0.0) - scene.origin(), direction, ..ALONG_X };
-    let mut crossings = Vec::new();
-    let hit = scene.trace(&ray, &mut crossings).unwrap();
-    assert!(matches!(hit.boundary, Boundary::Refracting(..)), "{hit:?}");
-    assert_eq!(crossings.len(), 2, "into the bubble and out of it");
-    assert!(crossings.iter().all(|crossing| crossing.t < hit.t));
-}
-
-#[test]
 fn refracting_bodies_do_not_block_a_segment_but_are_reported() {
     let scene = scene(MEDIA, "(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"glass\")");
     let mut crossings = Vec::new();

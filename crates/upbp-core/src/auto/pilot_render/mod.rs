@@ -26,8 +26,8 @@ use crate::settings::CheckedSettings;
 use grid::Grid;
 use recorder::{ByRoulette, PerTechnique, Recorder, Sample, TECHNIQUES, add, passed};
 
-/// Times that a pilot render samples each of its pixels: products of two independent samples tell the square
-/// of the mean.
+/// Times that a pilot render samples each of its pixels: products of two samples tell what they have in
+/// common, as iterations that are stratified do.
 pub(super) const PASSES: u32 = 2;
 /// Splats that are paired with another one of their light sub-path, about, to tell what neighbouring pixels
 /// have in common.
