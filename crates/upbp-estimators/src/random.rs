@@ -42,9 +42,9 @@ pub enum StreamKind {
     Camera,
     /// Light sub-paths of the preparation, which sets radii and counts before the first iteration.
     PilotLight,
-    /// Camera sub-paths of the preparation. Those of one index, in iterations that differ in nothing but their
-    /// lower 32 bits, share their first decisions and are independent after them: their difference tells the
-    /// variance of a pixel that stratification leaves.
+    /// Camera sub-paths of the preparation. Those of one index, in iterations that differ in nothing but
+    /// their lower 32 bits, share their first decisions and are independent after them: their difference
+    /// tells the variance of a pixel that stratification leaves.
     PilotCamera,
     /// The turns in which pixels make photon queries.
     MergePeriods,
