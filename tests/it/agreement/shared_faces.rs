@@ -263,6 +263,10 @@ proptest! {
             prop_assert_eq!(clear.is_some(), surfaces == 0);
         }
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, ..ProptestConfig::default() })]
 
     /// With media whose densities depend on where an edge is cut: a walk along it, one back, and a connection
     /// have to agree. Faces of index-matched boxes coincide to the bit.
