@@ -5,9 +5,9 @@
 //! the functions that evaluate it, that frequencies follow densities, and that densities integrate to one.
 //! They use their own fixed random numbers: an implementation passes always or never.
 //!
-//! Frequencies are compared by Pearson's χ² on a grid of directions, at a significance of 10⁻⁶ per test; sums
-//! of random terms within five standard errors. Equalities allow for single precision: one part in a
-//! thousand.
+//! Frequencies are compared by Pearson's χ² on a grid of directions, at a significance of 10⁻⁶ per test;
+//! those of lights by their moments, and sums of random terms, within five standard errors. Equalities allow
+//! for single precision: one part in a thousand.
 
 mod bsdf;
 mod camera;
