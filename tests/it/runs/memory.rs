@@ -233,7 +233,7 @@ fn preparations_take_what_is_allowed() {
         // Emitters are measured: without a limit up to 500 MiB.
         Some("milk") => prepare_text(MILK, "auto", usual),
         // Beams alone are stored, no vertices.
-        Some("beams") => prepare_text(FOG, "hit+nee+bb1d", 4096),
+        Some("beams") => prepare_text(FOG, "hit+nee+bb1d", 1024),
         // Long walks: with all of their queries the preparation takes a hundred MiB.
         Some(_) => prepare_text(FOG, "auto", 4096),
         None => {
