@@ -155,7 +155,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
 struct Measured {
     /// The contribution of every emitter by light sub-paths.
     emission: EmitterShares,
-    /// Findings of next events, in two halves of different camera sub-paths.
+    /// Contributions of next events, in two halves of different camera sub-paths.
     next_events: [Vec<NextEvent>; 2],
     guides: Evidence,
     /// Light that light sub-paths brought, relative to that of its pixel.
@@ -363,7 +363,7 @@ fn light_sub_paths<S: Scene, L: Lanes>(
     Some(LightMap::build(plan, vertices, beams))
 }
 
-/// Findings that sub-paths of one piece of work made.
+/// Contributions that sub-paths of one piece of work made.
 #[derive(Default)]
 struct Findings {
     /// Light sub-paths with their starts.

@@ -2,8 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
+use super::moments::{Distribution, Mean, Places, Sources};
 use super::{Check, DRAWS, Random, direction, is_density, is_light, is_unit, require, same, same_spectrum};
 use crate::scene::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint};
 
@@ -182,8 +183,8 @@ fn check_disc(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Rand
             mean.add(term);
         }
     }
-    let drawn = moments.iter().filter(|moment| moment.count > 0.0);
-    drawn.into_iter().try_for_each(|moment| moment.agrees((0.0, 2e-4), "the disc is sampled uniformly"))
+    let mut drawn = moments.iter().filter(|moment| !moment.is_empty());
+    drawn.try_for_each(|moment| moment.agrees((0.0, 2e-4), "the disc is sampled uniformly"))
 }
 
 /// A light that has one point or one direction: what is emitted is what receivers on its way see.
@@ -252,100 +253,6 @@ fn check_incident(
     let alone =
         emitter.pdf_incident(bounds, &incident.point, -incident.towards_light, receiver, seen.pdf_position);
     require(same(alone, incident.pdf), "pdf_incident agrees with sample_incident", (case, alone))
-}
-
-/// Mean of random terms, and its standard error.
-#[derive(Default)]
-struct Mean {
-    count: f64,
-    sum: f64,
-    squares: f64,
-}
-
-impl Mean {
-    fn add(&mut self, term: f64) {
-        self.count += 1.0;
-        self.sum += term;
-        self.squares += term * term;
-    }
-
-    fn value(&self) -> (f64, f64) {
-        let mean = self.sum / self.count;
-        (mean, ((self.squares / self.count - mean * mean).max(0.0) / self.count).sqrt())
-    }
-
-    fn agrees(&self, expected: (f64, f64), what: &'static str) -> Check {
-        let (mean, error) = self.value();
-        let tolerance = 5.0 * error.hypot(expected.1) + 2e-3 * expected.0.abs();
-        require((mean - expected.0).abs() <= tolerance, what, (mean, error, expected))
-    }
-}
-
-/// Samples of light with functions of what was drawn. Their means, weighted by the light, tell draws that do
-/// not follow their densities, also where the light over its density is always the same.
-#[derive(Default)]
-struct Distribution(Vec<(f64, [f64; 6])>);
-
-/// Effective number of samples from which on a standard error can be told.
-const LEAST_SAMPLES: f64 = 100.0;
-
-impl Distribution {
-    fn add(&mut self, light: f64, functions: [f64; 6]) {
-        if light > 0.0 {
-            self.0.push((light, functions));
-        }
-    }
-
-    /// Mean of a function, and its standard error.
-    fn moment(&self, function: usize) -> (f64, f64) {
-        let light: f64 = self.0.iter().map(|(light, _)| light).sum();
-        let mean = self.0.iter().map(|(light, values)| light * values[function]).sum::<f64>() / light;
-        let squares: f64 =
-            self.0.iter().map(|(light, values)| (light * (values[function] - mean)).powi(2)).sum();
-        (mean, squares.sqrt() / light)
-    }
-
-    /// As many samples of the same light would tell as much.
-    fn effective_samples(&self) -> f64 {
-        let light: f64 = self.0.iter().map(|(light, _)| light).sum();
-        let squares: f64 = self.0.iter().map(|(light, _)| light * light).sum();
-        if squares > 0.0 { light * light / squares } else { 0.0 }
-    }
-
-    /// Whether both are draws of one distribution, as far as there are enough of them to tell.
-    fn agrees(&self, other: &Self, what: &'static str) -> Check {
-        if self.effective_samples().min(other.effective_samples()) < LEAST_SAMPLES {
-            return Ok(());
-        }
-        (0..6).try_for_each(|function| {
-            let [own, others] = [self, other].map(|one| one.moment(function));
-            let tolerance = 5.0 * own.1.hypot(others.1) + 2e-3;
-            require((own.0 - others.0).abs() <= tolerance, what, (function, own, others))
-        })
-    }
-}
-
-/// Where an emitter starts light sub-paths: functions of a place have about the size of one.
-struct Places {
-    centre: DVec3,
-    spread: f64,
-}
-
-impl Places {
-    fn of(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Self {
-        let drawn: Vec<DVec3> = (0..1000)
-            .filter_map(|_| emitter.sample_emission(bounds, random.pair(), random.pair()))
-            .map(|emission| emission.point.position.as_dvec3())
-            .collect();
-        let centre = drawn.iter().sum::<DVec3>() / drawn.len().max(1) as f64;
-        let spread = drawn.iter().map(|place| place.distance(centre)).fold(0.0, f64::max);
-        Self { centre, spread: spread.max(f64::MIN_POSITIVE) }
-    }
-
-    fn functions(&self, place: Vec3) -> [f64; 6] {
-        let DVec3 { x, y, z } = (place.as_dvec3() - self.centre) / self.spread;
-        [x, y, z, x * x, y * y, z * z]
-    }
 }
 
 /// Directions from a surface or a volume must be drawn by their density. Directions that are drawn evenly and
@@ -507,57 +414,6 @@ fn check_point_directions(emitter: &impl Emitter, bounds: &BoundingSphere, rando
     }
     power.agrees((flux, 0.006 * flux), "emission carries the flux that receivers see")?;
     drawn.agrees(&even, "emission follows the density of directions")
-}
-
-/// A distribution of directions: every other one anywhere, and every other one in a cone around where light
-/// comes from, which uniform directions may miss altogether.
-struct Sources {
-    axis: DVec3,
-    /// One minus the cosine of the cone's half angle.
-    height: f64,
-}
-
-impl Sources {
-    /// By what the emitter draws: a cone of twice their angle.
-    fn of(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Random) -> Self {
-        let drawn: Vec<DVec3> = (0..1000)
-            .filter_map(|_| emitter.sample_emission(bounds, random.pair(), random.pair()))
-            .map(|emission| emission.direction.as_dvec3())
-            .collect();
-        let axis = drawn.iter().sum::<DVec3>().normalize_or(DVec3::Z);
-        let farthest = drawn.iter().map(|direction| versine(axis, *direction)).fold(0.0, f64::max);
-        Self { axis, height: (4.0 * farthest).clamp(1e-12, 2.0) }
-    }
-
-    fn sample(&self, random: &mut Random) -> Vec3 {
-        if random.next() < 0.5 {
-            return random.direction();
-        }
-        let [u, v] = random.pair().map(f64::from);
-        let (below_pole, (sin_phi, cos_phi)) = (u * self.height, (TAU * v).sin_cos());
-        let sine = (below_pole * (2.0 - below_pole)).sqrt();
-        let (tangent, bitangent) = self.axis.any_orthonormal_pair();
-        let across = sine * (cos_phi * tangent + sin_phi * bitangent);
-        (across + (1.0 - below_pole) * self.axis).as_vec3().normalize()
-    }
-
-    /// Functions of a direction, about as large as one within the cone.
-    fn functions(&self, direction: Vec3) -> [f64; 6] {
-        let direction = direction.as_dvec3();
-        let (tangent, bitangent) = self.axis.any_orthonormal_pair();
-        let [x, y] = [tangent, bitangent].map(|axis| axis.dot(direction) / (2.0 * self.height).sqrt());
-        [x, y, x * x, y * y, x * y, versine(self.axis, direction) / self.height]
-    }
-
-    fn pdf(&self, direction: Vec3) -> f64 {
-        let is_inside = versine(self.axis, direction.as_dvec3()) <= self.height;
-        0.5 / (2.0 * TAU) + if is_inside { 0.5 / (TAU * self.height) } else { 0.0 }
-    }
-}
-
-/// One minus the cosine of the angle between two unit vectors.
-fn versine(a: DVec3, b: DVec3) -> f64 {
-    0.5 * a.distance_squared(b)
 }
 
 /// `∫ pdf dω = 1` over all directions, and the same flux by emission, by choice and by quadrature.

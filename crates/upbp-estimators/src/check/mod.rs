@@ -13,6 +13,7 @@ mod bsdf;
 mod camera;
 mod emitter;
 mod medium;
+mod moments;
 mod normals;
 mod scene;
 
