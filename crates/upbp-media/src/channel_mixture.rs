@@ -44,8 +44,13 @@ pub(crate) fn channel_probabilities(sigma_s: Spectrum, sigma_t: Spectrum) -> [f6
 /// all of these. Of other channels nothing is left where they stop, and what passes is bounded by the channel
 /// that gets farthest.
 fn is_needed(sigma_s: Spectrum, sigma_t: Spectrum) -> [bool; 3] {
-    let farthest = (0..3).filter(|&c| sigma_s[c] > 0.0).map(|c| sigma_t[c]).fold(f32::INFINITY, f32::min);
-    [0, 1, 2].map(|c| sigma_s[c] > 0.0 || sigma_t[c] < farthest)
+    let least = least_extinction(sigma_s, sigma_t);
+    [0, 1, 2].map(|c| sigma_s[c] > 0.0 || sigma_t[c] < least)
+}
+
+/// The extinction of the channel that gets farthest of those that scatter; infinite if none does.
+pub(crate) fn least_extinction(sigma_s: Spectrum, sigma_t: Spectrum) -> f32 {
+    (0..3).filter(|&c| sigma_s[c] > 0.0).map(|c| sigma_t[c]).fold(f32::INFINITY, f32::min)
 }
 
 fn normalised(parts: [f64; 3]) -> [f64; 3] {

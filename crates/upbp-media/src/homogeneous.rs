@@ -11,7 +11,7 @@
 
 use glam::Vec3;
 
-use crate::channel_mixture::{channel_probabilities, segment_growth};
+use crate::channel_mixture::{channel_probabilities, least_extinction, segment_growth};
 use crate::error::check_non_negative;
 use crate::{MediaError, Medium, PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 
@@ -175,7 +175,7 @@ fn chromatic_density(alpha: &[f64; 3], sigma: Spectrum, length: f64) -> SegmentD
 /// The extinction of each channel's lane. The lane of a channel that only absorbs need not stop: it is that
 /// of the channel that gets farthest of those that scatter, or else one that always passes.
 fn lane_extinctions(sigma_s: Spectrum, sigma_t: Spectrum) -> Spectrum {
-    let farthest = (0..3).filter(|&c| sigma_s[c] > 0.0).map(|c| sigma_t[c]).fold(f32::INFINITY, f32::min);
+    let farthest = least_extinction(sigma_s, sigma_t);
     Spectrum::from_array([0, 1, 2].map(|c| {
         if sigma_s[c] > 0.0 {
             sigma_t[c]

@@ -25,9 +25,9 @@ impl<S: Scene> Clone for Context<'_, S> {
 impl<S: Scene> Copy for Context<'_, S> {}
 
 impl<S: Scene> Context<'_, S> {
-    /// The extent to which a ray is followed from within the bodies of `stack`, by a walk that has stopped in
-    /// media `stops` times: to the next surface if `all` is asked for, in a dense medium, and at every 32nd stop,
-    /// else until the walk stops.
+    /// The extent to which a ray is followed from within the bodies of `stack`, by a walk that has stopped
+    /// in media `stops` times: to the next surface if `all` is asked for, in a dense medium, and at every
+    /// 32nd stop, else until the walk stops.
     ///
     /// A walk that rounding has taken out of its body, and that heads away from it, meets no boundary that
     /// would tell, and would scatter for ever in a medium without end. The end of one ray in 32 does.
