@@ -1,4 +1,4 @@
-//! The emitters that sub-paths begin at, and how often.
+//! The emitters that sub-paths begin at, and how often (`docs/theory.md`, sections 6.6 and 6.11).
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,5 @@
-//! A discrete distribution over emitters, by their power and by the light that they were seen to bring.
+//! A discrete distribution over emitters, by their power and by the light that they were seen to bring
+//! (`docs/theory.md`, section 6.6).
 
 use serde::{Deserialize, Serialize};
 

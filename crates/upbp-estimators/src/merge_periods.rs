@@ -1,4 +1,5 @@
-//! Periods of photon queries: in each iteration one of `m` pixels makes them, and pixels take turns.
+//! Periods of photon queries: in each iteration one of `m` pixels makes them, and pixels take turns
+//! (`docs/theory.md`, section 6.3).
 //!
 //! Where photon queries bring little, a camera sub-path makes them with probability `1/m`, what they find
 //! counts `m` times, and in the weights of all camera sub-paths their number of samples is `n/m`. So the

@@ -88,6 +88,19 @@ fn light_whose_place_on_the_film_is_no_number_falls_on_no_pixel() {
 }
 
 #[test]
+fn light_that_is_never_chosen_is_hit() {
+    let scene = Hostile::new(F::Power(0.0));
+    for techniques in ["auto", "all", "hit+nee"] {
+        let settings = Settings { techniques: techniques.parse().expect("names"), ..Settings::default() };
+        let mut renderer =
+            Renderer::new(&scene, settings.validate().expect("valid settings")).expect("starts");
+        assert_eq!(renderer.support().techniques.to_string(), "hit", "{techniques}");
+        renderer.iterate();
+        assert!(renderer.film().image().mean().iter().all(|mean| *mean > 0.0), "{techniques}");
+    }
+}
+
+#[test]
 fn scenes_without_bounds_or_power_are_refused() {
     for bad in [f32::NAN, f32::INFINITY, -1.0] {
         assert!(render(F::Bounds(bad), "all").unwrap_err().contains("bounds"), "{bad}");

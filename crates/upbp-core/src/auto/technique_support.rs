@@ -6,7 +6,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use upbp_estimators::scene::{Emitter, EmitterId, EmitterKind, Scene};
+use upbp_estimators::scene::{Emitter, EmitterKind, Scene};
 use upbp_estimators::{MediumId, PreparedScene, Technique, TechniqueSet};
 
 use crate::error::RenderError;
@@ -84,16 +84,19 @@ impl TechniqueSupport {
                 support.drop(&reason, TechniqueSet::BPT.without(at_camera));
             }
         }
-        if !prepared.has_emitters() && !prepared.has_emitting_media() {
-            support.drop("nothing shines that reaches the scene", TechniqueSet::ALL);
-        } else if !prepared.has_emitters() {
-            support.drop("no light but emitting media: only emission hits remain", chosen.without(hit));
-        }
-        let is_hit = |(index, emitter): (usize, &S::Emitter)| {
-            emitter.kind().is_hittable() && prepared.emission_probability(EmitterId(index as u32)) > 0.0
-        };
-        if !prepared.has_emitting_media() && !scene.emitters().iter().enumerate().any(is_hit) {
-            support.drop("no light can be hit: emission hits are off", hit);
+        // Whatever their power: zero is never chosen, and hit like any other.
+        let is_area = |emitter: &S::Emitter| emitter.kind() == EmitterKind::Area;
+        let is_hit = prepared.has_emitting_media()
+            || !prepared.environments().is_empty()
+            || scene.emitters().iter().any(is_area);
+        match (is_hit, prepared.has_emitters()) {
+            (true, true) => {}
+            (true, false) => support.drop(
+                "nothing that shines can be chosen: only emission hits remain",
+                chosen.without(hit),
+            ),
+            (false, true) => support.drop("no light can be hit: emission hits are off", hit),
+            (false, false) => support.drop("nothing shines that reaches the scene", TechniqueSet::ALL),
         }
         if max_length < 2 {
             support.drop(&format!("paths of one edge: {remain}"), TechniqueSet::ALL.without(at_camera));

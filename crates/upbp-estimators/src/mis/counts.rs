@@ -45,7 +45,8 @@ pub struct VolumeMerges<T = f64> {
 /// The merges of a technique in one medium, where the scale of radii is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeMerge {
-    /// Samples times the volume of the kernel: `n V_d`, d its dimension; 0 if the technique is off there.
+    /// Samples times the volume of the kernel, with the factor of section 6.5: `n V_d / (1 + width)`, d its
+    /// dimension; 0 if the technique is off there.
     pub count: f64,
     /// `(r/ℓ)⁴` (section 6.5): its radius in mean free paths.
     pub width: f64,

@@ -1,5 +1,5 @@
 //! Next event estimation at the lens: a point on an emitter that is out of focus, and the lens point from
-//! which it is seen at the pixel's sample.
+//! which it is seen at the pixel's sample (`docs/theory.md`, section 2.8).
 
 use upbp_media::Lanes;
 

@@ -1,4 +1,4 @@
-//! Light tracing: a light vertex and the lens.
+//! Light tracing: a light vertex and the lens (`docs/theory.md`, section 2.8).
 
 use upbp_media::Lanes;
 

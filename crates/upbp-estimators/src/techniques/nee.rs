@@ -1,4 +1,4 @@
-//! Next event estimation: a camera vertex and a point chosen on a light.
+//! Next event estimation: a camera vertex and a point chosen on a light (`docs/theory.md`, section 2.8).
 
 use glam::Vec3;
 use upbp_media::{BodyId, Lanes, MediumStack};
