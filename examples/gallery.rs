@@ -1,8 +1,8 @@
-//! The pictures of the documentation: the shipped scene with everything, its layers, each technique alone.
+//! The lower half of `docs/gallery.md`: the shipped scene with everything, its layers, each technique alone.
 //!
 //! `cargo run --release --example gallery [-- SECONDS [FOLDER]]` renders six pictures of equal time and
-//! writes the PNG files of `docs/images`. Layers are the weighted contributions to the first picture, at the
-//! same exposure.
+//! writes them and the layers of the first one as PNG files to `docs/images`. Layers are the weighted
+//! contributions to the first picture, at the same exposure.
 
 use std::error::Error;
 use std::ops::ControlFlow;

@@ -28,7 +28,8 @@ fn page() -> String {
     let _ = writeln!(
         page,
         "\n`upbp help COMMAND` prints what is below.\n\
-         The file that `--settings` reads is described in [settings](settings.md)."
+         The file that `--settings` reads is described in [settings](settings.md), what a render prints and writes \
+         in [report](report.md)."
     );
     page += &lists("##", program.get_after_help());
     let mut before = String::new();

@@ -55,7 +55,8 @@ enum Command {
     Format,
     /// Print the completions of a shell
     ///
-    /// For bash: `upbp completions bash > ~/.local/share/bash-completion/completions/upbp`.
+    /// For bash: `mkdir -p ~/.local/share/bash-completion/completions && upbp completions bash >
+    /// ~/.local/share/bash-completion/completions/upbp`.
     Completions {
         /// The shell
         shell: Shell,

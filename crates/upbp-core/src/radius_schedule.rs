@@ -69,18 +69,20 @@ impl Radii {
 ///
 /// `γ = 1/(d + 4)` for a kernel of `d` dimensions balances variance and squared bias of what merges alone can
 /// find, and is consistent, since `0 < γ < 1/d` (section 5.1).
+///
+/// A technique that a choice of techniques has left out keeps its radius, which then has no effect.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RadiusSchedule {
-    /// Radius of surface merging, scene units, as all in iteration 0 where `φ` is one; 0 where it is off.
+    /// Radius of surface merging, scene units, as all in iteration 0 where `φ` is one; 0 if it cannot run.
     pub surf: f32,
-    /// Radius of photon points around points, scene units; 0 where it is off.
+    /// Radius of photon points around points, scene units; 0 if it cannot run.
     pub pp3d: f32,
-    /// Radius of photon points around query beams, scene units; 0 where it is off.
+    /// Radius of photon points around query beams, scene units; 0 if it cannot run.
     pub pb2d: f32,
-    /// Radius of photon beams around points, scene units; 0 where it is off.
+    /// Radius of photon beams around points, scene units; 0 if it cannot run.
     pub bp2d: f32,
-    /// Radius of photon beams around query beams, scene units; 0 where it is off.
+    /// Radius of photon beams around query beams, scene units; 0 if it cannot run.
     pub bb1d: f32,
     /// `φ`, the same for all techniques.
     pub field: RadiusField,

@@ -38,8 +38,8 @@ pub struct Report {
     pub deterministic: bool,
     /// Techniques, sample counts and first radii.
     pub plan: Plan,
-    /// Radii of the iteration with the largest index, where the scale of radii is one, scene units; 0 where a
-    /// technique is off.
+    /// Radii of the iteration with the largest index, where the scale of radii is one, scene units; without a
+    /// meaning for techniques that the plan does not run.
     pub last_radii: PerMerge<f32>,
     /// Counts over all iterations.
     pub counters: Counters,

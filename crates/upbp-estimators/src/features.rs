@@ -1,6 +1,7 @@
 //! Auxiliary features of a pixel, for denoisers and compositing: what the camera sees first.
 //!
-//! The first vertex with a smooth lobe counts, on a surface or in a medium, behind mirrors and through glass.
+//! The first vertex with a smooth lobe counts, on a surface or in a medium: behind perfect mirrors and
+//! through smooth glass, while rough glass and rough metal are such vertices themselves.
 //! Intel's Open Image Denoise takes albedos in `[0, 1]`, and normals of any length in `[-1, 1]`.
 
 use glam::Vec3;
@@ -12,8 +13,8 @@ use crate::scene::{Bsdf, Scene};
 /// Albedo, normal and distance of what one camera sub-path sees first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Features {
-    /// Share of light that is scattered, as it is tinted by mirrors and glass on the way, with light that is
-    /// emitted there or by the environment; in `[0, 1]`.
+    /// Share of light that is scattered, as it is tinted by perfect mirrors and smooth glass on the way, with
+    /// light that is emitted there or by the environment; in `[0, 1]`.
     pub albedo: Spectrum,
     /// Shading normal in world space, on the side that is seen; zero in a medium and where nothing is.
     pub normal: Vec3,

@@ -1,8 +1,9 @@
 //! Triangle meshes from Wavefront OBJ files.
 //!
 //! Read are vertices (`v`), normals (`vn`) and faces (`f`), with the names of objects (`o`), groups (`g`) and
-//! materials (`usemtl`) that they belong to; polygons become triangles. Texture coordinates, lines and points
-//! are skipped; anything else, such as a free-form surface, is an error.
+//! materials (`usemtl`) that they belong to; polygons become triangles. Statements that leave the polygons as
+//! they are, such as texture coordinates, lines and libraries of materials, are skipped; anything else, such
+//! as a free-form surface, is an error.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, Read as _};

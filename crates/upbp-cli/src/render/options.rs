@@ -139,7 +139,8 @@ pub(crate) struct Saving {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Resources")]
 pub(crate) struct Resources {
-    /// Threads, at most 16 per core; the image does not depend on it [default: one per core]
+    /// Threads, at most 16 per core; any number gives the same image by the same plan and iterations
+    /// [default: one per core]
     #[arg(long, value_name = "T", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Memory for film, light vertices, photon beams and their trees, MiB [default: half of what is free, or
@@ -316,7 +317,10 @@ pub(crate) fn names() -> String {
         ),
         ("half0, half1", "two independent halves of the render, for denoisers"),
         ("error", "estimated squared error of each pixel, relative to the converged value"),
-        ("albedo", "with --features: albedo of what the camera sees first, not counting mirrors and glass"),
+        (
+            "albedo",
+            "with --features: albedo of what the camera sees first, behind perfect mirrors and through smooth glass",
+        ),
         ("normal", "with --features: its normal X, Y, Z in world space; zero in media and for the sky"),
         ("Z", "with --features: its distance along the ray; infinite for the sky"),
         ("samples", "with --features: number of samples"),

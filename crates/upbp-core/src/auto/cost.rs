@@ -1,8 +1,9 @@
 //! The cost of an iteration of a plan, by a model.
 //!
 //! The model counts steps of sub-paths, as the pilot render saw them, and takes nanoseconds per step from a
-//! table that was set by hand after measurements on one machine. So a choice repeats to the last bit, on any
-//! machine and beside any other work.
+//! table that was set by hand after measurements on one machine. So a choice without a limit of time repeats
+//! to the last bit, on any machine and beside any other work. With one it depends on the number of threads,
+//! which tells how many iterations there will be, and on the clock, by which the preparation sizes its runs.
 
 use upbp_estimators::{Technique, TechniqueSet};
 
