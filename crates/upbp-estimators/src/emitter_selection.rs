@@ -179,7 +179,8 @@ impl Selection {
             return self.clone();
         }
         let evidence = shares.samples / TELLING_SAMPLES;
-        let trust = (1.0 - SPREAD_SHARE) * evidence / (evidence + count as f64);
+        let shining = (0..count).filter(|&i| spread(i) > 0.0).count();
+        let trust = (1.0 - SPREAD_SHARE) * evidence / (evidence + shining as f64);
         let weights: Vec<f64> =
             (0..count).map(|i| trust * light(i) / sum + (1.0 - trust) * spread(i)).collect();
         Self::new(&weights)

@@ -53,8 +53,8 @@ pub struct ReadyScene {
     pub(crate) is_specular: bool,
     pub(crate) camera: PerspectiveCamera,
     pub(crate) outside: Option<MediumId>,
-    /// Largest coordinate of meshes that refract.
-    pub(crate) largest_corner: f32,
+    /// The most that is [rounded](upbp_accel::TriangleMesh::rounded) for corners of meshes that refract.
+    pub(crate) most_rounded: f32,
     pub(crate) bounds: BoundingSphere,
     pub(crate) origin: Vec3,
     pub(crate) hash: u64,
@@ -250,18 +250,18 @@ impl Scene for ReadyScene {
         if hit.boundary.interior().is_none() && crossings.is_empty() {
             return Some(hit);
         }
-        let width = self.width(ray, &nearest, &hit);
+        let plane = self.plane(ray, &nearest, hit.position, hit.geometric_normal);
+        let width = plane.width(ray);
         let (before, behind) = (nearest.t - width, nearest.t + width);
-        let coincides = |t: f32| before < t && t < behind;
-        if hit.boundary.interior().is_some()
-            && (second < behind
-                || ray.t_max < behind
-                || opaque.is_some_and(|opaque| opaque.t < behind)
-                || crossings.iter().any(|crossing| coincides(crossing.t)))
-        {
-            hit = self.surface_at(ray, nearest.t, width, crossings).unwrap_or(hit);
+        let is_near = |crossing: &Crossing| before < crossing.t && crossing.t < behind;
+        let may_coincide = crossings.iter().any(is_near)
+            || hit.boundary.interior().is_some()
+                && (second < behind
+                    || ray.t_max < behind
+                    || opaque.is_some_and(|opaque| opaque.t < behind));
+        if may_coincide {
+            hit = self.surface_at(ray, &plane, crossings).unwrap_or(hit);
         } else {
-            // What is reflected by an opaque surface stays on this side of a boundary that coincides with it.
             crossings.retain(|crossing| crossing.t <= before);
         }
         sort(crossings);

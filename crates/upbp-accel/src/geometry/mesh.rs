@@ -108,7 +108,8 @@ impl TriangleMesh {
         let triangles = triangles.iter().map(|triangle| placement.winding(*triangle)).collect();
         let normals = normals.as_ref();
         let normals = normals.map(|normals| normals.iter().map(|normal| placement.normal(*normal)).collect());
-        let surface = Surface::new(positions, triangles, normals, *border, *dropped);
+        let mut surface = Surface::new(positions, triangles, normals, *border, *dropped);
+        surface.rounded = placement.rounded(self.surface.rounded.max(largest(self.surface.bounds())));
         if *border == Border::Nowhere {
             surface.set_signed_volume(self.surface.signed_volume() * placement.volume_ratio());
         }
@@ -348,6 +349,26 @@ impl TriangleMesh {
         self.bounds
     }
 
+    /// Along each axis the largest number that was rounded on the way to the coordinates of a triangle's
+    /// corners: planes that are meant to be one differ by roundings of these.
+    #[must_use]
+    pub fn rounded(&self, triangle: u32) -> Vec3 {
+        let [a, b, c] = self.surface.corners(triangle).map(Vec3::abs);
+        self.rounded_up_to(a.max(b).max(c))
+    }
+
+    /// The most that [`rounded`](Self::rounded) is for any triangle.
+    #[must_use]
+    pub fn most_rounded(&self) -> Vec3 {
+        self.rounded_up_to(largest(self.surface.bounds()))
+    }
+
+    /// What is rounded for corners of coordinates up to some, before the mesh is placed.
+    fn rounded_up_to(&self, coordinates: Vec3) -> Vec3 {
+        let own = self.surface.rounded.max(coordinates);
+        self.placement.as_ref().map_or(own, |placement| placement.rounded(own))
+    }
+
     /// The point with weights `b` and `c` for the second and third corner.
     pub(super) fn point(&self, triangle: u32, b: f64, c: f64) -> DVec3 {
         let [p, q, r] = self.corners(triangle).map(Vec3::as_dvec3);
@@ -379,6 +400,11 @@ impl TriangleMesh {
             None => geometric,
         }
     }
+}
+
+/// The largest coordinate along each axis.
+fn largest((min, max): (Vec3, Vec3)) -> Vec3 {
+    min.abs().max(max.abs())
 }
 
 #[cfg(test)]

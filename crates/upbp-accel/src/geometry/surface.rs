@@ -17,6 +17,8 @@ pub(super) struct Surface {
     pub(super) border: Border,
     /// Triangles without area that were left out.
     pub(super) dropped: usize,
+    /// [`rounded`](super::TriangleMesh::rounded) where corners were transformed, else zero.
+    pub(super) rounded: Vec3,
     bounds: (Vec3, Vec3),
     measures: Measures,
 }
@@ -81,7 +83,8 @@ impl Surface {
         for corner in triangles.iter().flatten().map(|&vertex| positions[vertex as usize]) {
             bounds = (bounds.0.min(corner), bounds.1.max(corner));
         }
-        Self { positions, triangles, normals, border, dropped, bounds, measures: Measures::default() }
+        let (rounded, measures) = (Vec3::ZERO, Measures::default());
+        Self { positions, triangles, normals, border, dropped, rounded, bounds, measures }
     }
 
     /// The least and the greatest coordinates.

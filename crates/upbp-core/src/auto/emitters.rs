@@ -249,11 +249,21 @@ fn measure<S: Scene, L: Lanes>(
     let [light_paths, camera_paths] = paths.map(|count| (part * f64::from(count)).ceil() as u32);
     let beam_paths = light_paths.div_ceil(PATHS_PER_BEAM_PATH).min(plan.beam_paths);
     let (full, plan) = (plan, &plan.blurred(light_paths, beam_paths));
-    let blur = |technique| match [plan, full].map(|plan| plan.kernels.get(technique)) {
-        [Some(wide), Some(narrow)] if narrow.effective_volume() > 0.0 => {
-            wide.effective_volume() / narrow.effective_volume()
-        }
-        _ => 1.0,
+    // In an iteration kernels are narrower, and contributions rarer and brighter by that; there are more light
+    // sub-paths, of which connections alone do not make more. So squares count for these many times as much.
+    let growth_of_squares = |technique| {
+        let blur = match [plan, full].map(|plan| plan.kernels.get(technique)) {
+            [Some(wide), Some(narrow)] if narrow.effective_volume() > 0.0 => {
+                wide.effective_volume() / narrow.effective_volume()
+            }
+            _ => 1.0,
+        };
+        let [few, many] = [plan, full].map(|plan| match technique {
+            Technique::Connect => 1.0,
+            Technique::Bp2d | Technique::Bb1d => f64::from(plan.beam_paths.max(1)),
+            _ => f64::from(plan.light_paths.max(1)),
+        });
+        blur * few / many
     };
     let context = Context { prepared: scene, plan };
     // Light tracing fills the crop. Without light sub-paths, a crop shows what the whole film does there.
@@ -303,8 +313,7 @@ fn measure<S: Scene, L: Lanes>(
         for &(path, contribution) in seen {
             if let Some((end, light)) = &mut starts[path as usize] {
                 let (chosen, relative) = (emission_probability(end.emitter), relative(contribution));
-                // In an iteration it would be as much brighter, and rarer, as its kernel is narrower.
-                let scale_of_squares = scale * blur(contribution.technique);
+                let scale_of_squares = scale * growth_of_squares(contribution.technique);
                 emission.push(contribution.square_of(end.emitter, chosen, scale_of_squares, relative));
                 let brought = scale * relative * contribution.value * contribution.weight;
                 *light += brought;

@@ -33,10 +33,11 @@ const DARK: f64 = 0.1;
 /// The variance of hits alone, relative to that with next events, up to which a volume is left to hits: a
 /// next event costs as much as a step of the walk.
 const MOST_BY_HITS: f64 = 2.0;
-/// Camera sub-paths that must have met a volume, or nothing is known of the variance of hits.
+/// Effective number of camera sub-paths that must have met a volume, or nothing is known of the variance of
+/// hits.
 const LEAST_MET: f64 = 64.0;
-/// Part of all camera sub-paths that must have, where light may come by specular surfaces: there light
-/// sub-paths may find what next events cannot.
+/// Part of all camera sub-paths that this number must be, where light may come by specular surfaces: there
+/// light sub-paths may find what next events cannot.
 const SELDOM: f64 = 0.125;
 /// Part of the time of a preparation that this may take.
 const TIME_FOR_VOLUMES: f64 = 0.05;

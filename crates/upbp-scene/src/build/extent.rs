@@ -65,14 +65,15 @@ pub(super) fn bounds(shapes: &[Shape], lights: &[Light], camera: &PerspectiveCam
     BoundingSphere { centre, radius: radius * (1.0 + 1e-5) + 1e-6 * centre.abs().max_element() }
 }
 
-/// The largest coordinate of meshes that refract; zero if there are none.
-pub(super) fn largest_corner(shapes: &[Shape], drafts: &[SurfaceDraft]) -> f32 {
+/// The most that is [rounded](upbp_accel::TriangleMesh::rounded) for corners of meshes that refract, in any
+/// direction; zero if there are none.
+pub(super) fn most_rounded(shapes: &[Shape], drafts: &[SurfaceDraft]) -> f32 {
     let refracting =
         |(_, draft): &(_, &SurfaceDraft)| matches!(draft.boundary, BoundaryDraft::Refracting(..));
     let refracting = shapes.iter().zip(drafts).filter(refracting);
-    let meshes = refracting.filter(|(shape, _)| matches!(shape, Shape::Mesh(_)));
-    meshes.fold(0.0, |largest, (shape, _)| {
-        let (min, max) = shape.aabb();
-        min.abs().max(max.abs()).max_element().max(largest)
-    })
+    let meshes = refracting.filter_map(|(shape, _)| match shape {
+        Shape::Mesh(mesh) => Some(mesh.most_rounded().length()),
+        Shape::Sphere(_) | Shape::Box(_) | Shape::Quad(_) => None,
+    });
+    meshes.fold(0.0, f32::max)
 }

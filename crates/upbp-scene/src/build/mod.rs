@@ -141,7 +141,7 @@ impl Builder<'_> {
         self.note_parts(places, origin);
         self.note_thin_bodies(places, origin);
         let bodies = bodies::rank(&drafts, &geometry).map_err(|error| self.problem("shapes", error)).ok()?;
-        let largest_corner = extent::largest_corner(geometry.shapes(), &drafts);
+        let most_rounded = extent::most_rounded(geometry.shapes(), &drafts);
         let surfaces = self.records(places, &bodies, &mut lights);
         lights.extend(volume_lights(&geometry, &bodies, &media, bounds.radius));
         let is_specular =
@@ -166,7 +166,7 @@ impl Builder<'_> {
             is_specular,
             camera,
             outside,
-            largest_corner,
+            most_rounded,
             bounds,
             origin,
             hash,

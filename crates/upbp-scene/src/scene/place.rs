@@ -3,8 +3,10 @@
 //! A path meets all that coincides as one: [`Scene::trace`](upbp_estimators::scene::Scene::trace) tells it of
 //! one surface, with the other boundaries as crossings at the same distance.
 
+use glam::Vec3;
 use upbp_accel::{Candidate, RAY_OFFSET, Ray, Shape, Visit};
 use upbp_estimators::scene::{Crossing, Hit};
+use upbp_media::BodyId;
 
 use super::{Opaque, ReadyScene, sort};
 use crate::material::Material;
@@ -13,8 +15,8 @@ use crate::material::Material;
 /// nearer than this to a surface, so that none that does not coincide with it is skipped. What one that
 /// leaves meets again was crossed already, which changes nothing.
 pub(crate) const COINCIDENT: f32 = 1.25 * RAY_OFFSET;
-/// Distance between planes of triangles that are meant to coincide, relative to the largest coordinate of a
-/// corner: roundings of the corners. It counts where the plane passes near the origin, far from the corners.
+/// Distance between planes of triangles that are meant to coincide, relative to what is rounded for their
+/// corners across the planes. It counts where the plane passes near the origin, far from the corners.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 /// Distance behind an opaque surface at which a lamp is meant to be in its plane, relative to the largest
 /// coordinate of the place. Rays start from a lamp farther off than this, or its light would not get out.
@@ -24,9 +26,35 @@ const DISTANCE: f32 = 2.0 * f32::EPSILON;
 /// Least cosine between a ray and the normal: distances between surfaces grow along rays that graze them.
 const GRAZING: f32 = 0.05;
 
-/// The way along `ray` to what is `across` off the surface that it hits, scene units.
-fn along(across: f32, ray: &Ray, hit: &Hit<Material>) -> f32 {
-    across / hit.geometric_normal.dot(ray.direction).abs().max(GRAZING) + DISTANCE * hit.t
+/// The plane of a surface that a ray meets, and how far off it another one coincides.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    /// Distance along the ray.
+    t: f32,
+    /// The geometric normal, turned the way the ray goes.
+    normal: Vec3,
+    /// Distance across the plane, scene units.
+    across: f32,
+}
+
+impl Plane {
+    fn new(ray: &Ray, t: f32, normal: Vec3, across: f32) -> Self {
+        Self { t, normal: if normal.dot(ray.direction) < 0.0 { -normal } else { normal }, across }
+    }
+
+    /// Distance along the ray beyond which nothing coincides.
+    pub(super) fn width(&self, ray: &Ray) -> f32 {
+        self.across / self.normal.dot(ray.direction).max(GRAZING) + DISTANCE * self.t
+    }
+
+    /// Whether another plane coincides: a ray that goes on from the nearer one starts `across` off it, and has
+    /// passed the other. So faces that are turned away from each other, as those at the rim of a ball are, or
+    /// stand upright on each other, never do.
+    fn coincides(&self, other: &Self, ray: &Ray) -> bool {
+        let between = (self.t - other.t).abs() - DISTANCE * self.t.max(other.t);
+        let cosine = self.normal.dot(ray.direction).min(other.normal.dot(ray.direction));
+        between * cosine < self.across.max(other.across) * self.normal.dot(other.normal).max(0.0)
+    }
 }
 
 /// Largest distance along `ray`, from an opaque surface at distance `t`, of a lamp in its plane.
@@ -38,17 +66,20 @@ pub(super) fn largest_width_of_plane(ray: &Ray, t: f32) -> f32 {
 }
 
 impl ReadyScene {
-    /// Distance along `ray` within which boundaries coincide with the hit of a candidate, scene units.
-    pub(super) fn width(&self, ray: &Ray, candidate: &Candidate, hit: &Hit<Material>) -> f32 {
-        let largest_corner = match self.geometry.shape(candidate.shape) {
-            Shape::Mesh(mesh) => {
-                let corners = mesh.corners(candidate.primitive);
-                corners.map(|corner| corner.abs().max_element()).into_iter().fold(0.0, f32::max)
-            }
+    /// The plane of the hit of a candidate.
+    pub(super) fn plane(&self, ray: &Ray, candidate: &Candidate, position: Vec3, normal: Vec3) -> Plane {
+        let rounded = match self.geometry.shape(candidate.shape) {
+            Shape::Mesh(mesh) => mesh.rounded(candidate.primitive).dot(normal.abs()),
             Shape::Sphere(_) | Shape::Box(_) | Shape::Quad(_) => 0.0,
         };
-        let across = (COINCIDENT * hit.position.abs().max_element()).max(ROUNDING * largest_corner);
-        along(across, ray, hit)
+        let across = (COINCIDENT * position.abs().max_element()).max(ROUNDING * rounded);
+        Plane::new(ray, candidate.t, normal, across)
+    }
+
+    /// The plane of a candidate.
+    fn plane_of(&self, ray: &Ray, candidate: &Candidate) -> Plane {
+        let point = self.geometry.surface(ray, candidate);
+        self.plane(ray, candidate, point.position, point.geometric_normal)
     }
 
     /// The hit of a lamp that is met behind the nearest opaque surface, if it is in its plane.
@@ -59,41 +90,59 @@ impl ReadyScene {
         nearest: &Candidate,
         lamp: &Candidate,
     ) -> Option<Hit<Material>> {
-        let hit = self.hit(ray, lamp);
-        let width = along(IN_PLANE * hit.position.abs().max_element(), ray, &hit);
-        (hit.t < nearest.t + width).then_some(hit)
+        let in_plane = |hit: &Hit<Material>| {
+            let across = IN_PLANE * hit.position.abs().max_element();
+            Plane::new(ray, hit.t, hit.geometric_normal, across)
+        };
+        let (nearest, hit) = (self.hit(ray, nearest), self.hit(ray, lamp));
+        in_plane(&nearest).coincides(&in_plane(&hit), ray).then_some(hit)
     }
 
-    /// Largest [`width`](Self::width) at distance `t` along `ray`.
+    /// Largest [width](Plane::width) at distance `t` along `ray`.
     #[inline]
     pub(super) fn largest_width(&self, ray: &Ray, t: f32) -> f32 {
         const MARGIN: f32 = 1.0 + 1e-4;
         let place = ray.origin.abs().max_element() + t;
-        let across = (COINCIDENT * place).max(ROUNDING * self.largest_corner);
+        let across = (COINCIDENT * place).max(ROUNDING * self.most_rounded);
         (across / GRAZING + DISTANCE * t) * MARGIN
     }
 
-    /// The surface at distance `at`, where something may coincide with it, as far as `width` before and
-    /// behind: an opaque one, or that of the highest body, with the other boundaries in `crossings`.
+    /// The surface that a ray meets first, in the plane `anchor`, where something may coincide with it: an
+    /// opaque one, or that of the highest body, with the other boundaries in `crossings`.
     #[cold]
     pub(super) fn surface_at(
         &self,
         ray: &Ray,
-        at: f32,
-        width: f32,
+        anchor: &Plane,
         crossings: &mut Vec<Crossing>,
     ) -> Option<Hit<Material>> {
-        let near = ray.with_range((at - width).max(ray.t_min), at + width);
+        let width = anchor.width(ray);
+        let near = ray.with_range((anchor.t - width).max(ray.t_min), anchor.t + width);
         crossings.retain(|crossing| crossing.t <= near.t_min);
+        let mut met = Vec::new();
+        self.geometry.for_each_hit(near, |candidate| {
+            let is_first = candidate.t <= anchor.t && !self.record(candidate).boundary.is_null();
+            met.push((*candidate, is_first || anchor.coincides(&self.plane_of(ray, candidate), ray)));
+            Visit::Continue
+        });
+        // What is behind something else belongs to another place.
+        let beyond = met.iter().filter(|(candidate, coincides)| candidate.t > anchor.t && !coincides);
+        let beyond = beyond.map(|(candidate, _)| candidate.t).fold(f32::INFINITY, f32::min);
+        met.retain(|(candidate, _)| candidate.t < beyond);
+        // What is before it and does not coincide was crossed before.
+        for (candidate, _) in met.iter().filter(|(_, coincides)| !coincides) {
+            let interior = self.record(candidate).boundary.interior();
+            crossings.extend(interior.map(|interior| self.crossing(ray, candidate, interior, false)));
+        }
         let first = crossings.len();
-        let (mut opaque, mut end) = (Opaque::default(), at);
+        let (mut opaque, mut end) = (Opaque::default(), anchor.t);
         let mut highest: Option<(Candidate, Crossing)> = None;
         let rank = |crossing: &Crossing| (crossing.interior.priority, crossing.entering);
-        self.geometry.for_each_hit(near, |candidate| {
+        for (candidate, _) in met.iter().filter(|(_, coincides)| *coincides) {
             let boundary = &self.record(candidate).boundary;
             let Some(interior) = boundary.interior() else {
                 self.add(ray, &mut opaque, candidate);
-                return Visit::Continue;
+                continue;
             };
             end = end.max(candidate.t);
             let crossing = self.crossing(ray, candidate, interior, !boundary.is_null());
@@ -103,8 +152,7 @@ impl ReadyScene {
             } else {
                 crossings.push(crossing);
             }
-            Visit::Continue
-        });
+        }
         // A glass that stands on a table: the light inside of it must not get below.
         if let Some(nearest) = opaque.nearest {
             crossings.truncate(first);
@@ -122,32 +170,52 @@ impl ReadyScene {
         let mut joined = false;
         let mut next = 0;
         while let Some(anchor) = (next..crossings.len()).find(|&i| crossings[i].scatters) {
-            let Crossing { t, interior, .. } = crossings[anchor];
-            let is_near = |other: &Crossing, width: f32| (other.t - t).abs() < width;
-            let largest = self.largest_width(ray, t);
-            let before = anchor > next && is_near(&crossings[anchor - 1], largest);
-            let behind = crossings.get(anchor + 1).is_some_and(|other| is_near(other, largest));
+            let begin = next;
             next = anchor + 1;
+            let t = crossings[anchor].t;
+            let largest = self.largest_width(ray, t);
+            let is_near = |other: &Crossing| (other.t - t).abs() < largest;
+            let before = anchor > begin && is_near(&crossings[anchor - 1]);
+            let behind = crossings.get(next).is_some_and(is_near);
             if !(before || behind) {
                 continue;
             }
-            let mut width = 0.0;
-            self.geometry.for_each_hit(ray.with_range(t.next_down(), t.next_up()), |candidate| {
-                if self.record(candidate).boundary.interior() == Some(interior) {
-                    width = self.width(ray, candidate, &self.hit(ray, candidate));
-                }
-                Visit::Continue
-            });
-            let first = crossings[..anchor].partition_point(|other| other.t <= t - width);
-            next += crossings[next..].partition_point(|other| other.t < t + width);
+            let planes = self.planes(&ray.with_range(t - largest, t + largest));
+            let plane_of = |crossing: &Crossing| {
+                let is_its = |(body, plane): &&(BodyId, Plane)| {
+                    *body == crossing.interior.body && plane.t == crossing.t
+                };
+                planes.iter().find(is_its).map(|(_, plane)| *plane)
+            };
+            let Some(own) = plane_of(&crossings[anchor]) else { continue };
+            let width = own.width(ray);
+            let coincides = |other: &Crossing| {
+                (other.t - t).abs() < width
+                    && plane_of(other).is_some_and(|plane| own.coincides(&plane, ray))
+            };
+            next += crossings[next..].iter().take_while(|other| coincides(other)).count();
             let end = crossings[next - 1].t;
-            for crossing in &mut crossings[first..next] {
-                crossing.t = end;
+            for crossing in &mut crossings[begin..next] {
+                if crossing.t >= t || coincides(crossing) {
+                    crossing.t = end;
+                }
             }
             joined = true;
         }
         if joined {
             sort(crossings);
         }
+    }
+
+    /// The planes of boundaries in the range of a ray.
+    #[cold]
+    fn planes(&self, near: &Ray) -> Vec<(BodyId, Plane)> {
+        let mut planes = Vec::new();
+        self.geometry.for_each_hit(*near, |candidate| {
+            let interior = self.record(candidate).boundary.interior();
+            planes.extend(interior.map(|interior| (interior.body, self.plane_of(near, candidate))));
+            Visit::Continue
+        });
+        planes
     }
 }

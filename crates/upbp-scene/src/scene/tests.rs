@@ -318,6 +318,53 @@ fn what_is_nearer_than_a_ray_starts_from_a_surface_coincides() {
 }
 
 #[test]
+fn the_rim_of_a_small_body_far_away_is_met() {
+    // A ball a thousand times as far from the origin as it is wide; something at the origin keeps it there.
+    let scene = scene(
+        MEDIA,
+        "(geometry: Sphere(centre: (500, 0, 0), radius: 0.5), material: \"glass\"),
+         (geometry: Sphere(centre: (-500, 0, 0), radius: 0.1), material: \"null\")",
+    );
+    let centre = Vec3::X * 500.0 - scene.origin();
+    for part in [0.9, 0.99, 0.995, 0.998, 0.9995] {
+        let ray = Ray { origin: centre + Vec3::new(-2.0, 0.5 * part, 0.0), ..ALONG_X };
+        let mut crossings = Vec::new();
+        let hit = scene.trace(&ray, &mut crossings).unwrap();
+        assert!(crossings.is_empty() && hit.t < 2.0, "{part}: {} {crossings:?}", hit.t);
+        assert!(scene.is_clear(&ray, &mut crossings));
+        let [enter, leave] = crossings[..] else { panic!("{crossings:?}") };
+        assert!(enter.t == hit.t && leave.t > 2.0, "{part}: {crossings:?}");
+    }
+}
+
+#[test]
+fn what_is_above_a_wide_mesh_is_not_in_its_plane() {
+    // Fog ends two centimetres above a ground of triangles 200 km wide, and a pane lies as far above it; the
+    // ground may have been turned there.
+    let ground = [
+        ("[(-1e5, 0, -1e5), (-1e5, 0, 1e5), (1e5, 0, 1e5), (1e5, 0, -1e5)]", ""),
+        ("[(-1e5, 1e5, 0), (-1e5, -1e5, 0), (1e5, -1e5, 0), (1e5, 1e5, 0)]", "rotate: [(axis: (1, 0, 0), degrees: -90)]"),
+    ];
+    for (positions, rotate) in ground {
+        let scene = scene(
+            MEDIA,
+            &format!(
+                "(geometry: Mesh(positions: {positions}, indices: [(0, 1, 2), (0, 2, 3)], {rotate}), material: \"wall\"),
+                 (geometry: Box(min: (-1, 0.02, -1), max: (1, 1, 1)), material: \"null\", interior: \"a\"),
+                 (geometry: Box(min: (2, 0.02, -1), max: (3, 0.03, 1)), material: \"glass\")"
+            ),
+        );
+        let down = |x: f32| Ray { origin: Vec3::new(x, 2.0, 0.1), direction: -Vec3::Y, ..ALONG_X };
+        let mut crossings = Vec::new();
+        let hit = scene.trace(&down(0.0), &mut crossings).unwrap();
+        assert!((hit.t - 2.0).abs() < 1e-5 && crossings.len() == 2, "{rotate} {} {crossings:?}", hit.t);
+        let inside = Ray { origin: Vec3::new(2.5, 0.025, 0.1), ..down(2.5) };
+        let hit = scene.trace(&inside, &mut Vec::new()).unwrap();
+        assert!(hit.boundary.interior().is_some(), "{rotate}");
+    }
+}
+
+#[test]
 fn refracting_bodies_do_not_block_a_segment_but_are_reported() {
     let scene = scene(MEDIA, "(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"glass\")");
     let mut crossings = Vec::new();
