@@ -7,6 +7,7 @@ mod edge;
 mod interaction;
 mod vertex;
 mod visibility;
+mod walk_state;
 
 pub(crate) use arrival::{Arrival, Arrived, arrive, depart};
 pub use context::{Context, Scratch};
@@ -18,3 +19,4 @@ pub(crate) use vertex::{CameraEdge, CameraVertex};
 pub use vertex::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
 pub(crate) use visibility::ray_origin;
 pub use visibility::{Target, clear_edge};
+pub use walk_state::WalkState;

@@ -207,8 +207,8 @@ impl<D: Densities, L: Lanes> CameraEdge<D, L> {
         let density = edge_trace.density_to(prepared.scene, span, t);
         let edge = Edge::new(&density, f64::from(t), 1.0, self.mis.start, true);
         (edge.forward.mean(&self.mis.shares) > 0.0).then(|| CameraVertex {
-            position: edge_trace.origin + edge_trace.direction * t,
-            towards_camera: -edge_trace.direction,
+            position: edge_trace.ray.at(t),
+            towards_camera: -edge_trace.ray.direction,
             throughput: self.throughput * transmitted(&density, plan.mis.query_beams, &self.mis.shares),
             mis: self.mis.arrive(&plan.mis, Walk::Camera, &edge, self.connections),
             scale,

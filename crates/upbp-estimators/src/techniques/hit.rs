@@ -63,8 +63,8 @@ fn emission_at<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 ) {
     let prepared = context.prepared;
     let density = edge_trace.density_to(prepared.scene, span, t);
-    let (receiver, direction) = (edge_trace.origin, -edge_trace.direction);
-    let position = receiver + t * edge_trace.direction;
+    let (receiver, direction) = (edge_trace.ray.origin, -edge_trace.ray.direction);
+    let position = edge_trace.ray.at(t);
     let value = edge.throughput * density.transmittance * (medium.source(position) / pdf as f32);
     let point = EmitterPoint { position, normal: direction };
     let light = edge_trace.stack_in(span, t).top().and_then(|top| prepared.volume_emitter(top.body));
@@ -149,15 +149,15 @@ pub(crate) fn environment<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.mis.start, false);
-    let away = prepared.bounds.centre + edge_trace.direction * (2.0 * prepared.bounds.radius);
-    let point = EmitterPoint { position: away, normal: -edge_trace.direction };
+    let away = prepared.bounds.centre + edge_trace.ray.direction * (2.0 * prepared.bounds.radius);
+    let point = EmitterPoint { position: away, normal: -edge_trace.ray.direction };
     for &emitter in prepared.environments() {
         shine(
             context,
             emitter,
             &point,
-            -edge_trace.direction,
-            edge_trace.origin,
+            -edge_trace.ray.direction,
+            edge_trace.ray.origin,
             &mis_edge,
             throughput,
             edge,

@@ -1,6 +1,7 @@
 //! Camera sub-paths: one per pixel sample, with every technique that ends on them.
 
 use glam::Vec2;
+use upbp_accel::Ray;
 use upbp_media::{Lanes, Spectrum};
 
 use crate::counters::Counters;
@@ -10,10 +11,10 @@ use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, depart, ray_origin,
+    Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, WalkState, arrive, depart,
+    ray_origin,
 };
 use crate::random::{Stream, StreamKind};
-use crate::roulette::Survival;
 use crate::scene::{Camera, EmitterPoint, Hit, Scene, Walk};
 use crate::technique::{Layer, Technique};
 use crate::techniques;
@@ -38,12 +39,13 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let mut stream = Stream::new(plan.seed, plan.iteration, kind, index);
     let [dx, dy] = stream.pair();
     let film = Vec2::new(pixel[0] as f32 + dx, pixel[1] as f32 + dy);
-    let Some(ray) = scene.camera().ray(film, stream.pair()) else { return walk };
+    let Some(camera_ray) = scene.camera().ray(film, stream.pair()) else { return walk };
+    let mut ray = Ray::new(camera_ray.origin, camera_ray.direction);
     if !(ray.origin.is_finite() && ray.direction.is_finite()) {
         counters.lost_walks += 1;
         return walk;
     }
-    observer.camera_end(film, &ray);
+    observer.camera_end(film, &camera_ray);
     let mut out = Output { film, layers: &mut walk.layers, counters, observer };
     let emission = plan.mis.hit > 0.0 && prepared.has_emitting_media();
     let own = plan.techniques_at(pixel);
@@ -52,32 +54,28 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let is_long = query_beams && plan.mis.query_beams == BeamExtent::Long;
     let needs_all = is_long || emission;
     let mut stack = prepared.stack_at_camera(ray.origin);
-    let mut origin = ray.origin;
-    let mut direction = ray.direction;
     let mut edge = CameraEdge {
         throughput: Spectrum::ONE,
-        mis: EdgeMis::at_camera(&plan.mis, f64::from(ray.pdf)),
+        mis: EdgeMis::at_camera(&plan.mis, f64::from(camera_ray.pdf)),
         connections: O::Densities::of(Technique::LightTracing, plan.mis.pow(plan.mis.light_tracing)),
         depth: 1,
     };
 
-    let mut stops = 0;
     let mut travelled = 0.0;
-    let mut survival = Survival::of_camera(plan.roulette, prepared.surroundings());
-    let hero = L::draw(&plan.mis.lanes, || stream.uniform());
+    let mut state = WalkState::new(context, Walk::Camera, stream);
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
         edge.depth = depth;
-        let extent = context.extent(needs_all, stops, &stack);
-        scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, hero, &mut stream);
+        let extent = context.extent(needs_all, &state, &stack);
+        scratch.edge_trace.trace(scene, &ray, &stack, extent, &mut state);
         out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
         if depth == 1 {
             let crossings = &mut scratch.crossings;
-            techniques::next_events_at_lens::<_, L, O>(context, &mut stream, crossings, &mut out);
+            techniques::next_events_at_lens::<_, L, O>(context, &mut state.stream, crossings, &mut out);
         }
         let edge_trace = &scratch.edge_trace;
         if emission {
-            techniques::emission_along(context, edge_trace, &edge, &mut stream, &mut out);
+            techniques::emission_along(context, edge_trace, &edge, &mut state.stream, &mut out);
         }
         if pb2d {
             techniques::pb2d(context, map, edge_trace, &edge, &mut out);
@@ -107,7 +105,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
             break;
         }
-        let from = -direction;
+        let from = -ray.direction;
         let mis_edge = Edge::new(
             &arrived.density,
             f64::from(arrived.distance),
@@ -119,7 +117,9 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             && let Some(Hit { emitter: Some(emitter), position, geometric_normal, .. }) = edge_trace.hit
         {
             let point = EmitterPoint { position, normal: geometric_normal };
-            techniques::shine(context, emitter, &point, from, origin, &mis_edge, throughput, &edge, &mut out);
+            techniques::shine(
+                context, emitter, &point, from, ray.origin, &mis_edge, throughput, &edge, &mut out,
+            );
         }
         if plan.features && !scattered_before {
             let Arrived { interaction, position, distance, .. } = &arrived;
@@ -155,9 +155,9 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
                 walk.seen = out.layers[Layer::Bpt as usize];
                 scattered_before = true;
             }
-            let crossings = &mut scratch.crossings;
-            techniques::next_events(context, &vertex, &sides, &mut stream, crossings, &mut out);
-            techniques::connections(context, map, &vertex, &sides, &mut stream, crossings, &mut out);
+            let (stream, crossings) = (&mut state.stream, &mut scratch.crossings);
+            techniques::next_events(context, &vertex, &sides, stream, crossings, &mut out);
+            techniques::connections(context, map, &vertex, &sides, stream, crossings, &mut out);
             match &vertex.interaction {
                 Interaction::Surface(surface) if own.has(Technique::Surf) => {
                     techniques::surf(context, map, &vertex, surface, &mut out);
@@ -174,16 +174,9 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             }
         }
 
-        let Some(scattered) = vertex.interaction.scatter::<_, L>(
-            scene,
-            &mut survival,
-            Walk::Camera,
-            vertex.position,
-            from,
-            hero,
-            &vertex.mis.shares,
-            &mut stream,
-        ) else {
+        let shares = &vertex.mis.shares;
+        let Some(scattered) = vertex.interaction.scatter(scene, vertex.position, from, shares, &mut state)
+        else {
             break;
         };
         out.observer.camera_vertex(&ObservedVertex {
@@ -193,10 +186,9 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             delta: scattered.delta,
             albedo: scattered.albedo,
         });
-        origin = ray_origin(&vertex.interaction, vertex.position, scattered.direction);
-        direction = scattered.direction;
+        let origin = ray_origin(&vertex.interaction, vertex.position, scattered.direction);
+        ray = Ray::new(origin, scattered.direction);
         stack.clone_from(sides.towards(scattered.transmitted));
-        stops += u32::from(in_medium);
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
             mis: depart(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),

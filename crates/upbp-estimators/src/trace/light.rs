@@ -1,6 +1,5 @@
 //! Light sub-paths: they leave vertices, photon beams, and splats of light tracing.
 
-use glam::Vec3;
 use upbp_accel::{Ray, Segment, offset_origin};
 use upbp_media::{Lanes, Medium, MediumId, MediumStack, Spectrum};
 
@@ -9,25 +8,22 @@ use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
     Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE, MediumSpan,
-    PhotonBeam, Scratch, arrive, depart, ray_origin,
+    PhotonBeam, Scratch, WalkState, arrive, depart, ray_origin,
 };
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
-use crate::roulette::Survival;
 use crate::scene::{Emitter, EmitterKind, PathEnd, Scene, Walk};
 use crate::technique::Technique;
 use crate::techniques::light_tracing;
 
 /// The walk's state between two vertices.
 struct Flight<D: Densities, L: Lanes> {
-    origin: Vec3,
-    direction: Vec3,
+    ray: Ray,
     stack: MediumStack,
     mis: EdgeMis<D, L>,
     source: EdgeSource,
     throughput: Spectrum,
     infinite: bool,
-    hero: L::Hero,
 }
 
 /// Traces light sub-path `index`.
@@ -40,12 +36,10 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     observer: &mut O,
 ) {
     let Context { prepared, plan } = *context;
-    let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
+    let stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
     let counters = &mut out.counters;
-    let Some(mut flight) = emit(context, index, &mut stream, counters, observer) else { return };
+    let Some((mut flight, mut state)) = emit(context, index, stream, counters, observer) else { return };
     let scene = prepared.scene;
-    let mut survival = Survival::of_light(plan.roulette, prepared.surroundings());
-    let mut stops = 0;
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
     let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
@@ -54,18 +48,8 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     for depth in 1..plan.lengths.max {
         out.counters.light_edges += 1;
         let edge_trace = &mut scratch.edge_trace;
-        let start = if flight.infinite { f32::NEG_INFINITY } else { 0.0 };
-        let extent = context.extent(long_beams, stops, &flight.stack);
-        edge_trace.trace(
-            scene,
-            flight.origin,
-            flight.direction,
-            &flight.stack,
-            start,
-            extent,
-            flight.hero,
-            &mut stream,
-        );
+        let extent = context.extent(long_beams, &state, &flight.stack);
+        edge_trace.trace(scene, &flight.ray, &flight.stack, extent, &mut state);
         out.counters.boundary_conflicts += edge_trace.take_conflicts();
         if leaves_beams {
             store_beams(context, edge_trace, &flight, depth, index, out);
@@ -86,7 +70,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         if !(t > 0.0) || throughput.is_black() || out.counters.overflows(throughput) {
             return;
         }
-        let from = -flight.direction;
+        let from = -flight.ray.direction;
         let connectible = interaction.is_connectible();
         let edge = Edge::new(
             &density,
@@ -96,7 +80,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             in_medium,
         );
         let connections = if connectible {
-            flight.source.connections(context, flight.direction, position)
+            flight.source.connections(context, flight.ray.direction, position)
         } else {
             O::Densities::ZERO
         };
@@ -117,7 +101,8 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
                 && plan.lengths.contains(depth + 1)
                 && !context.hides_from_both(&sides, PathEnd::Lens)
             {
-                light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
+                let (stream, crossings) = (&mut state.stream, &mut scratch.crossings);
+                light_tracing(context, &vertex, &sides, stream, crossings, out, observer);
                 observer.call(Technique::LightTracing, 0);
             }
             if plan.stores_vertices() {
@@ -126,17 +111,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             }
         }
 
-        let hero = flight.hero;
-        let Some(scattered) = interaction.scatter::<_, L>(
-            scene,
-            &mut survival,
-            Walk::Light,
-            position,
-            from,
-            hero,
-            &mis.shares,
-            &mut stream,
-        ) else {
+        let Some(scattered) = interaction.scatter(scene, position, from, &mis.shares, &mut state) else {
             return;
         };
         observer.light_vertex(
@@ -150,26 +125,23 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             },
         );
         flight = Flight {
-            origin: ray_origin(&interaction, position, scattered.direction),
-            direction: scattered.direction,
+            ray: Ray::new(ray_origin(&interaction, position, scattered.direction), scattered.direction),
             stack: sides.towards(scattered.transmitted).clone(),
             mis: depart(context, &mis, &interaction, scale, &scattered),
             source: EdgeSource::Vertex,
             throughput: throughput * scattered.weight,
             infinite: false,
-            hero,
         };
-        stops += u32::from(in_medium);
     }
 }
 
 fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     index: u32,
-    stream: &mut Stream,
+    mut stream: Stream,
     counters: &mut Counters,
     observer: &mut O,
-) -> Option<Flight<O::Densities, L>> {
+) -> Option<(Flight<O::Densities, L>, WalkState<L>)> {
     let prepared = context.prepared;
     let (emitter, probability) = prepared.choose_emission(stream.uniform())?;
     let light = &prepared.scene.emitters()[emitter.0 as usize];
@@ -181,9 +153,10 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let kind = light.kind();
     // With another probability a walk from infinity does not arrive. Those that do have not stopped on the
     // way.
-    let hero = L::draw(&context.plan.mis.lanes, || stream.uniform());
-    let passes = if kind.is_infinite() { prepared.passes_from_infinity::<L>().of_hero(hero) } else { 1.0 };
-    if passes < 1.0 && f64::from(stream.uniform()) >= passes {
+    let mut state = WalkState::<L>::new(context, Walk::Light, stream);
+    let is_infinite = kind.is_infinite();
+    let passes = if is_infinite { prepared.passes_from_infinity::<L>().of_hero(state.hero) } else { 1.0 };
+    if passes < 1.0 && f64::from(state.stream.uniform()) >= passes {
         return None;
     }
     let cos = match kind {
@@ -204,7 +177,7 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         EmitterKind::Point => offset_origin(emission.point.position, emission.direction, emission.direction),
         _ => emission.point.position,
     };
-    let stack = if kind.is_infinite() {
+    let stack = if is_infinite {
         MediumStack::new(prepared.scene.outside())
     } else {
         prepared.scene.stack_at(origin)
@@ -220,14 +193,10 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         _ => f64::from(u8::from(kind.is_hittable())),
     };
     observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
-    let origin = if kind.is_infinite() {
-        start_near_scene(prepared.scene, &Ray::new(origin, emission.direction))?
-    } else {
-        origin
-    };
-    Some(Flight {
-        origin,
-        direction: emission.direction,
+    let ray = Ray::new(origin, emission.direction);
+    let ray = if is_infinite { near_scene(prepared.scene, &ray)? } else { ray };
+    let flight = Flight {
+        ray,
         stack,
         mis: EdgeMis::at_light(
             &context.plan.mis,
@@ -239,19 +208,20 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         ),
         source: EdgeSource::Emitter { emitter, point: emission.point, pdf_position: emission.pdf_position },
         throughput,
-        infinite: kind.is_infinite(),
-        hero,
-    })
+        infinite: is_infinite,
+    };
+    Some((flight, state))
 }
 
-/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Distances
-/// from there have the digits of what is near, not those of a start as far away as the scene is wide: both
-/// faces of a pane of glass would be at one, and places in media beside their bodies.
-fn start_near_scene<S: Scene>(scene: &S, ray: &Ray) -> Option<Vec3> {
+/// The ray from infinity whose origin is just before what it meets first; `None` if it meets nothing.
+/// Distances from there have the digits of what is near, not those of a start as far away as the scene is
+/// wide: both faces of a pane of glass would be at one, and places in media beside their bodies.
+fn near_scene<S: Scene>(scene: &S, ray: &Ray) -> Option<Ray> {
     let first = scene.intersect(ray)?.t;
     let margin = 16.0 * f32::EPSILON * (first + ray.origin.abs().max_element());
     let along = f64::from((first - margin).max(0.0));
-    Some((ray.origin.as_dvec3() + along * ray.direction.as_dvec3()).as_vec3())
+    let origin = (ray.origin.as_dvec3() + along * ray.direction.as_dvec3()).as_vec3();
+    Some(Ray { origin, t_min: f32::NEG_INFINITY, ..*ray })
 }
 
 fn store_beams<S: Scene, D: Densities, L: Lanes>(
@@ -273,8 +243,8 @@ fn store_beams<S: Scene, D: Densities, L: Lanes>(
         out.counters.photon_beams += 1;
         out.beams.push(PhotonBeam {
             segment: Segment {
-                origin: edge_trace.origin,
-                direction: edge_trace.direction,
+                origin: edge_trace.ray.origin,
+                direction: edge_trace.ray.direction,
                 start: span.start,
                 end,
             },
