@@ -81,7 +81,7 @@ const ROUNDINGS: f32 = 64.0;
 const MOST_OF_FREE_PATH: f32 = 1.0 / 128.0;
 
 /// The decision where a walk stops, while it is followed.
-struct Flight<'a, L: Lanes> {
+struct FreeFlight<'a, L: Lanes> {
     extent: Extent,
     /// The lane that distances are drawn from.
     hero: L::Hero,
@@ -95,7 +95,7 @@ struct Flight<'a, L: Lanes> {
     origin: f32,
 }
 
-impl<L: Lanes> Flight<'_, L> {
+impl<L: Lanes> FreeFlight<'_, L> {
     /// Distance to which the ray has to be followed if the current medium goes on: to all that the stop has
     /// to keep off.
     fn max_distance(&self) -> f32 {
@@ -190,7 +190,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         self.spans.clear();
         self.stop = None;
         self.hit = None;
-        let mut flight = Flight::<L> {
+        let mut flight = FreeFlight::<L> {
             extent,
             hero: state.hero,
             stream: &mut state.stream,
@@ -293,7 +293,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
 
     /// Begins `span`: draws the distance in its medium.
     #[inline]
-    fn enter<S: Scene<Bsdf = B>>(&self, scene: &S, span: &MediumSpan<L>, flight: &mut Flight<'_, L>) {
+    fn enter<S: Scene<Bsdf = B>>(&self, scene: &S, span: &MediumSpan<L>, flight: &mut FreeFlight<'_, L>) {
         flight.stop = f32::INFINITY;
         if self.stop.is_some() || span.start == f32::NEG_INFINITY {
             return;
@@ -319,7 +319,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         &mut self,
         scene: &S,
         span: &mut MediumSpan<L>,
-        flight: &Flight<'_, L>,
+        flight: &FreeFlight<'_, L>,
         end: f32,
     ) -> bool {
         span.end = end;
@@ -359,7 +359,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         &mut self,
         scene: &S,
         span: &mut MediumSpan<L>,
-        flight: &mut Flight<'_, L>,
+        flight: &mut FreeFlight<'_, L>,
         crossings: usize,
         more: bool,
     ) -> bool {

@@ -15,7 +15,7 @@ pub(crate) use crossing::{cross_all, has_surface};
 pub use edge::{EdgeTrace, Extent, MediumSpan};
 pub(crate) use interaction::MIN_COSINE;
 pub use interaction::{Evaluation, Interaction, MediumInterface, Scattered, SurfaceInteraction};
-pub(crate) use vertex::{CameraEdge, CameraVertex};
+pub(crate) use vertex::{CameraEdge, CameraVertex, LightEdge};
 pub use vertex::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
 pub(crate) use visibility::ray_origin;
 pub use visibility::{Target, clear_edge};

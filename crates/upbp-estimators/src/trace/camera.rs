@@ -65,7 +65,6 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let mut state = WalkState::new(context, Walk::Camera, stream);
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
-        edge.depth = depth;
         let extent = context.extent(needs_all, &state, &stack);
         scratch.edge_trace.trace(scene, &ray, &stack, extent, &mut state);
         out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
@@ -193,7 +192,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             throughput: throughput * scattered.weight,
             mis: depart(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),
             connections: plan.mis.connections(),
-            depth,
+            depth: depth + 1,
         };
     }
     if !scattered_before {

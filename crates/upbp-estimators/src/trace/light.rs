@@ -1,14 +1,14 @@
 //! Light sub-paths: they leave vertices, photon beams, and splats of light tracing.
 
 use upbp_accel::{Ray, Segment, offset_origin};
-use upbp_media::{Lanes, Medium, MediumId, MediumStack, Spectrum};
+use upbp_media::{Lanes, Medium, MediumId, MediumStack};
 
 use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE, MediumSpan,
-    PhotonBeam, Scratch, WalkState, arrive, depart, ray_origin,
+    Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightEdge, LightVertex, MIN_COSINE,
+    MediumSpan, PhotonBeam, Scratch, WalkState, arrive, depart, ray_origin,
 };
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
@@ -16,14 +16,13 @@ use crate::scene::{Emitter, EmitterKind, PathEnd, Scene, Walk};
 use crate::technique::Technique;
 use crate::techniques::light_tracing;
 
-/// The walk's state between two vertices.
-struct Flight<D: Densities, L: Lanes> {
+/// A light sub-path that starts.
+struct Emitted<D: Densities, L: Lanes> {
     ray: Ray,
+    /// The bodies around the ray's origin.
     stack: MediumStack,
-    mis: EdgeMis<D, L>,
-    source: EdgeSource,
-    throughput: Spectrum,
-    infinite: bool,
+    edge: LightEdge<D, L>,
+    state: WalkState<L>,
 }
 
 /// Traces light sub-path `index`.
@@ -38,7 +37,8 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let Context { prepared, plan } = *context;
     let stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
     let counters = &mut out.counters;
-    let Some((mut flight, mut state)) = emit(context, index, stream, counters, observer) else { return };
+    let Some(emitted) = emit(context, index, stream, counters, observer) else { return };
+    let Emitted { mut ray, mut stack, mut edge, mut state } = emitted;
     let scene = prepared.scene;
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
@@ -48,11 +48,11 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     for depth in 1..plan.lengths.max {
         out.counters.light_edges += 1;
         let edge_trace = &mut scratch.edge_trace;
-        let extent = context.extent(long_beams, &state, &flight.stack);
-        edge_trace.trace(scene, &flight.ray, &flight.stack, extent, &mut state);
+        let extent = context.extent(long_beams, &state, &stack);
+        edge_trace.trace(scene, &ray, &stack, extent, &mut state);
         out.counters.boundary_conflicts += edge_trace.take_conflicts();
         if leaves_beams {
-            store_beams(context, edge_trace, &flight, depth, index, out);
+            store_beams(context, edge_trace, &edge, index, out);
         }
 
         let arrival = match arrive(scene, edge_trace) {
@@ -65,26 +65,26 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         };
         let Arrived { position, distance, density, interaction, sides } = arrival;
         let in_medium = interaction.in_medium();
-        let t = density.forward(in_medium).mean(&flight.mis.shares);
-        let throughput = flight.throughput * density.transmittance / t as f32;
+        let t = density.forward(in_medium).mean(&edge.mis.shares);
+        let throughput = edge.throughput * density.transmittance / t as f32;
         if !(t > 0.0) || throughput.is_black() || out.counters.overflows(throughput) {
             return;
         }
-        let from = -flight.ray.direction;
+        let from = -ray.direction;
         let connectible = interaction.is_connectible();
-        let edge = Edge::new(
+        let mis_edge = Edge::new(
             &density,
-            if flight.infinite { f64::INFINITY } else { f64::from(distance) },
+            if edge.from_infinity { f64::INFINITY } else { f64::from(distance) },
             interaction.cosine(from),
-            flight.mis.start,
+            edge.mis.start,
             in_medium,
         );
         let connections = if connectible {
-            flight.source.connections(context, flight.ray.direction, position)
+            edge.source.connections(context, ray.direction, position)
         } else {
             O::Densities::ZERO
         };
-        let mis = flight.mis.arrive(&plan.mis, Walk::Light, &edge, connections);
+        let mis = edge.mis.arrive(&plan.mis, Walk::Light, &mis_edge, connections);
         let scale = plan.radius_scale(position, in_medium);
         let vertex = LightVertex {
             position,
@@ -124,13 +124,14 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
                 albedo: scattered.albedo,
             },
         );
-        flight = Flight {
-            ray: Ray::new(ray_origin(&interaction, position, scattered.direction), scattered.direction),
-            stack: sides.towards(scattered.transmitted).clone(),
+        ray = Ray::new(ray_origin(&interaction, position, scattered.direction), scattered.direction);
+        stack.clone_from(sides.towards(scattered.transmitted));
+        edge = LightEdge {
+            throughput: throughput * scattered.weight,
             mis: depart(context, &mis, &interaction, scale, &scattered),
             source: EdgeSource::Vertex,
-            throughput: throughput * scattered.weight,
-            infinite: false,
+            from_infinity: false,
+            depth: depth + 1,
         };
     }
 }
@@ -141,7 +142,7 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     mut stream: Stream,
     counters: &mut Counters,
     observer: &mut O,
-) -> Option<(Flight<O::Densities, L>, WalkState<L>)> {
+) -> Option<Emitted<O::Densities, L>> {
     let prepared = context.prepared;
     let (emitter, probability) = prepared.choose_emission(stream.uniform())?;
     let light = &prepared.scene.emitters()[emitter.0 as usize];
@@ -195,9 +196,8 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
     let ray = Ray::new(origin, emission.direction);
     let ray = if is_infinite { near_scene(prepared.scene, &ray)? } else { ray };
-    let flight = Flight {
-        ray,
-        stack,
+    let edge = LightEdge {
+        throughput,
         mis: EdgeMis::at_light(
             &context.plan.mis,
             if matches!(kind, EmitterKind::Volume(_)) { EdgeStart::Volume } else { EdgeStart::Surface },
@@ -207,10 +207,10 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             f64::from(emission.pdf_direction),
         ),
         source: EdgeSource::Emitter { emitter, point: emission.point, pdf_position: emission.pdf_position },
-        throughput,
-        infinite: is_infinite,
+        from_infinity: is_infinite,
+        depth: 1,
     };
-    Some((flight, state))
+    Some(Emitted { ray, stack, edge, state })
 }
 
 /// The ray from infinity whose origin is just before what it meets first; `None` if it meets nothing.
@@ -227,8 +227,7 @@ fn near_scene<S: Scene>(scene: &S, ray: &Ray) -> Option<Ray> {
 fn store_beams<S: Scene, D: Densities, L: Lanes>(
     context: &Context<'_, S>,
     edge_trace: &EdgeTrace<S::Bsdf, L>,
-    flight: &Flight<D, L>,
-    depth: u32,
+    edge: &LightEdge<D, L>,
     path: u32,
     out: &mut LightChunk<S::Bsdf, D, L>,
 ) {
@@ -250,11 +249,11 @@ fn store_beams<S: Scene, D: Densities, L: Lanes>(
             },
             medium,
             before: span.before,
-            mis: flight.mis,
-            source: flight.source,
-            throughput: flight.throughput,
-            from_infinity: flight.infinite,
-            depth,
+            mis: edge.mis,
+            source: edge.source,
+            throughput: edge.throughput,
+            from_infinity: edge.from_infinity,
+            depth: edge.depth,
             path,
         });
     }
