@@ -9,7 +9,7 @@ use crate::features::Features;
 use crate::film_sample::{CameraWalk, Output};
 use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
-use crate::observer::{ObservedVertex, Observer};
+use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
     Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, WalkState, arrive, depart,
     ray_origin,
@@ -116,9 +116,8 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             && let Some(Hit { emitter: Some(emitter), position, geometric_normal, .. }) = edge_trace.hit
         {
             let point = EmitterPoint { position, normal: geometric_normal };
-            techniques::shine(
-                context, emitter, &point, from, ray.origin, &mis_edge, throughput, &edge, &mut out,
-            );
+            let end = LightEnd { emitter, point, direction: from };
+            techniques::shine(context, &end, ray.origin, &mis_edge, throughput, &edge, &mut out);
         }
         if plan.features && !scattered_before {
             let Arrived { interaction, position, distance, .. } = &arrived;
