@@ -9,7 +9,7 @@ use crate::mis::{Densities, Edge, Weight};
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{CameraEdge, Context, EdgeTrace, MediumSpan};
 use crate::random::Stream;
-use crate::scene::{Bsdf, Emitter, EmitterPoint, HitDensities, Scene, Walk};
+use crate::scene::{Bsdf, Emitter, EmitterPoint, Hit, HitDensities, Scene, Walk};
 use crate::technique::Technique;
 
 /// Emission of media along the whole ray to the next surface.
@@ -156,8 +156,28 @@ pub(crate) fn environment<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     }
 }
 
+/// The camera sub-path has come to a surface, which may be that of an emitter.
+pub(crate) fn hit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
+    context: &Context<'_, S>,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+    mis_edge: &Edge<L>,
+    throughput: Spectrum,
+    edge: &CameraEdge<O::Densities, L>,
+    out: &mut Output<'_, O>,
+) {
+    // A walk that stops in a medium may know of the surface behind it.
+    if edge_trace.stop.is_none()
+        && let Some(Hit { emitter: Some(emitter), position, geometric_normal, .. }) = edge_trace.hit
+    {
+        let Ray { origin, direction, .. } = edge_trace.ray;
+        let point = EmitterPoint { position, normal: geometric_normal };
+        let end = LightEnd { emitter, point, direction: -direction };
+        shine(context, &end, origin, mis_edge, throughput, edge, out);
+    }
+}
+
 /// An emitter's light at the `end` of a camera sub-path, which gets there from `receiver` by `mis_edge`.
-pub(crate) fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
+fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     end: &LightEnd,
     receiver: Vec3,

@@ -35,9 +35,8 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     observer: &mut O,
 ) {
     let Context { prepared, plan } = *context;
-    let stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
-    let counters = &mut out.counters;
-    let Some(emitted) = emit(context, index, stream, counters, observer) else { return };
+    let stream = plan.stream(kind, u64::from(index));
+    let Some(emitted) = emit(context, index, stream, &mut out.counters, observer) else { return };
     let Emitted { mut ray, mut stack, mut edge, mut state } = emitted;
     let scene = prepared.scene;
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
