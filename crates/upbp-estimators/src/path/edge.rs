@@ -42,6 +42,14 @@ pub struct MediumSpan<L = f64> {
     crossings: usize,
 }
 
+impl<L> MediumSpan<L> {
+    /// The medium itself, of the scene that the edge was traced in; `None` for vacuum.
+    #[inline]
+    pub(crate) fn medium_in<'s, S: Scene>(&self, scene: &'s S) -> Option<&'s S::Medium> {
+        self.medium.map(|medium| &scene.media()[medium.0 as usize])
+    }
+}
+
 /// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a
 /// medium. Its densities are those of each of the [`Lanes`] `L`.
 pub struct EdgeTrace<B, L: Lanes = f64> {
@@ -72,6 +80,25 @@ pub struct EdgeTrace<B, L: Lanes = f64> {
 /// which [`check_scene`](crate::check::check_scene) finds.
 pub(crate) fn medium_of<S: Scene>(scene: &S, stack: &MediumStack) -> Option<MediumId> {
     stack.medium().filter(|medium| (medium.0 as usize) < scene.media().len())
+}
+
+/// Appends the stretch of `ray` from `start` to `end`, in a medium or in vacuum, to the densities of an edge.
+#[inline]
+pub(crate) fn push_stretch<S: Scene, L: Lanes>(
+    scene: &S,
+    density: &mut EdgeDensity<L>,
+    ray: &Ray,
+    medium: Option<MediumId>,
+    start: f32,
+    end: f32,
+) {
+    match medium {
+        Some(medium) => {
+            let segment = RaySegment { origin: ray.origin, direction: ray.direction, start, end };
+            density.push(&L::segment(&scene.media()[medium.0 as usize], &segment));
+        }
+        None => density.push_vacuum(),
+    }
 }
 
 /// Distance that stops of walks keep from boundaries and surfaces, lest they come out beyond them, in
@@ -298,7 +325,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         if self.stop.is_some() || span.start == f32::NEG_INFINITY {
             return;
         }
-        let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize]) else { return };
+        let Some(medium) = span.medium_in(scene) else { return };
         if !medium.scatters() {
             return;
         }
@@ -328,7 +355,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         }
         if self.stop.is_none()
             && let Some(u) = flight.decision
-            && let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize])
+            && let Some(medium) = span.medium_in(scene)
             && medium.scatters()
         {
             // Next to its end, decided for the segment as it is: the rounding of a distance far from the
@@ -400,12 +427,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     #[inline]
     pub fn density_to<S: Scene>(&self, scene: &S, span: &MediumSpan<L>, t: f32) -> EdgeDensity<L> {
         let mut density = span.before;
-        match span.medium {
-            Some(medium) => {
-                density.push(&L::segment(&scene.media()[medium.0 as usize], &self.segment(span, t)));
-            }
-            None => density.push_vacuum(),
-        }
+        push_stretch(scene, &mut density, &self.ray, span.medium, span.start, t);
         density
     }
 

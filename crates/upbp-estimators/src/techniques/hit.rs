@@ -30,8 +30,7 @@ pub(crate) fn emission_along<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     }
     let may_have_others = prepared.has_volume_emitters() && edge.depth > 1 && !edge.mis.is_alone();
     for span in &edge_trace.spans {
-        let Some(medium) = span.medium else { continue };
-        let medium = &prepared.scene.media()[medium.0 as usize];
+        let Some(medium) = span.medium_in(prepared.scene) else { continue };
         if !medium.emits() {
             continue;
         }

@@ -1,7 +1,7 @@
 //! Light sub-paths: they leave vertices, photon beams, and splats of light tracing.
 
 use upbp_accel::{Ray, Segment, offset_origin};
-use upbp_media::{Lanes, Medium, MediumId, MediumStack};
+use upbp_media::{Lanes, Medium, MediumStack};
 
 use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
@@ -237,7 +237,7 @@ fn store_beams<S: Scene, D: Densities, L: Lanes>(
         if !(merges.bb1d.is_on() || merges.bp2d.is_on()) {
             continue;
         }
-        let Some(end) = beam_end(prepared, edge_trace, span, medium, end) else { continue };
+        let Some(end) = beam_end(prepared, edge_trace, span, end) else { continue };
         out.counters.photon_beams += 1;
         out.beams.push(PhotonBeam {
             segment: Segment {
@@ -264,7 +264,7 @@ const DOUBLINGS: usize = 64;
 /// precision does not tell.
 const NEGLIGIBLE: f32 = 1e-7;
 
-/// The end of a beam in `span`, whose medium is `medium`, that runs to distance `end` there.
+/// The end of a beam in the medium of `span` that runs to distance `end` there.
 ///
 /// Where there is none, the beam ends where what is left in every channel is [negligible](NEGLIGIBLE), or is
 /// not attenuated any further. So weights may take it to be without an end. A beam from infinity has none
@@ -273,13 +273,12 @@ fn beam_end<S: Scene, L: Lanes>(
     prepared: &PreparedScene<'_, S>,
     edge_trace: &EdgeTrace<S::Bsdf, L>,
     span: &MediumSpan<L>,
-    medium: MediumId,
     end: f32,
 ) -> Option<f32> {
     if end.is_finite() || !span.start.is_finite() {
         return (end > span.start && span.start.is_finite()).then_some(end);
     }
-    let medium = &prepared.scene.media()[medium.0 as usize];
+    let medium = span.medium_in(prepared.scene)?;
     let transmittance = |end| medium.segment(&edge_trace.segment(span, end)).transmittance;
     let left = transmittance(f32::INFINITY);
     let ends = std::iter::successors(Some(prepared.bounds.radius), |length| Some(2.0 * length))
