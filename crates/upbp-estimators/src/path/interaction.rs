@@ -96,6 +96,14 @@ fn sine(a: Vec3, b: Vec3) -> f64 {
     f64::from(a.cross(b).length()).min(1.0)
 }
 
+impl<B> Interaction<B> {
+    /// Whether the vertex is in a medium.
+    #[inline]
+    pub const fn in_medium(&self) -> bool {
+        matches!(self, Self::Medium(_))
+    }
+}
+
 impl<B: Bsdf> Interaction<B> {
     /// The surface of a hit, between the bodies of `sides`. `None` if the surface is grazed.
     #[inline]
@@ -121,12 +129,6 @@ impl<B: Bsdf> Interaction<B> {
             Self::Surface(surface) => surface.bsdf.is_connectible(),
             Self::Medium(_) => true,
         }
-    }
-
-    /// Whether the vertex is in a medium.
-    #[inline]
-    pub const fn in_medium(&self) -> bool {
-        matches!(self, Self::Medium(_))
     }
 
     /// Cosine factor of an arriving or leaving direction.
