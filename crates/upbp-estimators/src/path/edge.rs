@@ -149,8 +149,8 @@ impl<L: Lanes> FreeFlight<'_, L> {
 }
 
 impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
-    /// Follows `ray`, whose origin lies in the bodies of `stack` but for rounding (a boundary that contradicts
-    /// them corrects them), and draws where the walk stops.
+    /// Follows `ray`, whose origin lies in the bodies of `stack` but for rounding (a boundary that
+    /// contradicts them corrects them), and draws where the walk stops.
     ///
     /// The way begins at the ray's lower end: 0, or −∞ for light that has come from infinity to the origin,
     /// through the medium around everything without a stop. It does not stop in its first stretch, then. The
