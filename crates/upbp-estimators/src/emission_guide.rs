@@ -6,6 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::random::ONE_MINUS_EPSILON;
+
 /// Random numbers of a start: two for the place, two for the direction.
 pub(crate) const AXES: usize = 4;
 /// Part of the starts that stays with the emitter's own distribution: but for the rounding of shares, no
@@ -39,7 +41,7 @@ const EVEN_STEPS: [f64; AXES] =
 
 /// The random numbers of a start in a sequence of which each first part fills the unit hypercube evenly.
 pub(crate) fn even_numbers(index: usize) -> [f32; 4] {
-    EVEN_STEPS.map(|step| (0.5 + index as f64 * step).fract() as f32).map(|u| u.min(1.0 - f32::EPSILON / 2.0))
+    EVEN_STEPS.map(|step| (0.5 + index as f64 * step).fract() as f32).map(|u| u.min(ONE_MINUS_EPSILON))
 }
 
 /// A start of a light sub-path with the light that it brought to the picture.
@@ -325,7 +327,7 @@ fn concentration(shares: &[f64]) -> f64 {
 fn mirrored(number: f64) -> f32 {
     let number = number.abs();
     let within = if number < 1.0 { number } else { 2.0 - number };
-    (within as f32).min(1.0_f32.next_down())
+    (within as f32).min(ONE_MINUS_EPSILON)
 }
 
 #[cfg(test)]

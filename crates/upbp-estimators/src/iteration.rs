@@ -10,6 +10,7 @@ use crate::mis::{BeamExtent, Heuristic, MergeKind, MisPlan, VolumeMerge, VolumeM
 use crate::path::Interaction;
 use crate::prepared_scene::arrives_in_part;
 use crate::radius_field::RadiusField;
+use crate::random::{Stream, StreamKind};
 use crate::roulette::Roulette;
 use crate::scene::Scene;
 use crate::technique::{PerMerge, Technique, TechniqueSet};
@@ -307,6 +308,12 @@ impl IterationPlan {
             bb1d,
         };
         Self { light_paths, beam_paths: beam_paths.min(light_paths), kernels, ..self.clone() }
+    }
+
+    /// The random numbers of one sub-path of the iteration.
+    #[must_use]
+    pub fn stream(&self, kind: StreamKind, index: u64) -> Stream {
+        Stream::new(self.seed, self.iteration, kind, index)
     }
 
     /// Whether vertices of light sub-paths are stored, for connections or merges.

@@ -7,7 +7,7 @@ use upbp_media::Lanes;
 
 use crate::iteration::IterationPlan;
 use crate::mis::Densities;
-use crate::path::{Interaction, LightVertex, PhotonBeam};
+use crate::path::{LightVertex, PhotonBeam};
 use crate::technique::Technique;
 
 /// Light vertices and photon beams of an iteration, with the trees that camera sub-paths query.
@@ -32,16 +32,13 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
         vertices: Vec<LightVertex<B, D, L>>,
         beams: Vec<PhotonBeam<D, L>>,
     ) -> Self {
-        let photons = |on: bool, keep: fn(&Interaction<B>) -> bool| {
-            let chosen = vertices.iter().enumerate().filter(|(_, v)| on && keep(&v.interaction));
+        let photons = |on: bool, in_medium: bool| {
+            let is_chosen = |v: &LightVertex<B, D, L>| on && v.interaction.in_medium() == in_medium;
+            let chosen = vertices.iter().enumerate().filter(|(_, v)| is_chosen(v));
             PointTree::build(chosen.map(|(i, v)| (v.position, i as u32)).collect())
         };
-        let surface = photons(plan.merges_by(Technique::Surf), |interaction| {
-            matches!(interaction, Interaction::Surface(_))
-        });
-        let medium = photons(plan.stores_medium_photons(), |interaction| {
-            matches!(interaction, Interaction::Medium(_))
-        });
+        let surface = photons(plan.merges_by(Technique::Surf), false);
+        let medium = photons(plan.stores_medium_photons(), true);
         let segments: Vec<_> = beams.iter().enumerate().map(|(i, b)| (b.segment, i as u32)).collect();
         // A technique that does not run has a radius of zero.
         let radius = plan.kernels.bb1d.radius().max(plan.kernels.bp2d.radius());
@@ -68,8 +65,7 @@ impl<B: Copy + Send + Sync, D: Densities, L: Lanes> LightMap<B, D, L> {
     #[inline]
     pub(crate) fn read_ahead(&self, index: u32) {
         let vertex = &self.vertices[index as usize];
-        let is_surface = matches!(vertex.interaction, Interaction::Surface(_));
-        black_box((is_surface, vertex.mis.distance_factor, vertex.path));
+        black_box((vertex.interaction.in_medium(), vertex.mis.distance_factor, vertex.path));
     }
 
     /// Numbers of photon points on surfaces and in media, each 0 where the plan does not query them.

@@ -11,7 +11,7 @@ use crate::emitter_selection::{EmitterSample, EmitterShares, Selection};
 use crate::emitter_tree::EmitterTree;
 use crate::emitters_by_receiver::{ClusterSample, ReceiverShares};
 use crate::lens_emitters::LensEmitters;
-use crate::random::Decision;
+use crate::random::{Decision, ONE_MINUS_EPSILON};
 use crate::roulette::Surroundings;
 use crate::scene::{
     BoundingSphere, Camera, CameraRay, Emission, Emitter, EmitterId, EmitterKind, EmitterPoint,
@@ -339,7 +339,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         let found = light.emission_coordinates(&self.emission_bounds, point, direction, on_ray)?;
         let [a, b] = found.position.unwrap_or([0.5; 2]);
         let [c, d] = found.direction.unwrap_or([0.5; 2]);
-        let at = [a, b, c, d].map(|x| x.clamp(0.0, 1.0 - f32::EPSILON / 2.0));
+        let at = [a, b, c, d].map(|x| x.clamp(0.0, ONE_MINUS_EPSILON));
         (!at.iter().any(|x| x.is_nan())).then_some(at)
     }
 

@@ -18,6 +18,9 @@
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
+/// The largest number below one: what rounding makes one is moved there, to be a random number.
+pub(crate) const ONE_MINUS_EPSILON: f32 = 1.0_f32.next_down();
+
 /// Draws that are stratified: about four vertices of a path.
 const STRATIFIED_DRAWS: u32 = 24;
 /// Side of the squares of pixels whose camera sub-paths share their sequences: that of the largest blocks

@@ -294,17 +294,9 @@ pub(super) fn run<O: Observer<Material>, L: Lanes>(
     let LightChunk { vertices, beams, mut counters, .. } = chunk;
     let map = LightMap::build(context.plan, vertices, beams);
     for i in 0..size * size {
-        let (kind, pixel) = (StreamKind::Camera, [i % size, i / size]);
-        let _ = trace_camera_path(
-            context,
-            &map,
-            kind,
-            pixel,
-            u64::from(i),
-            &mut scratch,
-            &mut counters,
-            observer,
-        );
+        let stream = context.plan.stream(StreamKind::Camera, u64::from(i));
+        let pixel = [i % size, i / size];
+        let _ = trace_camera_path(context, &map, stream, pixel, &mut scratch, &mut counters, observer);
     }
     counters
 }

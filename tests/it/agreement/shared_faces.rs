@@ -9,8 +9,9 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::subsequence;
 use upbp_core::scene::Scene as _;
-use upbp_estimators::path::{EdgeTrace, Extent, Target, clear_edge};
-use upbp_estimators::{MediumStack, Stream, StreamKind, offset_origin};
+use upbp_estimators::path::{EdgeTrace, Extent, Target, WalkState, clear_edge};
+use upbp_estimators::scene::Walk;
+use upbp_estimators::{MediumStack, Ray, Roulette, Stream, StreamKind, Survival, offset_origin};
 use upbp_scene::ReadyScene;
 use upbp_scene::material::Material;
 
@@ -216,6 +217,17 @@ fn line() -> impl Strategy<Value = (DVec3, DVec3)> {
     )
 }
 
+/// A walk that starts, for edges by themselves.
+fn camera_walk() -> WalkState {
+    WalkState {
+        walk: Walk::Camera,
+        stream: Stream::new(1, 0, StreamKind::Camera, 0),
+        survival: Survival::of_camera(Roulette::Off, None),
+        hero: (),
+        stops: 0,
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
@@ -229,8 +241,7 @@ proptest! {
         for (origin, direction) in lines {
             let line = Line { origin, direction, placed };
             let Some(stretches) = stretches(&scene, &bodies, &line) else { continue };
-            let mut edge_trace: EdgeTrace<Material> = EdgeTrace::new();
-            let mut stream = Stream::new(1, 0, StreamKind::Camera, 0);
+            let (mut edge_trace, mut state) = (EdgeTrace::<Material>::default(), camera_walk());
             let mut start = line.at(0.0);
             let direction = (line.at(1.0).as_dvec3() - start.as_dvec3()).normalize().as_vec3();
             let mut stack = stretches[0].stack.clone();
@@ -242,7 +253,7 @@ proptest! {
                     continue;
                 }
                 surfaces += 1;
-                edge_trace.trace(&scene, start, direction, &stack, 0.0, Extent::ToSurface, (), &mut stream);
+                edge_trace.trace(&scene, &Ray::new(start, direction), &stack, Extent::ToSurface, &mut state);
                 prop_assert_eq!(edge_trace.take_conflicts(), 0, "at {}", start);
                 let sides = edge_trace.sides();
                 prop_assert_eq!((sides.near.top(), sides.far.top()), (before.top(), behind.top()));
@@ -253,7 +264,7 @@ proptest! {
                 stack = sides.far.clone();
                 start = offset_origin(hit.position, hit.geometric_normal, direction);
             }
-            edge_trace.trace(&scene, start, direction, &stack, 0.0, Extent::ToSurface, (), &mut stream);
+            edge_trace.trace(&scene, &Ray::new(start, direction), &stack, Extent::ToSurface, &mut state);
             prop_assert!(edge_trace.hit.is_none() && edge_trace.sides().near.is_empty());
 
             // A connection gets through if nothing bends it.
@@ -285,7 +296,7 @@ proptest! {
             if stretches.iter().any(|stretch| (stretch.end - f64::from(SIDE)).abs() < 0.02) {
                 continue;
             }
-            let mut stream = Stream::new(1, 0, StreamKind::Camera, 0);
+            let mut state = camera_walk();
             let ends = [line.at(0.0), line.at(f64::from(SIDE))];
             let stacks = ends.map(|end| scene.stack_at(end));
             let target = Target::Medium(ends[1]);
@@ -293,11 +304,9 @@ proptest! {
             let connected = connected.expect("nothing refracts");
             let mut walk = |from: usize| {
                 let between = ends[1 - from] - ends[from];
-                let direction = between.normalize();
-                let mut edge_trace: EdgeTrace<Material> = EdgeTrace::new();
-                edge_trace.trace(
-                    &scene, ends[from], direction, &stacks[from], 0.0, Extent::ToSurface, (), &mut stream,
-                );
+                let ray = Ray::new(ends[from], between.normalize());
+                let mut edge_trace = EdgeTrace::<Material>::default();
+                edge_trace.trace(&scene, &ray, &stacks[from], Extent::ToSurface, &mut state);
                 let t = between.length();
                 let span = edge_trace.spans.iter().rfind(|span| span.start <= t).expect("the first one");
                 edge_trace.density_to(&scene, span, t)

@@ -82,9 +82,8 @@ fn iteration_in<S: Scene, L: Lanes>(scene: &S, choices: &IterationChoices) -> f6
     let mut counters = Counters::default();
     for index in 0..SIZE * SIZE {
         let pixel = [index % SIZE, index / SIZE];
-        let kind = StreamKind::Camera;
-        let index = u64::from(index);
-        let walk = trace_camera_path(&context, &map, kind, pixel, index, &mut scratch, &mut counters, nobody);
+        let stream = plan.stream(StreamKind::Camera, u64::from(index));
+        let walk = trace_camera_path(&context, &map, stream, pixel, &mut scratch, &mut counters, nobody);
         sum += walk.layers.iter().map(|layer| f64::from(layer.mean())).sum::<f64>();
     }
     assert_eq!(counters.dropped, 0);
@@ -183,9 +182,8 @@ fn light_is_seen_up_to_the_first_vertex_that_scatters() {
     let (mut deepest, mut less_than_all) = (0, 0);
     for index in 0..SIZE * SIZE {
         let (pixel, mut seen) = ([index % SIZE, index / SIZE], Seen::default());
-        let (kind, index) = (StreamKind::Camera, u64::from(index));
-        let walk =
-            trace_camera_path(&context, &map, kind, pixel, index, &mut scratch, &mut counters, &mut seen);
+        let stream = plan.stream(StreamKind::Camera, u64::from(index));
+        let walk = trace_camera_path(&context, &map, stream, pixel, &mut scratch, &mut counters, &mut seen);
         let difference = (walk.seen.mean() - seen.light.mean()).abs();
         assert!(difference <= 1e-5 * seen.light.mean(), "{pixel:?}: {:?}, {:?}", walk.seen, seen.light);
         deepest = deepest.max(seen.depth);

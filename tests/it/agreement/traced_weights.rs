@@ -10,12 +10,12 @@ use std::sync::Arc;
 use glam::Vec3;
 use upbp_estimators::mis::{BeamExtent, ByTechnique, Densities, Heuristic, MisPlan, VolumeMerges, Weight};
 use upbp_estimators::observer::{ObservedSample, Observer};
-use upbp_estimators::path::{Context, EdgeTrace, Extent};
-use upbp_estimators::scene::{EmitterId, Scene};
+use upbp_estimators::path::{Context, EdgeTrace, Extent, WalkState};
+use upbp_estimators::scene::{EmitterId, Scene, Walk};
 use upbp_estimators::{
     EmissionGuide, EmissionSample, EmitterChoice, EmitterSample, FootprintField, IterationChoices,
-    IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PreparedScene, RadiusField,
-    Roulette, Stream, StreamKind, Technique, TechniqueSet,
+    IterationPlan, Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PreparedScene, RadiusField, Ray,
+    Roulette, Stream, StreamKind, Survival, Technique, TechniqueSet,
 };
 use upbp_media::{Medium as _, MediumId};
 use upbp_testing::closed_form::fog::Fog;
@@ -444,28 +444,25 @@ fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
     // The fog's boundary runs through the glass, where it is hidden: it changes no medium, but what is behind
     // the glass.
     let scene = ClosedForm::new(CAMERAS[0], 1);
-    let mut edge_trace: EdgeTrace<Material> = EdgeTrace::new();
+    let mut edge_trace = EdgeTrace::<Material>::default();
+    let mut state = WalkState::<f64> {
+        walk: Walk::Camera,
+        stream: Stream::new(2, 0, StreamKind::Camera, 0),
+        survival: Survival::of_camera(Roulette::Off, None),
+        hero: (),
+        stops: 0,
+    };
     let mut random = Stream::new(1, 0, StreamKind::Camera, 0);
     let mut hidden = 0;
     for _ in 0..20_000 {
         let mut point = || 3.0 * Vec3::new(random.uniform(), random.uniform(), random.uniform()) - 1.5;
         let (from, towards) = (point(), point());
-        let direction = (towards - from).normalize();
-        let mut walk = Stream::new(2, 0, StreamKind::Camera, 0);
-        edge_trace.trace(
-            &scene,
-            from,
-            direction,
-            &scene.stack_at(from),
-            0.0,
-            Extent::ToSurface,
-            (),
-            &mut walk,
-        );
+        let ray = Ray::new(from, (towards - from).normalize());
+        edge_trace.trace(&scene, &ray, &scene.stack_at(from), Extent::ToSurface, &mut state);
         for span in &edge_trace.spans {
             let t = span.start + (span.end.min(10.0) - span.start) * random.uniform();
             let found = edge_trace.stack_in(span, t);
-            assert_eq!(found, scene.stack_at(from + direction * t), "{from}, {direction}, {t}");
+            assert_eq!(found, scene.stack_at(ray.at(t)), "{ray:?}, {t}");
             hidden += usize::from(found.len() > 1 && found.priority() == 10);
         }
     }

@@ -298,16 +298,9 @@ impl Setup {
                 let (mut scratch, mut counters) = (Scratch::default(), Counters::default());
                 let mut sums = Sums { count: f64::from(light) * f64::from(camera), ..Sums::default() };
                 for index in 0..u64::from(camera) {
-                    trace_camera_path(
-                        &context,
-                        &map,
-                        StreamKind::Camera,
-                        [0, 0],
-                        index,
-                        &mut scratch,
-                        &mut counters,
-                        &mut sums,
-                    );
+                    let stream = plan.stream(StreamKind::Camera, index);
+                    let counters = &mut counters;
+                    trace_camera_path(&context, &map, stream, [0, 0], &mut scratch, counters, &mut sums);
                 }
                 sums
             })

@@ -10,7 +10,7 @@ use glam::Vec3;
 use upbp_estimators::observer::LightEnd;
 use upbp_estimators::scene::{Emitter, EmitterId, EmitterKind, Scene};
 use upbp_estimators::{
-    EmissionGuide, EmissionSample, IterationPlan, PreparedScene, Stream, StreamKind, TechniqueSet,
+    EmissionGuide, EmissionSample, IterationPlan, PreparedScene, StreamKind, TechniqueSet,
 };
 
 /// Part of the first guide that leads to specular surfaces; the rest leads to lit points.
@@ -137,7 +137,7 @@ pub(super) fn first<S: Scene>(
     let step = seen.specular.len().div_ceil(MOST_POINTS).max(1);
     let points = seen.specular.len().div_ceil(step);
     for (index, &point) in seen.specular.iter().step_by(step).enumerate() {
-        let mut stream = Stream::new(plan.seed, plan.iteration, StreamKind::PilotLight, index as u64);
+        let mut stream = plan.stream(StreamKind::PilotLight, index as u64);
         let Some((emitter, _)) = scene.choose_next_event(point, stream.decide()) else { continue };
         let light = &scene.scene.emitters()[emitter.0 as usize];
         if let Some(incident) = light.sample_incident(scene.emission_bounds(), point, stream.pair()) {

@@ -102,7 +102,8 @@ pub(super) fn camera_path<S: Scene, L: Lanes>(
     counters: &mut Counters,
     observer: &mut PilotObserver<'_, S::Bsdf>,
 ) {
-    trace_camera_path(context, map, StreamKind::PilotCamera, pixel, index, scratch, counters, observer);
+    let stream = context.plan.stream(StreamKind::PilotCamera, index);
+    trace_camera_path(context, map, stream, pixel, scratch, counters, observer);
 }
 
 /// Traces a light sub-path of a pilot.

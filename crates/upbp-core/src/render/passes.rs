@@ -144,9 +144,9 @@ pub(crate) fn camera_pass<S: Scene, L: Lanes>(
             }
             traced = true;
             let place = [rect.x + column as u32, rect.y + row as u32];
-            let (kind, index, counters) = (StreamKind::Camera, pixel_index(place), &mut counters);
+            let stream = context.plan.stream(StreamKind::Camera, pixel_index(place));
             let walk =
-                trace_camera_path(context, map, kind, place, index, scratch, counters, &mut NoObserver);
+                trace_camera_path(context, map, stream, place, scratch, &mut counters, &mut NoObserver);
             for (sum, value) in pixel.layers.iter_mut().zip(walk.layers) {
                 *sum += value;
             }

@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::moments::{Distribution, Mean, Places, Sources};
 use super::{Check, DRAWS, Random, direction, is_density, is_light, is_unit, require, same, same_spectrum};
+use crate::random::ONE_MINUS_EPSILON;
 use crate::scene::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint};
 
 /// Checks the contract of [`Emitter`] in a scene with these bounds, for receivers at the given points, of
@@ -153,7 +154,7 @@ fn check_coordinates(
     let pairs = [found.position.unwrap_or(u_position), found.direction.unwrap_or(u_direction)];
     let is_number = pairs.as_flattened().iter().all(|u| (-1e-4..=1.0001).contains(u));
     require(is_number, "coordinates of a start are random numbers", (emission, found))?;
-    let [u_position, u_direction] = pairs.map(|pair| pair.map(|u| u.clamp(0.0, 1.0 - f32::EPSILON / 2.0)));
+    let [u_position, u_direction] = pairs.map(|pair| pair.map(|u| u.clamp(0.0, ONE_MINUS_EPSILON)));
     // At the border rounding may draw nothing.
     let Some(again) = emitter.sample_emission(bounds, u_position, u_direction) else { return Ok(()) };
     let off = again.point.position.distance(emission.point.position);

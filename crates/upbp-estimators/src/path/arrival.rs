@@ -43,7 +43,7 @@ pub(crate) fn arrive<'a, S: Scene, L: Lanes>(
     if let Some((i, t)) = edge_trace.stop {
         let span = &edge_trace.spans[i];
         let Some(medium) = span.medium else { return Arrival::Lost };
-        let position = edge_trace.origin + t * edge_trace.direction;
+        let position = edge_trace.ray.at(t);
         if !(t >= span.start && position.is_finite()) {
             return Arrival::Lost;
         }
@@ -59,7 +59,7 @@ pub(crate) fn arrive<'a, S: Scene, L: Lanes>(
         return if sides.near.is_empty() { Arrival::Escaped } else { Arrival::Lost };
     };
     let Some(&bsdf) = hit.boundary.bsdf() else { return Arrival::Lost };
-    match Interaction::at_hit(hit, bsdf, edge_trace.direction, &sides) {
+    match Interaction::at_hit(hit, bsdf, edge_trace.ray.direction, &sides) {
         Some(interaction) => Arrival::Vertex(Arrived {
             position: hit.position,
             distance: hit.t,

@@ -2,8 +2,9 @@
 
 use upbp_media::{Lanes, MediumStack};
 
-use super::MediumInterface;
 use super::edge::{EdgeTrace, Extent};
+use super::interaction::MediumInterface;
+use super::walk_state::WalkState;
 use crate::iteration::IterationPlan;
 use crate::prepared_scene::PreparedScene;
 use crate::scene::{Crossing, PathEnd, Scene};
@@ -25,17 +26,16 @@ impl<S: Scene> Clone for Context<'_, S> {
 impl<S: Scene> Copy for Context<'_, S> {}
 
 impl<S: Scene> Context<'_, S> {
-    /// The extent to which a ray is followed from within the bodies of `stack`, by a walk that has stopped
-    /// in media `stops` times: to the next surface if `all` is asked for, in a dense medium, and at every
-    /// 32nd stop, else until the walk stops.
+    /// The extent to which a walk follows a ray from within the bodies of `stack`: to the next surface if
+    /// `all` is asked for, in a dense medium, and at every 32nd stop, else until the walk stops.
     ///
     /// A walk that rounding has taken out of its body, and that heads away from it, meets no boundary that
     /// would tell, and would scatter for ever in a medium without end. The end of one ray in 32 does.
     #[inline]
-    pub(crate) fn extent(&self, all: bool, stops: u32, stack: &MediumStack) -> Extent {
+    pub(crate) fn extent<L: Lanes>(&self, all: bool, state: &WalkState<L>, stack: &MediumStack) -> Extent {
         /// Stops after which the bodies are put to the proof.
         const PROOF: u32 = 32;
-        let is_proof = stops % PROOF == PROOF - 1;
+        let is_proof = state.stops % PROOF == PROOF - 1;
         let to_surface =
             all || is_proof || stack.medium().is_some_and(|medium| self.prepared.is_dense(medium));
         if to_surface { Extent::ToSurface } else { Extent::ToStop }
@@ -62,6 +62,6 @@ pub struct Scratch<B, L: Lanes = f64> {
 
 impl<B: Copy, L: Lanes> Default for Scratch<B, L> {
     fn default() -> Self {
-        Self { edge_trace: EdgeTrace::new(), crossings: Vec::new() }
+        Self { edge_trace: EdgeTrace::default(), crossings: Vec::new() }
     }
 }

@@ -11,6 +11,7 @@ use upbp_media::{BodyId, EdgeDensity, Lanes, Medium, MediumId, MediumStack, RayS
 
 use super::crossing::{correction, correction_of_escape, cross_all, is_surface, may_correct};
 use super::interaction::MediumInterface;
+use super::walk_state::WalkState;
 use crate::iteration::IterationPlan;
 use crate::mis::BeamExtent;
 use crate::random::Stream;
@@ -41,13 +42,19 @@ pub struct MediumSpan<L = f64> {
     crossings: usize,
 }
 
+impl<L> MediumSpan<L> {
+    /// The medium itself, of the scene that the edge was traced in; `None` for vacuum.
+    #[inline]
+    pub(crate) fn medium_in<'s, S: Scene>(&self, scene: &'s S) -> Option<&'s S::Medium> {
+        self.medium.map(|medium| &scene.media()[medium.0 as usize])
+    }
+}
+
 /// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a
 /// medium. Its densities are those of each of the [`Lanes`] `L`.
 pub struct EdgeTrace<B, L: Lanes = f64> {
-    /// Start of the ray.
-    pub origin: Vec3,
-    /// Direction of the ray, a unit vector.
-    pub direction: Vec3,
+    /// The ray; the edge begins at its lower end.
+    pub ray: Ray,
     /// Stretches in order, adjoining, from 0 to the surface. With [`Extent::ToStop`] the one in which the
     /// walk stops is the last, and its end means nothing.
     pub spans: Vec<MediumSpan<L>>,
@@ -75,6 +82,25 @@ pub(crate) fn medium_of<S: Scene>(scene: &S, stack: &MediumStack) -> Option<Medi
     stack.medium().filter(|medium| (medium.0 as usize) < scene.media().len())
 }
 
+/// Appends the stretch of `ray` from `start` to `end`, in a medium or in vacuum, to the densities of an edge.
+#[inline]
+pub(crate) fn push_stretch<S: Scene, L: Lanes>(
+    scene: &S,
+    density: &mut EdgeDensity<L>,
+    ray: &Ray,
+    medium: Option<MediumId>,
+    start: f32,
+    end: f32,
+) {
+    match medium {
+        Some(medium) => {
+            let segment = RaySegment { origin: ray.origin, direction: ray.direction, start, end };
+            density.push(&L::segment(&scene.media()[medium.0 as usize], &segment));
+        }
+        None => density.push_vacuum(),
+    }
+}
+
 /// Distance that stops of walks keep from boundaries and surfaces, lest they come out beyond them, in
 /// roundings of the largest coordinate. What coincides is nearer to each other than this.
 const ROUNDINGS: f32 = 64.0;
@@ -82,10 +108,11 @@ const ROUNDINGS: f32 = 64.0;
 const MOST_OF_FREE_PATH: f32 = 1.0 / 128.0;
 
 /// The decision where a walk stops, while it is followed.
-struct Flight<L: Lanes> {
+struct FreeFlight<'a, L: Lanes> {
     extent: Extent,
     /// The lane that distances are drawn from.
     hero: L::Hero,
+    stream: &'a mut Stream,
     /// The random numbers that decide in the current stretch.
     decision: Option<[f32; 2]>,
     /// Distance where the walk stops if the current medium goes on; infinite if it never does, or if that is
@@ -95,7 +122,7 @@ struct Flight<L: Lanes> {
     origin: f32,
 }
 
-impl<L: Lanes> Flight<L> {
+impl<L: Lanes> FreeFlight<'_, L> {
     /// Distance to which the ray has to be followed if the current medium goes on: to all that the stop has
     /// to keep off.
     fn max_distance(&self) -> f32 {
@@ -122,52 +149,26 @@ impl<L: Lanes> Flight<L> {
 }
 
 impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
-    /// An empty one; [`trace`](Self::trace) fills it, again and again without allocation.
-    #[must_use]
-    pub fn new() -> Self {
-        Self {
-            origin: Vec3::ZERO,
-            direction: Vec3::Z,
-            spans: Vec::new(),
-            stop: None,
-            hit: None,
-            start: MediumStack::new(None),
-            end: MediumStack::new(None),
-            behind: MediumStack::new(None),
-            crossings: Vec::new(),
-            found: Vec::new(),
-            conflicts: 0,
-            lost: false,
-        }
-    }
-
-    /// Follows a ray from `origin`, which lies in the bodies of `stack` but for rounding (a boundary that
-    /// contradicts them corrects them), and draws from `stream` where the walk stops, by the lane of `hero`.
+    /// Follows `ray`, whose origin lies in the bodies of `stack` but for rounding (a boundary that
+    /// contradicts them corrects them), and draws where the walk stops.
     ///
-    /// The way begins at distance `start`: 0, or −∞ for light that has come from infinity to `origin`,
-    /// through the medium around everything without a stop. It does not stop in its first stretch, then.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "a ray, what is known where it starts, and how it is followed"
-    )]
+    /// The way begins at the ray's lower end: 0, or −∞ for light that has come from infinity to the origin,
+    /// through the medium around everything without a stop. It does not stop in its first stretch, then. The
+    /// ray's upper end does not count.
     pub fn trace<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
-        origin: Vec3,
-        direction: Vec3,
+        ray: &Ray,
         stack: &MediumStack,
-        start: f32,
         extent: Extent,
-        hero: L::Hero,
-        stream: &mut Stream,
+        state: &mut WalkState<L>,
     ) {
-        self.origin = origin;
-        self.direction = direction;
+        self.ray = *ray;
         self.start.clone_from(stack);
         self.crossings.clear();
         self.lost = false;
         let mut corrections = 0;
-        while let Some(correction) = self.follow(scene, start, (extent, hero), stream, corrections) {
+        while let Some(correction) = self.follow(scene, extent, state, corrections) {
             self.conflicts += 1;
             if !may_correct(corrections) {
                 self.lose();
@@ -209,24 +210,29 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     fn follow<S: Scene<Bsdf = B>>(
         &mut self,
         scene: &S,
-        start: f32,
-        (extent, hero): (Extent, L::Hero),
-        stream: &mut Stream,
+        extent: Extent,
+        state: &mut WalkState<L>,
         corrections: usize,
     ) -> Option<Crossing> {
         self.spans.clear();
         self.stop = None;
         self.hit = None;
-        let largest = self.origin.abs().max_element();
-        let mut flight = Flight::<L> { extent, hero, decision: None, stop: f32::INFINITY, origin: largest };
+        let mut flight = FreeFlight::<L> {
+            extent,
+            hero: state.hero,
+            stream: &mut state.stream,
+            decision: None,
+            stop: f32::INFINITY,
+            origin: self.ray.origin.abs().max_element(),
+        };
         let medium = medium_of(scene, &self.start);
+        let start = self.ray.t_min;
         let mut span = MediumSpan { start, end: start, medium, before: EdgeDensity::EMPTY, crossings: 0 };
-        self.enter(scene, &span, &mut flight, stream);
-        if (1..=corrections).any(|i| self.cross(scene, &mut span, &mut flight, i, i < corrections, stream)) {
+        self.enter(scene, &span, &mut flight);
+        if (1..=corrections).any(|i| self.cross(scene, &mut span, &mut flight, i, i < corrections)) {
             return None;
         }
-        let mut ray =
-            Ray { origin: self.origin, direction: self.direction, t_min: 0.0, t_max: flight.max_distance() };
+        let mut ray = self.ray.with_range(0.0, flight.max_distance());
         loop {
             self.found.clear();
             let hit = scene.trace(&ray, &mut self.found);
@@ -237,7 +243,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 return None;
             }
             let known = hit.as_ref().map_or(ray.t_max, |hit| hit.t);
-            let boundary = hit.as_ref().and_then(|hit| hit.crossing(self.direction));
+            let boundary = hit.as_ref().and_then(|hit| hit.crossing(self.ray.direction));
             // What coincides with the surface of a body counts together with it.
             let before = match boundary {
                 Some(_) => self.found.partition_point(|crossing| crossing.t < known),
@@ -253,7 +259,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 }
                 self.crossings.push(self.found[i]);
                 let more = i + 1 < before && self.found[i + 1].t == self.found[i].t;
-                if self.cross(scene, &mut span, &mut flight, self.crossings.len(), more, stream) {
+                if self.cross(scene, &mut span, &mut flight, self.crossings.len(), more) {
                     return None;
                 }
             }
@@ -275,7 +281,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
                 for i in before..self.found.len() {
                     self.crossings.push(self.found[i]);
                     let more = i + 1 < self.found.len();
-                    if self.cross(scene, &mut span, &mut flight, self.crossings.len(), more, stream) {
+                    if self.cross(scene, &mut span, &mut flight, self.crossings.len(), more) {
                         return None;
                     }
                 }
@@ -314,23 +320,17 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
 
     /// Begins `span`: draws the distance in its medium.
     #[inline]
-    fn enter<S: Scene<Bsdf = B>>(
-        &self,
-        scene: &S,
-        span: &MediumSpan<L>,
-        flight: &mut Flight<L>,
-        stream: &mut Stream,
-    ) {
+    fn enter<S: Scene<Bsdf = B>>(&self, scene: &S, span: &MediumSpan<L>, flight: &mut FreeFlight<'_, L>) {
         flight.stop = f32::INFINITY;
         if self.stop.is_some() || span.start == f32::NEG_INFINITY {
             return;
         }
-        let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize]) else { return };
+        let Some(medium) = span.medium_in(scene) else { return };
         if !medium.scatters() {
             return;
         }
         // A stretch without length has not used its draw.
-        let u = *flight.decision.get_or_insert_with(|| stream.pair());
+        let u = *flight.decision.get_or_insert_with(|| flight.stream.pair());
         if flight.extent == Extent::ToStop
             && let Some(t) = L::sample_distance(medium, &self.segment(span, f32::INFINITY), flight.hero, u)
             && t >= span.start
@@ -346,7 +346,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         &mut self,
         scene: &S,
         span: &mut MediumSpan<L>,
-        flight: &Flight<L>,
+        flight: &FreeFlight<'_, L>,
         end: f32,
     ) -> bool {
         span.end = end;
@@ -355,7 +355,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         }
         if self.stop.is_none()
             && let Some(u) = flight.decision
-            && let Some(medium) = span.medium.map(|medium| &scene.media()[medium.0 as usize])
+            && let Some(medium) = span.medium_in(scene)
             && medium.scatters()
         {
             // Next to its end, decided for the segment as it is: the rounding of a distance far from the
@@ -386,10 +386,9 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         &mut self,
         scene: &S,
         span: &mut MediumSpan<L>,
-        flight: &mut Flight<L>,
+        flight: &mut FreeFlight<'_, L>,
         crossings: usize,
         more: bool,
-        stream: &mut Stream,
     ) -> bool {
         if crossings == 1 {
             self.end.clone_from(&self.start);
@@ -420,7 +419,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         span.start = t;
         span.medium = medium;
         span.crossings = crossings;
-        self.enter(scene, span, flight, stream);
+        self.enter(scene, span, flight);
         false
     }
 
@@ -428,12 +427,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     #[inline]
     pub fn density_to<S: Scene>(&self, scene: &S, span: &MediumSpan<L>, t: f32) -> EdgeDensity<L> {
         let mut density = span.before;
-        match span.medium {
-            Some(medium) => {
-                density.push(&L::segment(&scene.media()[medium.0 as usize], &self.segment(span, t)));
-            }
-            None => density.push_vacuum(),
-        }
+        push_stretch(scene, &mut density, &self.ray, span.medium, span.start, t);
         density
     }
 
@@ -474,8 +468,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
         let spans = completes.then(|| self.beam_spans(plan.mis.query_beams)).into_iter().flatten();
         spans.filter_map(move |(span, end)| {
             let medium = span.medium.filter(|&medium| plan.merges_in(medium, technique))?;
-            let ray = Ray { origin: self.origin, direction: self.direction, t_min: span.start, t_max: end };
-            Some((span, medium, ray))
+            Some((span, medium, self.ray.with_range(span.start, end)))
         })
     }
 
@@ -483,7 +476,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     #[inline]
     #[must_use]
     pub fn segment(&self, span: &MediumSpan<L>, t: f32) -> RaySegment {
-        RaySegment { origin: self.origin, direction: self.direction, start: span.start, end: t }
+        RaySegment { origin: self.ray.origin, direction: self.ray.direction, start: span.start, end: t }
     }
 
     /// The bodies around the point at distance `t`, which lies in `span`.
@@ -524,7 +517,20 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
 }
 
 impl<B: Copy, L: Lanes> Default for EdgeTrace<B, L> {
+    /// An empty one; [`trace`](Self::trace) fills it, again and again without allocation.
     fn default() -> Self {
-        Self::new()
+        Self {
+            ray: Ray::new(Vec3::ZERO, Vec3::Z),
+            spans: Vec::new(),
+            stop: None,
+            hit: None,
+            start: MediumStack::new(None),
+            end: MediumStack::new(None),
+            behind: MediumStack::new(None),
+            crossings: Vec::new(),
+            found: Vec::new(),
+            conflicts: 0,
+            lost: false,
+        }
     }
 }

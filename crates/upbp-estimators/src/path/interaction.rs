@@ -3,8 +3,9 @@
 use glam::Vec3;
 use upbp_media::{Lanes, Medium, MediumId, MediumStack, Spectrum, orthonormal_basis};
 
-use crate::random::{Decision, Stream};
-use crate::roulette::{Roulette, Survival};
+use super::walk_state::WalkState;
+use crate::random::Decision;
+use crate::roulette::Roulette;
 use crate::scene::{Bsdf, Hit, Interface, Scene, Walk};
 
 /// Directions closer to a tangent plane than this end a walk and forbid a connection, on both sides alike.
@@ -95,6 +96,14 @@ fn sine(a: Vec3, b: Vec3) -> f64 {
     f64::from(a.cross(b).length()).min(1.0)
 }
 
+impl<B> Interaction<B> {
+    /// Whether the vertex is in a medium.
+    #[inline]
+    pub const fn in_medium(&self) -> bool {
+        matches!(self, Self::Medium(_))
+    }
+}
+
 impl<B: Bsdf> Interaction<B> {
     /// The surface of a hit, between the bodies of `sides`. `None` if the surface is grazed.
     #[inline]
@@ -120,12 +129,6 @@ impl<B: Bsdf> Interaction<B> {
             Self::Surface(surface) => surface.bsdf.is_connectible(),
             Self::Medium(_) => true,
         }
-    }
-
-    /// Whether the vertex is in a medium.
-    #[inline]
-    pub const fn in_medium(&self) -> bool {
-        matches!(self, Self::Medium(_))
     }
 
     /// Cosine factor of an arriving or leaving direction.
@@ -181,34 +184,29 @@ impl<B: Bsdf> Interaction<B> {
         }
     }
 
-    /// Samples a direction for `walk` with a hero, which came from `from` and whose lanes have `shares`.
-    /// `None`: the walk ends.
-    #[expect(clippy::too_many_arguments, reason = "called by the two walks, with their state")]
+    /// Samples a direction for a walk, which came from `from` and whose lanes have `shares`. `None`: the walk
+    /// ends.
     pub fn scatter<S: Scene<Bsdf = B>, L: Lanes>(
         &self,
         scene: &S,
-        survival: &mut Survival,
-        walk: Walk,
         position: Vec3,
         from: Vec3,
-        hero: L::Hero,
         shares: &L::Shares,
-        stream: &mut Stream,
+        state: &mut WalkState<L>,
     ) -> Option<Scattered<L>> {
-        let goes_on = stream.decide();
         match self {
-            Self::Surface(surface) => {
-                surface.scatter(survival, walk, from, goes_on, stream.decide(), stream.decide())
-            }
+            Self::Surface(surface) => surface.scatter(from, state),
             Self::Medium(medium) => {
-                let turn = stream.decide();
+                let WalkState { stream, survival, hero, stops, .. } = state;
+                *stops += 1;
+                let [goes_on, turn] = [stream.decide(), stream.decide()];
                 let medium = &scene.media()[medium.0 as usize];
                 let albedo = continuation(medium, position, survival.roulette());
                 let probability = survival.probability(albedo, true) * survival.probability_at(position);
                 if ends(goes_on, probability) {
                     return None;
                 }
-                let sample = medium.phase().sample::<L>(-from, hero, shares, turn.pair());
+                let sample = medium.phase().sample::<L>(-from, *hero, shares, turn.pair());
                 if !sample.pdf.is_positive() {
                     return None;
                 }
@@ -293,15 +291,9 @@ impl<B: Bsdf> SurfaceInteraction<B> {
         })
     }
 
-    fn scatter<L: Lanes>(
-        &self,
-        survival: &mut Survival,
-        walk: Walk,
-        from: Vec3,
-        goes_on: Decision,
-        lobe: Decision,
-        turn: Decision,
-    ) -> Option<Scattered<L>> {
+    fn scatter<L: Lanes>(&self, from: Vec3, state: &mut WalkState<L>) -> Option<Scattered<L>> {
+        let WalkState { walk, ref mut stream, ref mut survival, .. } = *state;
+        let [goes_on, lobe, turn] = [stream.decide(), stream.decide(), stream.decide()];
         let local_from = self.local(from);
         let cos_from = self.agreeing_cosine(from, local_from.z)?;
         let roulette = survival.roulette();

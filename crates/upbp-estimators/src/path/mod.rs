@@ -7,6 +7,7 @@ mod edge;
 mod interaction;
 mod vertex;
 mod visibility;
+mod walk_state;
 
 pub(crate) use arrival::{Arrival, Arrived, arrive, depart};
 pub use context::{Context, Scratch};
@@ -14,7 +15,8 @@ pub(crate) use crossing::{cross_all, has_surface};
 pub use edge::{EdgeTrace, Extent, MediumSpan};
 pub(crate) use interaction::MIN_COSINE;
 pub use interaction::{Evaluation, Interaction, MediumInterface, Scattered, SurfaceInteraction};
-pub(crate) use vertex::{CameraEdge, CameraVertex};
+pub(crate) use vertex::{CameraEdge, CameraVertex, LightEdge};
 pub use vertex::{EdgeSource, LightChunk, LightVertex, PhotonBeam, Splat};
 pub(crate) use visibility::ray_origin;
 pub use visibility::{Target, clear_edge};
+pub use walk_state::WalkState;

@@ -93,6 +93,20 @@ impl EdgeSource {
     }
 }
 
+/// An edge of a light sub-path.
+pub(crate) struct LightEdge<D: Densities, L: Lanes> {
+    /// Flux over density at the edge's first vertex, after scattering.
+    pub(crate) throughput: Spectrum,
+    /// Densities for the weights, at the first vertex.
+    pub(crate) mis: EdgeMis<D, L>,
+    /// The start of the edge.
+    pub(crate) source: EdgeSource,
+    /// Whether the edge starts at an infinite emitter: distances from there do not count in densities.
+    pub(crate) from_infinity: bool,
+    /// Edges from the light to a vertex on this edge.
+    pub(crate) depth: u32,
+}
+
 /// The light that a sub-path carries through one medium along one edge.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotonBeam<D: Densities = f64, L: Lanes = f64> {
@@ -207,8 +221,8 @@ impl<D: Densities, L: Lanes> CameraEdge<D, L> {
         let density = edge_trace.density_to(prepared.scene, span, t);
         let edge = Edge::new(&density, f64::from(t), 1.0, self.mis.start, true);
         (edge.forward.mean(&self.mis.shares) > 0.0).then(|| CameraVertex {
-            position: edge_trace.origin + edge_trace.direction * t,
-            towards_camera: -edge_trace.direction,
+            position: edge_trace.ray.at(t),
+            towards_camera: -edge_trace.ray.direction,
             throughput: self.throughput * transmitted(&density, plan.mis.query_beams, &self.mis.shares),
             mis: self.mis.arrive(&plan.mis, Walk::Camera, &edge, self.connections),
             scale,

@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 use upbp_accel::{Ray, offset_origin};
-use upbp_media::{EdgeDensity, Lanes, MediumId, MediumStack, RaySegment};
+use upbp_media::{EdgeDensity, Lanes, MediumStack};
 
 use super::crossing::{correction, correction_of_escape, cross_all, has_surface, may_correct};
-use super::edge::medium_of;
+use super::edge::{medium_of, push_stretch};
 use super::interaction::Interaction;
 use crate::scene::{Crossing, MAX_CROSSINGS, Scene};
 
@@ -76,7 +76,7 @@ pub fn clear_edge<S: Scene, L: Lanes>(
     if crossings.is_empty() && (!escapes || stack.is_empty()) {
         // Most edges: no list is copied.
         let mut density = EdgeDensity::EMPTY;
-        push(scene, &mut density, &ray, medium_of(scene, stack), 0.0, length);
+        push_stretch(scene, &mut density, &ray, medium_of(scene, stack), 0.0, length);
         return Some(density);
     }
     // As along a walk, what the ray meets counts more than what was known where it starts.
@@ -98,25 +98,6 @@ enum Followed<L> {
     Blocked,
     /// The edge is another one, with this crossing at its start.
     Corrected(Crossing),
-}
-
-/// Appends the stretch of `ray` from `start` to `end` in a medium, or in vacuum.
-#[inline]
-fn push<S: Scene, L: Lanes>(
-    scene: &S,
-    density: &mut EdgeDensity<L>,
-    ray: &Ray,
-    medium: Option<MediumId>,
-    start: f32,
-    end: f32,
-) {
-    match medium {
-        Some(medium) => {
-            let segment = RaySegment { origin: ray.origin, direction: ray.direction, start, end };
-            density.push(&L::segment(&scene.media()[medium.0 as usize], &segment));
-        }
-        None => density.push_vacuum(),
-    }
 }
 
 fn accumulate<S: Scene, L: Lanes>(
@@ -147,7 +128,7 @@ fn accumulate<S: Scene, L: Lanes>(
             let t = place[0].t.max(start);
             // The first stretch counts even without a length.
             if t > start || !started {
-                push(scene, &mut density, ray, medium, start, t);
+                push_stretch(scene, &mut density, ray, medium, start, t);
                 started = true;
             }
             start = t;
@@ -159,7 +140,7 @@ fn accumulate<S: Scene, L: Lanes>(
         return Followed::Corrected(correction);
     }
     if length > start || !started {
-        push(scene, &mut density, ray, medium_of(scene, &stack), start, length);
+        push_stretch(scene, &mut density, ray, medium_of(scene, &stack), start, length);
     }
     Followed::Clear(density)
 }

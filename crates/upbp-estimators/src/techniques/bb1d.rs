@@ -11,7 +11,7 @@ use crate::scene::Scene;
 use crate::technique::Technique;
 
 /// Merges the photon beams around `edge`, through all its media.
-pub(crate) fn bb1d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
+pub(super) fn bb1d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities, L>,
     edge_trace: &EdgeTrace<S::Bsdf, L>,

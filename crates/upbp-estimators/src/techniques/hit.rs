@@ -1,15 +1,15 @@
 //! Light that a camera sub-path meets: emitters, environments, emitting media.
 
 use glam::Vec3;
+use upbp_accel::Ray;
 use upbp_media::{Lanes, Medium, Spectrum};
 
 use crate::film_sample::Output;
 use crate::mis::{Densities, Edge, Weight};
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
-use crate::path::Context;
-use crate::path::{CameraEdge, EdgeTrace, MediumSpan};
+use crate::path::{CameraEdge, Context, EdgeTrace, MediumSpan};
 use crate::random::Stream;
-use crate::scene::{Bsdf, Emitter, EmitterId, EmitterPoint, HitDensities, Scene, Walk};
+use crate::scene::{Bsdf, Emitter, EmitterPoint, Hit, HitDensities, Scene, Walk};
 use crate::technique::Technique;
 
 /// Emission of media along the whole ray to the next surface.
@@ -30,8 +30,7 @@ pub(crate) fn emission_along<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     }
     let may_have_others = prepared.has_volume_emitters() && edge.depth > 1 && !edge.mis.is_alone();
     for span in &edge_trace.spans {
-        let Some(medium) = span.medium else { continue };
-        let medium = &prepared.scene.media()[medium.0 as usize];
+        let Some(medium) = span.medium_in(prepared.scene) else { continue };
         if !medium.emits() {
             continue;
         }
@@ -39,8 +38,7 @@ pub(crate) fn emission_along<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         let is_emitter = |body| prepared.volume_emitter(body).is_some();
         if may_have_others && edge_trace.any_body_in(span, is_emitter) {
             if let Some(t) = medium.sample_emitted(&segment, stream.uniform()) {
-                let pdf = medium.pdf_emitted(&segment, t);
-                emission_at(context, edge_trace, span, t, pdf, medium, edge, out);
+                emission_at(context, edge_trace, span, medium, t, edge, out);
             }
         } else {
             let value = edge.throughput * span.before.transmittance * medium.emitted(&segment);
@@ -49,22 +47,21 @@ pub(crate) fn emission_along<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     }
 }
 
-/// Emission of a medium at distance `t` in a span, for all of the span; `pdf` is the density of `t`.
-#[expect(clippy::too_many_arguments, reason = "a point of an edge, used here only")]
+/// Emission of a span's medium at the sampled distance `t`, for all of the span.
 fn emission_at<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     edge_trace: &EdgeTrace<S::Bsdf, L>,
     span: &MediumSpan<L>,
-    t: f32,
-    pdf: f64,
     medium: &S::Medium,
+    t: f32,
     edge: &CameraEdge<O::Densities, L>,
     out: &mut Output<'_, O>,
 ) {
     let prepared = context.prepared;
+    let pdf = medium.pdf_emitted(&edge_trace.segment(span, span.end), t);
     let density = edge_trace.density_to(prepared.scene, span, t);
-    let (receiver, direction) = (edge_trace.origin, -edge_trace.direction);
-    let position = receiver + t * edge_trace.direction;
+    let (receiver, direction) = (edge_trace.ray.origin, -edge_trace.ray.direction);
+    let position = edge_trace.ray.at(t);
     let value = edge.throughput * density.transmittance * (medium.source(position) / pdf as f32);
     let point = EmitterPoint { position, normal: direction };
     let light = edge_trace.stack_in(span, t).top().and_then(|top| prepared.volume_emitter(top.body));
@@ -149,30 +146,39 @@ pub(crate) fn environment<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.mis.start, false);
-    let away = prepared.bounds.centre + edge_trace.direction * (2.0 * prepared.bounds.radius);
-    let point = EmitterPoint { position: away, normal: -edge_trace.direction };
+    let Ray { origin, direction, .. } = edge_trace.ray;
+    let away = prepared.bounds.centre + direction * (2.0 * prepared.bounds.radius);
+    let point = EmitterPoint { position: away, normal: -direction };
     for &emitter in prepared.environments() {
-        shine(
-            context,
-            emitter,
-            &point,
-            -edge_trace.direction,
-            edge_trace.origin,
-            &mis_edge,
-            throughput,
-            edge,
-            out,
-        );
+        let end = LightEnd { emitter, point, direction: -direction };
+        shine(context, &end, origin, &mis_edge, throughput, edge, out);
     }
 }
 
-/// An emitter's light at the end of a camera sub-path.
-#[expect(clippy::too_many_arguments, reason = "the state of one hit")]
-pub(crate) fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
+/// The camera sub-path has come to a surface, which may be that of an emitter.
+pub(crate) fn hit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
-    emitter: EmitterId,
-    point: &EmitterPoint,
-    direction: Vec3,
+    edge_trace: &EdgeTrace<S::Bsdf, L>,
+    mis_edge: &Edge<L>,
+    throughput: Spectrum,
+    edge: &CameraEdge<O::Densities, L>,
+    out: &mut Output<'_, O>,
+) {
+    // A walk that stops in a medium may know of the surface behind it.
+    if edge_trace.stop.is_none()
+        && let Some(Hit { emitter: Some(emitter), position, geometric_normal, .. }) = edge_trace.hit
+    {
+        let Ray { origin, direction, .. } = edge_trace.ray;
+        let point = EmitterPoint { position, normal: geometric_normal };
+        let end = LightEnd { emitter, point, direction: -direction };
+        shine(context, &end, origin, mis_edge, throughput, edge, out);
+    }
+}
+
+/// An emitter's light at the `end` of a camera sub-path, which gets there from `receiver` by `mis_edge`.
+fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
+    context: &Context<'_, S>,
+    end: &LightEnd,
     receiver: Vec3,
     mis_edge: &Edge<L>,
     throughput: Spectrum,
@@ -183,18 +189,18 @@ pub(crate) fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     if plan.mis.hit == 0.0 || !plan.lengths.contains(edge.depth) {
         return;
     }
+    let LightEnd { emitter, point, direction } = *end;
     let Some(light) = prepared.scene.emitters().get(emitter.0 as usize) else { return };
-    let Some(densities) = light.hit(prepared.emission_bounds(), point, direction, receiver) else { return };
-    let end = LightEnd { emitter, point: *point, direction };
+    let Some(densities) = light.hit(prepared.emission_bounds(), &point, direction, receiver) else { return };
     let weight = if edge.depth == 1 {
         let pdf_ray = edge.mis.rho * mis_edge.cos_in / mis_edge.distance_squared;
         let passes = mis_edge.pass_probability.mean(&edge.mis.shares);
-        match prepared.connect_through_lens(emitter, point, out.film) {
+        match prepared.connect_through_lens(emitter, &point, out.film) {
             Some((_, pdf)) => plan.mis.direct_hit_weight(pdf, pdf_ray * passes),
             None => Weight::alone(Technique::Hit),
         }
     } else {
-        weight_of_hit(context, &end, &densities, receiver, mis_edge, edge)
+        weight_of_hit(context, end, &densities, receiver, mis_edge, edge)
     };
-    record_hit(edge, Completion::Hit(end), weight, throughput * densities.radiance, out);
+    record_hit(edge, Completion::Hit(*end), weight, throughput * densities.radiance, out);
 }

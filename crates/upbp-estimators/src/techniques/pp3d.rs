@@ -11,7 +11,7 @@ use crate::scene::Scene;
 use crate::technique::Technique;
 
 /// Merges the photons around `vertex`, which lies in `medium`.
-pub(crate) fn pp3d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
+pub(super) fn pp3d<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities, L>,
     vertex: &CameraVertex<S::Bsdf, O::Densities, L>,

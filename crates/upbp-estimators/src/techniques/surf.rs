@@ -19,7 +19,7 @@ const MIN_NORMAL_COSINE: f32 = 0.7;
 const MAX_PLANE_DISTANCE: f32 = 0.3;
 
 /// Merges the photons around `vertex`, which lies on `surface`.
-pub(crate) fn surf<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
+pub(super) fn surf<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities, L>,
     vertex: &CameraVertex<S::Bsdf, O::Densities, L>,

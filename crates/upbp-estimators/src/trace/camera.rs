@@ -1,98 +1,81 @@
 //! Camera sub-paths: one per pixel sample, with every technique that ends on them.
 
 use glam::Vec2;
+use upbp_accel::Ray;
 use upbp_media::{Lanes, Spectrum};
 
+use super::first_seen::FirstSeen;
 use crate::counters::Counters;
-use crate::features::Features;
 use crate::film_sample::{CameraWalk, Output};
 use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, CameraEdge, CameraVertex, Context, Interaction, Scratch, arrive, depart, ray_origin,
+    Arrival, CameraEdge, CameraVertex, Context, Scratch, WalkState, arrive, depart, ray_origin,
 };
-use crate::random::{Stream, StreamKind};
-use crate::roulette::Survival;
-use crate::scene::{Camera, EmitterPoint, Hit, Scene, Walk};
+use crate::random::Stream;
+use crate::scene::{Camera, Scene, Walk};
 use crate::technique::{Layer, Technique};
 use crate::techniques;
 
-/// Traces the camera sub-path of one sample of a pixel. `index` addresses its random numbers.
-#[expect(clippy::too_many_arguments, reason = "one call per sample, with the state of the pass")]
+/// Traces the camera sub-path of one sample of a pixel, with random numbers from `stream`.
 pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     map: &LightMap<S::Bsdf, O::Densities, L>,
-    kind: StreamKind,
+    mut stream: Stream,
     pixel: [u32; 2],
-    index: u64,
     scratch: &mut Scratch<S::Bsdf, L>,
     counters: &mut Counters,
     observer: &mut O,
 ) -> CameraWalk {
-    let mut walk =
-        CameraWalk { layers: [Spectrum::ZERO; Layer::COUNT], seen: Spectrum::ZERO, features: Features::NONE };
-    let mut scattered_before = false;
     let Context { prepared, plan } = *context;
     let scene = prepared.scene;
-    let mut stream = Stream::new(plan.seed, plan.iteration, kind, index);
+    let mut layers = [Spectrum::ZERO; Layer::COUNT];
+    let mut first_seen = FirstSeen::new(plan.features);
     let [dx, dy] = stream.pair();
     let film = Vec2::new(pixel[0] as f32 + dx, pixel[1] as f32 + dy);
-    let Some(ray) = scene.camera().ray(film, stream.pair()) else { return walk };
+    let Some(camera_ray) = scene.camera().ray(film, stream.pair()) else { return first_seen.finish(layers) };
+    let mut ray = Ray::new(camera_ray.origin, camera_ray.direction);
     if !(ray.origin.is_finite() && ray.direction.is_finite()) {
         counters.lost_walks += 1;
-        return walk;
+        return first_seen.finish(layers);
     }
-    observer.camera_end(film, &ray);
-    let mut out = Output { film, layers: &mut walk.layers, counters, observer };
-    let emission = plan.mis.hit > 0.0 && prepared.has_emitting_media();
+    observer.camera_end(film, &camera_ray);
+    let mut out = Output { film, layers: &mut layers, counters, observer };
+
     let own = plan.techniques_at(pixel);
-    let [pb2d, bb1d] = [Technique::Pb2d, Technique::Bb1d].map(|one| own.has(one) && plan.merges_by(one));
-    let query_beams = pb2d || bb1d;
-    let is_long = query_beams && plan.mis.query_beams == BeamExtent::Long;
-    let needs_all = is_long || emission;
+    let emission = plan.mis.hit > 0.0 && prepared.has_emitting_media();
+    let queries_beams = |technique| own.has(technique) && plan.merges_by(technique);
+    let query_beams = queries_beams(Technique::Pb2d) || queries_beams(Technique::Bb1d);
+    let needs_all = emission || query_beams && plan.mis.query_beams == BeamExtent::Long;
+
     let mut stack = prepared.stack_at_camera(ray.origin);
-    let mut origin = ray.origin;
-    let mut direction = ray.direction;
     let mut edge = CameraEdge {
         throughput: Spectrum::ONE,
-        mis: EdgeMis::at_camera(&plan.mis, f64::from(ray.pdf)),
+        mis: EdgeMis::at_camera(&plan.mis, f64::from(camera_ray.pdf)),
         connections: O::Densities::of(Technique::LightTracing, plan.mis.pow(plan.mis.light_tracing)),
         depth: 1,
     };
-
-    let mut stops = 0;
-    let mut travelled = 0.0;
-    let mut survival = Survival::of_camera(plan.roulette, prepared.surroundings());
-    let hero = L::draw(&plan.mis.lanes, || stream.uniform());
+    let mut state = WalkState::new(context, Walk::Camera, stream);
+    let Scratch { edge_trace, crossings } = scratch;
     for depth in 1..=plan.lengths.max {
         out.counters.camera_edges += 1;
-        edge.depth = depth;
-        let extent = context.extent(needs_all, stops, &stack);
-        scratch.edge_trace.trace(scene, origin, direction, &stack, 0.0, extent, hero, &mut stream);
-        out.counters.boundary_conflicts += scratch.edge_trace.take_conflicts();
+        let extent = context.extent(needs_all, &state, &stack);
+        edge_trace.trace(scene, &ray, &stack, extent, &mut state);
+        out.counters.boundary_conflicts += edge_trace.take_conflicts();
         if depth == 1 {
-            let crossings = &mut scratch.crossings;
-            techniques::next_events_at_lens::<_, L, O>(context, &mut stream, crossings, &mut out);
+            techniques::next_events_at_lens::<_, L, O>(context, &mut state.stream, crossings, &mut out);
         }
-        let edge_trace = &scratch.edge_trace;
         if emission {
-            techniques::emission_along(context, edge_trace, &edge, &mut stream, &mut out);
+            techniques::emission_along(context, edge_trace, &edge, &mut state.stream, &mut out);
         }
-        if pb2d {
-            techniques::pb2d(context, map, edge_trace, &edge, &mut out);
-        }
-        if bb1d {
-            techniques::bb1d(context, map, edge_trace, &edge, &mut out);
-        }
+        techniques::merge_along_edge(context, map, own, edge_trace, &edge, &mut out);
 
         let arrived = match arrive(scene, edge_trace) {
             Arrival::Vertex(arrived) => arrived,
             Arrival::Escaped => {
                 techniques::environment(context, edge_trace, &edge, &mut out);
-                if !scattered_before {
-                    walk.features = Features::NONE;
-                }
+                first_seen.escape();
                 break;
             }
             Arrival::Absorbed => break,
@@ -107,7 +90,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
             break;
         }
-        let from = -direction;
+        let from = -ray.direction;
         let mis_edge = Edge::new(
             &arrived.density,
             f64::from(arrived.distance),
@@ -115,100 +98,45 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             edge.mis.start,
             in_medium,
         );
-        if !in_medium
-            && let Some(Hit { emitter: Some(emitter), position, geometric_normal, .. }) = edge_trace.hit
-        {
-            let point = EmitterPoint { position, normal: geometric_normal };
-            techniques::shine(context, emitter, &point, from, origin, &mis_edge, throughput, &edge, &mut out);
-        }
-        if plan.features && !scattered_before {
-            let Arrived { interaction, position, distance, .. } = &arrived;
-            travelled += distance;
-            let features = Features::at(scene, interaction, *position, from, throughput, travelled);
-            // Not a mirror: roulette may end the walk there. What is black is seen.
-            if interaction.is_connectible() || features.albedo.is_black() {
-                walk.features = features;
-            }
-        }
+        techniques::hit(context, edge_trace, &mis_edge, throughput, &edge, &mut out);
+        first_seen.arrive(scene, &arrived, from, throughput, out.layers[Layer::Bpt as usize]);
+        let is_connectible = arrived.interaction.is_connectible();
         if depth == plan.lengths.max {
-            out.counters.cut_walks += u64::from(arrived.interaction.is_connectible());
+            out.counters.cut_walks += u64::from(is_connectible);
             break;
         }
-        let (connectible, sides) = (arrived.interaction.is_connectible(), arrived.sides);
-        let mis = edge.mis.arrive(
-            &plan.mis,
-            Walk::Camera,
-            &mis_edge,
-            if connectible { edge.connections } else { O::Densities::ZERO },
-        );
+
+        let connections = if is_connectible { edge.connections } else { O::Densities::ZERO };
         let vertex = CameraVertex {
             position: arrived.position,
             towards_camera: from,
             throughput,
-            mis,
+            mis: edge.mis.arrive(&plan.mis, Walk::Camera, &mis_edge, connections),
             scale: plan.radius_scale(arrived.position, in_medium),
             depth,
             interaction: arrived.interaction,
         };
-        if connectible {
-            if !scattered_before {
-                walk.seen = out.layers[Layer::Bpt as usize];
-                scattered_before = true;
-            }
-            let crossings = &mut scratch.crossings;
-            techniques::next_events(context, &vertex, &sides, &mut stream, crossings, &mut out);
-            techniques::connections(context, map, &vertex, &sides, &mut stream, crossings, &mut out);
-            match &vertex.interaction {
-                Interaction::Surface(surface) if own.has(Technique::Surf) => {
-                    techniques::surf(context, map, &vertex, surface, &mut out);
-                }
-                Interaction::Surface(_) => {}
-                Interaction::Medium(medium) => {
-                    if own.has(Technique::Pp3d) {
-                        techniques::pp3d(context, map, &vertex, *medium, &mut out);
-                    }
-                    if own.has(Technique::Bp2d) {
-                        techniques::bp2d(context, map, &vertex, *medium, &mut out);
-                    }
-                }
-            }
+        let sides = arrived.sides;
+        if is_connectible {
+            techniques::next_events(context, &vertex, &sides, &mut state.stream, crossings, &mut out);
+            techniques::connections(context, map, &vertex, &sides, &mut state.stream, crossings, &mut out);
+            techniques::merge_at_vertex(context, map, own, &vertex, &mut out);
         }
 
-        let Some(scattered) = vertex.interaction.scatter::<_, L>(
-            scene,
-            &mut survival,
-            Walk::Camera,
-            vertex.position,
-            from,
-            hero,
-            &vertex.mis.shares,
-            &mut stream,
-        ) else {
+        let CameraVertex { position, interaction, mis, scale, .. } = vertex;
+        let Some(scattered) = interaction.scatter(scene, position, from, &mis.shares, &mut state) else {
             break;
         };
-        out.observer.camera_vertex(&ObservedVertex {
-            depth,
-            position: vertex.position,
-            interaction: vertex.interaction,
-            delta: scattered.delta,
-            albedo: scattered.albedo,
-        });
-        origin = ray_origin(&vertex.interaction, vertex.position, scattered.direction);
-        direction = scattered.direction;
+        let (delta, albedo) = (scattered.delta, scattered.albedo);
+        out.observer.camera_vertex(&ObservedVertex { depth, position, interaction, delta, albedo });
+        ray = Ray::new(ray_origin(&interaction, position, scattered.direction), scattered.direction);
         stack.clone_from(sides.towards(scattered.transmitted));
-        stops += u32::from(in_medium);
         edge = CameraEdge {
             throughput: throughput * scattered.weight,
-            mis: depart(context, &vertex.mis, &vertex.interaction, vertex.scale, &scattered),
+            mis: depart(context, &mis, &interaction, scale, &scattered),
             connections: plan.mis.connections(),
-            depth,
+            depth: depth + 1,
         };
     }
-    if !scattered_before {
-        walk.seen = walk.layers[Layer::Bpt as usize];
-    }
-    if plan.features {
-        walk.features = walk.features.with_light(walk.seen);
-    }
-    walk
+    first_seen.finish(layers)
 }

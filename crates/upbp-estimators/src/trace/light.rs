@@ -1,33 +1,28 @@
 //! Light sub-paths: they leave vertices, photon beams, and splats of light tracing.
 
-use glam::Vec3;
 use upbp_accel::{Ray, Segment, offset_origin};
-use upbp_media::{Lanes, Medium, MediumId, MediumStack, Spectrum};
+use upbp_media::{Lanes, Medium, MediumStack};
 
 use crate::counters::Counters;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis, EdgeStart};
 use crate::observer::{LightEnd, ObservedVertex, Observer};
 use crate::path::{
-    Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightVertex, MIN_COSINE, MediumSpan,
-    PhotonBeam, Scratch, arrive, depart, ray_origin,
+    Arrival, Arrived, Context, EdgeSource, EdgeTrace, LightChunk, LightEdge, LightVertex, MIN_COSINE,
+    MediumSpan, PhotonBeam, Scratch, WalkState, arrive, depart, ray_origin,
 };
 use crate::prepared_scene::PreparedScene;
 use crate::random::{Stream, StreamKind};
-use crate::roulette::Survival;
 use crate::scene::{Emitter, EmitterKind, PathEnd, Scene, Walk};
 use crate::technique::Technique;
 use crate::techniques::light_tracing;
 
-/// The walk's state between two vertices.
-struct Flight<D: Densities, L: Lanes> {
-    origin: Vec3,
-    direction: Vec3,
+/// A light sub-path that starts.
+struct Emitted<D: Densities, L: Lanes> {
+    ray: Ray,
+    /// The bodies around the ray's origin.
     stack: MediumStack,
-    mis: EdgeMis<D, L>,
-    source: EdgeSource,
-    throughput: Spectrum,
-    infinite: bool,
-    hero: L::Hero,
+    edge: LightEdge<D, L>,
+    state: WalkState<L>,
 }
 
 /// Traces light sub-path `index`.
@@ -40,12 +35,10 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     observer: &mut O,
 ) {
     let Context { prepared, plan } = *context;
-    let mut stream = Stream::new(plan.seed, plan.iteration, kind, u64::from(index));
-    let counters = &mut out.counters;
-    let Some(mut flight) = emit(context, index, &mut stream, counters, observer) else { return };
+    let stream = plan.stream(kind, u64::from(index));
+    let Some(emitted) = emit(context, index, stream, &mut out.counters, observer) else { return };
+    let Emitted { mut ray, mut stack, mut edge, mut state } = emitted;
     let scene = prepared.scene;
-    let mut survival = Survival::of_light(plan.roulette, prepared.surroundings());
-    let mut stops = 0;
     // Paths 0..N_B leave beams: all paths are alike, so the first ones are as good as any.
     let leaves_beams = index < plan.beam_paths && plan.stores_beams();
     let long_beams = leaves_beams && plan.mis.photon_beams == BeamExtent::Long;
@@ -54,21 +47,11 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     for depth in 1..plan.lengths.max {
         out.counters.light_edges += 1;
         let edge_trace = &mut scratch.edge_trace;
-        let start = if flight.infinite { f32::NEG_INFINITY } else { 0.0 };
-        let extent = context.extent(long_beams, stops, &flight.stack);
-        edge_trace.trace(
-            scene,
-            flight.origin,
-            flight.direction,
-            &flight.stack,
-            start,
-            extent,
-            flight.hero,
-            &mut stream,
-        );
+        let extent = context.extent(long_beams, &state, &stack);
+        edge_trace.trace(scene, &ray, &stack, extent, &mut state);
         out.counters.boundary_conflicts += edge_trace.take_conflicts();
         if leaves_beams {
-            store_beams(context, edge_trace, &flight, depth, index, out);
+            store_beams(context, edge_trace, &edge, index, out);
         }
 
         let arrival = match arrive(scene, edge_trace) {
@@ -81,26 +64,26 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         };
         let Arrived { position, distance, density, interaction, sides } = arrival;
         let in_medium = interaction.in_medium();
-        let t = density.forward(in_medium).mean(&flight.mis.shares);
-        let throughput = flight.throughput * density.transmittance / t as f32;
+        let t = density.forward(in_medium).mean(&edge.mis.shares);
+        let throughput = edge.throughput * density.transmittance / t as f32;
         if !(t > 0.0) || throughput.is_black() || out.counters.overflows(throughput) {
             return;
         }
-        let from = -flight.direction;
+        let from = -ray.direction;
         let connectible = interaction.is_connectible();
-        let edge = Edge::new(
+        let mis_edge = Edge::new(
             &density,
-            if flight.infinite { f64::INFINITY } else { f64::from(distance) },
+            if edge.from_infinity { f64::INFINITY } else { f64::from(distance) },
             interaction.cosine(from),
-            flight.mis.start,
+            edge.mis.start,
             in_medium,
         );
         let connections = if connectible {
-            flight.source.connections(context, flight.direction, position)
+            edge.source.connections(context, ray.direction, position)
         } else {
             O::Densities::ZERO
         };
-        let mis = flight.mis.arrive(&plan.mis, Walk::Light, &edge, connections);
+        let mis = edge.mis.arrive(&plan.mis, Walk::Light, &mis_edge, connections);
         let scale = plan.radius_scale(position, in_medium);
         let vertex = LightVertex {
             position,
@@ -117,7 +100,8 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
                 && plan.lengths.contains(depth + 1)
                 && !context.hides_from_both(&sides, PathEnd::Lens)
             {
-                light_tracing(context, &vertex, &sides, &mut stream, &mut scratch.crossings, out, observer);
+                let (stream, crossings) = (&mut state.stream, &mut scratch.crossings);
+                light_tracing(context, &vertex, &sides, stream, crossings, out, observer);
                 observer.call(Technique::LightTracing, 0);
             }
             if plan.stores_vertices() {
@@ -126,17 +110,7 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             }
         }
 
-        let hero = flight.hero;
-        let Some(scattered) = interaction.scatter::<_, L>(
-            scene,
-            &mut survival,
-            Walk::Light,
-            position,
-            from,
-            hero,
-            &mis.shares,
-            &mut stream,
-        ) else {
+        let Some(scattered) = interaction.scatter(scene, position, from, &mis.shares, &mut state) else {
             return;
         };
         observer.light_vertex(
@@ -149,27 +123,25 @@ pub fn trace_light_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
                 albedo: scattered.albedo,
             },
         );
-        flight = Flight {
-            origin: ray_origin(&interaction, position, scattered.direction),
-            direction: scattered.direction,
-            stack: sides.towards(scattered.transmitted).clone(),
+        ray = Ray::new(ray_origin(&interaction, position, scattered.direction), scattered.direction);
+        stack.clone_from(sides.towards(scattered.transmitted));
+        edge = LightEdge {
+            throughput: throughput * scattered.weight,
             mis: depart(context, &mis, &interaction, scale, &scattered),
             source: EdgeSource::Vertex,
-            throughput: throughput * scattered.weight,
-            infinite: false,
-            hero,
+            from_infinity: false,
+            depth: depth + 1,
         };
-        stops += u32::from(in_medium);
     }
 }
 
 fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     index: u32,
-    stream: &mut Stream,
+    mut stream: Stream,
     counters: &mut Counters,
     observer: &mut O,
-) -> Option<Flight<O::Densities, L>> {
+) -> Option<Emitted<O::Densities, L>> {
     let prepared = context.prepared;
     let (emitter, probability) = prepared.choose_emission(stream.uniform())?;
     let light = &prepared.scene.emitters()[emitter.0 as usize];
@@ -181,9 +153,10 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let kind = light.kind();
     // With another probability a walk from infinity does not arrive. Those that do have not stopped on the
     // way.
-    let hero = L::draw(&context.plan.mis.lanes, || stream.uniform());
-    let passes = if kind.is_infinite() { prepared.passes_from_infinity::<L>().of_hero(hero) } else { 1.0 };
-    if passes < 1.0 && f64::from(stream.uniform()) >= passes {
+    let mut state = WalkState::<L>::new(context, Walk::Light, stream);
+    let is_infinite = kind.is_infinite();
+    let passes = if is_infinite { prepared.passes_from_infinity::<L>().of_hero(state.hero) } else { 1.0 };
+    if passes < 1.0 && f64::from(state.stream.uniform()) >= passes {
         return None;
     }
     let cos = match kind {
@@ -204,7 +177,7 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         EmitterKind::Point => offset_origin(emission.point.position, emission.direction, emission.direction),
         _ => emission.point.position,
     };
-    let stack = if kind.is_infinite() {
+    let stack = if is_infinite {
         MediumStack::new(prepared.scene.outside())
     } else {
         prepared.scene.stack_at(origin)
@@ -220,15 +193,10 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         _ => f64::from(u8::from(kind.is_hittable())),
     };
     observer.light_end(index, &LightEnd { emitter, point: emission.point, direction: emission.direction });
-    let origin = if kind.is_infinite() {
-        start_near_scene(prepared.scene, &Ray::new(origin, emission.direction))?
-    } else {
-        origin
-    };
-    Some(Flight {
-        origin,
-        direction: emission.direction,
-        stack,
+    let ray = Ray::new(origin, emission.direction);
+    let ray = if is_infinite { near_scene(prepared.scene, &ray)? } else { ray };
+    let edge = LightEdge {
+        throughput,
         mis: EdgeMis::at_light(
             &context.plan.mis,
             if matches!(kind, EmitterKind::Volume(_)) { EdgeStart::Volume } else { EdgeStart::Surface },
@@ -238,27 +206,27 @@ fn emit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             f64::from(emission.pdf_direction),
         ),
         source: EdgeSource::Emitter { emitter, point: emission.point, pdf_position: emission.pdf_position },
-        throughput,
-        infinite: kind.is_infinite(),
-        hero,
-    })
+        from_infinity: is_infinite,
+        depth: 1,
+    };
+    Some(Emitted { ray, stack, edge, state })
 }
 
-/// A place on a ray from infinity just before what it meets first; `None` if it meets nothing. Distances
-/// from there have the digits of what is near, not those of a start as far away as the scene is wide: both
-/// faces of a pane of glass would be at one, and places in media beside their bodies.
-fn start_near_scene<S: Scene>(scene: &S, ray: &Ray) -> Option<Vec3> {
+/// The ray from infinity whose origin is just before what it meets first; `None` if it meets nothing.
+/// Distances from there have the digits of what is near, not those of a start as far away as the scene is
+/// wide: both faces of a pane of glass would be at one, and places in media beside their bodies.
+fn near_scene<S: Scene>(scene: &S, ray: &Ray) -> Option<Ray> {
     let first = scene.intersect(ray)?.t;
     let margin = 16.0 * f32::EPSILON * (first + ray.origin.abs().max_element());
     let along = f64::from((first - margin).max(0.0));
-    Some((ray.origin.as_dvec3() + along * ray.direction.as_dvec3()).as_vec3())
+    let origin = (ray.origin.as_dvec3() + along * ray.direction.as_dvec3()).as_vec3();
+    Some(Ray { origin, t_min: f32::NEG_INFINITY, ..*ray })
 }
 
 fn store_beams<S: Scene, D: Densities, L: Lanes>(
     context: &Context<'_, S>,
     edge_trace: &EdgeTrace<S::Bsdf, L>,
-    flight: &Flight<D, L>,
-    depth: u32,
+    edge: &LightEdge<D, L>,
     path: u32,
     out: &mut LightChunk<S::Bsdf, D, L>,
 ) {
@@ -269,22 +237,22 @@ fn store_beams<S: Scene, D: Densities, L: Lanes>(
         if !(merges.bb1d.is_on() || merges.bp2d.is_on()) {
             continue;
         }
-        let Some(end) = beam_end(prepared, edge_trace, span, medium, end) else { continue };
+        let Some(end) = beam_end(prepared, edge_trace, span, end) else { continue };
         out.counters.photon_beams += 1;
         out.beams.push(PhotonBeam {
             segment: Segment {
-                origin: edge_trace.origin,
-                direction: edge_trace.direction,
+                origin: edge_trace.ray.origin,
+                direction: edge_trace.ray.direction,
                 start: span.start,
                 end,
             },
             medium,
             before: span.before,
-            mis: flight.mis,
-            source: flight.source,
-            throughput: flight.throughput,
-            from_infinity: flight.infinite,
-            depth,
+            mis: edge.mis,
+            source: edge.source,
+            throughput: edge.throughput,
+            from_infinity: edge.from_infinity,
+            depth: edge.depth,
             path,
         });
     }
@@ -296,7 +264,7 @@ const DOUBLINGS: usize = 64;
 /// precision does not tell.
 const NEGLIGIBLE: f32 = 1e-7;
 
-/// The end of a beam in `span`, whose medium is `medium`, that runs to distance `end` there.
+/// The end of a beam in the medium of `span` that runs to distance `end` there.
 ///
 /// Where there is none, the beam ends where what is left in every channel is [negligible](NEGLIGIBLE), or is
 /// not attenuated any further. So weights may take it to be without an end. A beam from infinity has none
@@ -305,13 +273,12 @@ fn beam_end<S: Scene, L: Lanes>(
     prepared: &PreparedScene<'_, S>,
     edge_trace: &EdgeTrace<S::Bsdf, L>,
     span: &MediumSpan<L>,
-    medium: MediumId,
     end: f32,
 ) -> Option<f32> {
     if end.is_finite() || !span.start.is_finite() {
         return (end > span.start && span.start.is_finite()).then_some(end);
     }
-    let medium = &prepared.scene.media()[medium.0 as usize];
+    let medium = span.medium_in(prepared.scene)?;
     let transmittance = |end| medium.segment(&edge_trace.segment(span, end)).transmittance;
     let left = transmittance(f32::INFINITY);
     let ends = std::iter::successors(Some(prepared.bounds.radius), |length| Some(2.0 * length))

@@ -2,7 +2,7 @@
 //! Jacobian of refraction by finite differences.
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
-use upbp_estimators::path::{Interaction, Scattered, SurfaceInteraction};
+use upbp_estimators::path::{Interaction, Scattered, SurfaceInteraction, WalkState};
 use upbp_estimators::scene::{
     BoundingSphere, Bsdf, BsdfSample, Camera, CameraConnection, CameraRay, Emission, Emitter, EmitterKind,
     EmitterPoint, Hit, HitDensities, Incident, Interface, Scene, Walk,
@@ -146,18 +146,14 @@ fn jacobian(direction: DVec3, normal: DVec3, ratio: f64) -> f64 {
 
 fn transmitted(interaction: &Interaction<Glass>, walk: Walk, from: Vec3) -> Option<Scattered<f64>> {
     (0..64).find_map(|index| {
-        let mut stream = Stream::new(1, 0, StreamKind::Light, index);
-        let mut survival = Survival::of_light(Roulette::Below(1.0), None);
-        let scattered = interaction.scatter::<_, f64>(
-            &Nothing,
-            &mut survival,
+        let mut state = WalkState::<f64> {
             walk,
-            Vec3::ZERO,
-            from,
-            (),
-            &(),
-            &mut stream,
-        );
+            stream: Stream::new(1, 0, StreamKind::Light, index),
+            survival: Survival::of_light(Roulette::Below(1.0), None),
+            hero: (),
+            stops: 0,
+        };
+        let scattered = interaction.scatter(&Nothing, Vec3::ZERO, from, &(), &mut state);
         scattered.filter(|scattered| scattered.transmitted)
     })
 }
