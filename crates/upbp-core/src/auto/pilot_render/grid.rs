@@ -1,10 +1,10 @@
-//! The pixels that a pilot render looks at.
+//! The pixels of a pilot render.
 
 use upbp_estimators::scene::PixelRect;
 
 use super::blocks;
 
-/// Cells of the picture, one pixel of each of which a pilot render looks at.
+/// Cells of the picture, one pixel of each of which a pilot render has.
 pub(crate) struct Grid {
     rect: PixelRect,
     side: f64,
