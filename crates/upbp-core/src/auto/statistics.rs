@@ -13,6 +13,7 @@ use upbp_estimators::{
 };
 use upbp_media::Lanes;
 
+use super::full_plan::Inputs;
 use super::memory_limit::Room;
 use super::parallel_walks::{PIECE, PilotRun, camera_path, in_pieces, pixel};
 use super::photon_distances::{Nearest, Neighbours, median};
@@ -21,7 +22,6 @@ use super::roulette::usual_roulette;
 use super::thinned::Thinned;
 use crate::deadline::{Allowance, Clock, Halt};
 use crate::error::RenderError;
-use crate::settings::CheckedSettings;
 
 /// Light sub-paths of a quick look.
 pub(crate) const FEW_LIGHT_PATHS: u32 = 1024;
@@ -45,8 +45,6 @@ const NEIGHBOURS: usize = 16384;
 /// Averages over light sub-paths, and typical distances between photons and queries.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Statistics {
-    /// The probability of each lane, if walks run in lanes.
-    pub(crate) lanes: Option<[f64; 3]>,
     /// Wall seconds per light sub-path, with all threads at work: for limits of time, which are kept by the
     /// clock.
     pub(crate) light_path_seconds: f64,
@@ -84,24 +82,23 @@ pub(crate) struct Statistics {
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
-pub(crate) fn measure<S: Scene, L: Lanes>(
+pub(super) fn measure<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    lanes: Option<[f64; 3]>,
+    inputs: Inputs<'_>,
     light_paths: u32,
     room: &Room,
     allowance: &Allowance<'_>,
 ) -> Result<Statistics, RenderError> {
+    let Inputs { settings, techniques, .. } = inputs;
     let use_nothing = [Technique::Hit, Technique::Nee, Technique::LightTracing].into_iter().collect();
     let only_light_tracing = techniques.without(use_nothing).is_empty();
     if only_light_tracing && !(allowance.is_limited() && techniques.has(Technique::LightTracing)) {
-        return Ok(Statistics { lanes, ..Statistics::default() });
+        return Ok(Statistics::default());
     }
     let run = |part: f64, halt: &Halt<'_>| {
         let light_paths = (part * f64::from(light_paths)).ceil() as u32;
         let camera_paths = (part * f64::from(CAMERA_PATHS)).ceil() as u32;
-        let plan = |paths| nominal_plan(scene, settings, techniques, lanes, paths);
+        let plan = |paths| nominal_plan(scene, inputs, paths);
         let most_vertices = room.items::<LightVertex<S::Bsdf, f64, L>>().min(MOST_VERTICES);
         let light = TracedPaths::trace::<_, L>(scene, plan, light_paths, most_vertices as f64, halt)?;
         let plan = plan(light.paths);
@@ -112,7 +109,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
         } else {
             RadiusField::Uniform
         };
-        Some(Statistics { lanes, ..light.statistics(&plan, field, &queries, scene.bounds.radius) })
+        Some(light.statistics(&plan, field, &queries, scene.bounds.radius))
     };
     allowance.largest(run).ok_or(RenderError::Cancelled)
 }
@@ -121,9 +118,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
 /// importance.
 fn nominal_plan<S: Scene>(
     scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    lanes: Option<[f64; 3]>,
+    Inputs { settings, techniques, lanes }: Inputs<'_>,
     light_paths: u32,
 ) -> IterationPlan {
     let nominal = 1e-3 * scene.bounds.radius;
@@ -242,7 +237,6 @@ impl TracedPaths {
             })
         };
         Statistics {
-            lanes: None,
             light_path_seconds: self.seconds,
             vertices_per_path: self.photons.len() as f64 / paths,
             footprint: queries.footprint(),

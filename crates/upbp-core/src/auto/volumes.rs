@@ -14,7 +14,7 @@ use upbp_estimators::path::Context;
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet};
 
-use super::full_plan::{pilot_plan, plan_with};
+use super::full_plan::{Inputs, Planner, pilot_plan};
 use super::parallel_walks::{PilotRun, camera_path, in_pieces, pixel};
 use super::statistics::Statistics;
 use crate::deadline::{Budget, Halt};
@@ -60,7 +60,8 @@ pub(crate) fn choose<S: Scene>(
         scene.leave_out_volumes(|_| true);
         return Ok(());
     }
-    let plan = plan_with(scene, settings, TechniqueSet::PT, &Statistics::default(), [0; 2]);
+    let inputs = Inputs { settings, techniques: TechniqueSet::PT, lanes: None };
+    let plan = Planner { scene, inputs, statistics: &Statistics::default() }.plan_with([0; 2]);
     let plan = pilot_plan(scene, settings, &plan);
     let run = |part: f64, halt: &Halt<'_>| {
         let paths = (part * f64::from(PATHS)).ceil() as u32;
