@@ -71,8 +71,7 @@ impl Plan {
         let radii = &self.radii;
         let lengths = [radii.surf, radii.pp3d, radii.pb2d, radii.bp2d, radii.bb1d];
         let possible = |x: &f32| (0.0..=LARGEST_RADIUS).contains(x);
-        let merges = [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bp2d, Technique::Bb1d];
-        let mut radii_of = merges.into_iter().zip(lengths);
+        let mut radii_of = Technique::MERGES.into_iter().zip(lengths);
         if self.techniques.is_empty() {
             Err("techniques: expected at least one".into())
         } else if self.light_paths == 0 && self.uses_light_paths() {

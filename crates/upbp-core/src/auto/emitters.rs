@@ -14,8 +14,8 @@ use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVe
 use upbp_estimators::path::{Context, LightChunk, LightVertex};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::{
-    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet,
-    effective_samples,
+    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PerTechnique, PreparedScene, Technique,
+    TechniqueSet, effective_samples,
 };
 use upbp_media::Lanes;
 
@@ -23,7 +23,6 @@ use super::full_plan::{Inputs, Planner, pilot_plan};
 use super::guides::{self, Evidence};
 use super::memory_limit::Room;
 use super::parallel_walks::{PilotRun, SampleRoom, camera_path, in_pieces, light_path, pixel};
-use super::pilot_render::recorder::{PerTechnique, TECHNIQUES};
 use super::statistics::{self, PATHS_PER_BEAM_PATH};
 use super::thinned::Thinned;
 use crate::deadline::{Budget, Halt};
@@ -60,7 +59,7 @@ pub(super) const TIME_FOR_EMITTERS: f64 = 0.2;
 const QUICK_LOOK: f64 = 0.2;
 
 /// Lets the scene choose its emitters, and the starts of light sub-paths on them, by what they contribute
-/// under a plan with all techniques; returns the light that each technique brought from light sub-paths, in any
+/// under a plan with all techniques; returns the light that each brought from light sub-paths, in any
 /// unit. The scene has to be as it was prepared.
 ///
 /// # Errors
@@ -71,7 +70,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     room: &Room,
     budget: &Budget<'_>,
 ) -> Result<PerTechnique<f64>, RenderError> {
-    let mut by_technique = [0.0; TECHNIQUES];
+    let mut by_technique = [0.0; Technique::COUNT];
     let emitters = scene.scene.emitters().len();
     let is_guided = guides::can_guide(scene, inputs.techniques);
     if emitters < 2 && !is_guided {
@@ -295,7 +294,7 @@ fn measure<S: Scene, L: Lanes>(
     let relative = |contribution: Contribution| {
         if mean > 0.0 { mean / (mean + contribution.pixel) } else { 1.0 }
     };
-    let mut by_technique = [0.0; TECHNIQUES];
+    let mut by_technique = [0.0; Technique::COUNT];
     let mut by_path = |seen: &[(u32, Contribution)], scale: f64| {
         for &(path, contribution) in seen {
             if let Some((end, light)) = &mut starts[path as usize] {

@@ -13,7 +13,9 @@ use std::ops::Range;
 use upbp_estimators::mis;
 use upbp_estimators::path::{Context, LightChunk, LightVertex, Splat};
 use upbp_estimators::scene::{Camera, Scene};
-use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet};
+use upbp_estimators::{
+    Counters, IterationPlan, LightMap, PerTechnique, PreparedScene, Technique, TechniqueSet,
+};
 use upbp_media::Lanes;
 
 use super::full_plan::pilot_plan;
@@ -24,7 +26,7 @@ use crate::deadline::Halt;
 use crate::plan::Plan;
 use crate::settings::CheckedSettings;
 use grid::Grid;
-use recorder::{ByRoulette, PerTechnique, Recorder, Sample, TECHNIQUES, add, passed};
+use recorder::{ByRoulette, Recorder, Sample, add, passed};
 
 /// Times that a pilot render samples each of its pixels: products of two samples tell what they have in
 /// common, as iterations that are stratified do.
@@ -227,10 +229,7 @@ impl PilotRender {
 
     /// Samples that the pilot render has over those that an iteration of the plan has.
     pub(super) const fn thinning(&self, technique: Technique) -> f64 {
-        match technique {
-            Technique::Hit | Technique::Nee | Technique::Connect => 1.0,
-            _ => self.thinning[technique.uses_beams() as usize],
-        }
+        if technique.is_per_camera_vertex() { 1.0 } else { self.thinning[technique.uses_beams() as usize] }
     }
 
     /// Light sub-paths that a technique's samples under another plan come from, relative to the plan of this
@@ -259,7 +258,7 @@ impl PilotRender {
     fn work(&self, passes: &[Pass], camera_paths: f64, [light_paths, beam_paths]: [f64; 2]) -> Work {
         let mut counters = Counters::default();
         let mut edges = ByRoulette::default();
-        let [mut calls, mut tests, mut samples] = [[edges; TECHNIQUES]; 3];
+        let [mut calls, mut tests, mut samples] = [[edges; Technique::COUNT]; 3];
         let mut points = [0.0; 2];
         for pass in passes {
             counters.add(&pass.counters);
@@ -495,7 +494,7 @@ mod tests {
                         merged: None,
                         albedos: 1.0,
                         value,
-                        weights: [0.0; TECHNIQUES],
+                        weights: [0.0; Technique::COUNT],
                     });
                     let pixel = [(11 * i % 24) as u32, (7 * i % 20) as u32];
                     splats.push(Splat { pixel, value: Spectrum::splat(1.0) });

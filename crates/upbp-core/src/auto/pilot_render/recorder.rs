@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use glam::{Vec2, Vec3};
-use upbp_estimators::Technique;
 use upbp_estimators::mis;
 use upbp_estimators::mis::Densities;
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::scene::CameraRay;
+use upbp_estimators::{PerTechnique, Technique};
 
 use crate::auto::parallel_walks::SampleRoom;
 use crate::auto::roulette;
@@ -16,12 +16,6 @@ use crate::auto::roulette;
 /// next to no value, and no other technique has a weight there that single precision could divide by: that
 /// must not look as if only connections found this light.
 const LEAST_WEIGHT: f64 = 1e-30;
-
-/// The number of techniques.
-pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
-
-/// A value for each technique.
-pub(crate) type PerTechnique<T> = [T; TECHNIQUES];
 
 /// A sample, weighted as when everything runs.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +27,7 @@ pub(crate) struct Sample {
     /// Product of the albedos of the camera vertices that scattered before.
     pub(crate) albedos: f32,
     /// [Weights](mis_weights) of all techniques on its path; they sum to one.
-    pub(crate) weights: [f32; TECHNIQUES],
+    pub(crate) weights: PerTechnique<f32>,
 }
 
 /// Counts of camera sub-paths' work, by the number of a roulette.

@@ -13,9 +13,9 @@ pub(super) mod tests;
 
 use glam::DVec3;
 
-use upbp_estimators::{Technique, TechniqueSet};
+use upbp_estimators::{PerTechnique, Technique, TechniqueSet};
 
-use super::pilot_render::recorder::{PerTechnique, Sample, TECHNIQUES};
+use super::pilot_render::recorder::Sample;
 use super::pilot_render::{PilotRender, PixelPair};
 use crate::plan::Plan;
 use limits::{reductions, relative_to, surroundings};
@@ -54,9 +54,9 @@ impl Counts {
         // Camera sub-paths are never told apart by how they find the light.
         let techniques = plan.techniques.union(TechniqueSet::PT);
         let mut counts = Self {
-            relative: [0.0; TECHNIQUES],
+            relative: [0.0; Technique::COUNT],
             paths: [Technique::Surf, Technique::Bb1d].map(|technique| pilot.relative_paths(technique, plan)),
-            active: [1.0; TECHNIQUES],
+            active: [1.0; Technique::COUNT],
             camera_factor: f64::from(plan.camera_factor),
             roulette: pilot.roulette(plan),
             light_paths: f64::from(if plan.techniques.intersects(TechniqueSet::BEAMS) {
@@ -69,7 +69,7 @@ impl Counts {
         for technique in techniques.iter() {
             let active = plan.active_part(technique);
             counts.active[technique as usize] = active;
-            counts.relative[technique as usize] = if has_camera_factor(technique) {
+            counts.relative[technique as usize] = if technique.is_per_camera_vertex() {
                 1.0
             } else {
                 active * pilot.relative_photons(technique, plan)
@@ -77,12 +77,6 @@ impl Counts {
         }
         counts
     }
-}
-
-/// Whether a technique has the camera factor in its weights: as many samples as camera vertices make, however
-/// many light sub-paths there are.
-const fn has_camera_factor(technique: Technique) -> bool {
-    matches!(technique, Technique::Hit | Technique::Nee | Technique::Connect)
 }
 
 /// A pilot render, made ready for predictions.

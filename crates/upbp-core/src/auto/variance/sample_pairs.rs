@@ -4,10 +4,10 @@
 use std::num::NonZeroU32;
 
 use glam::{DVec3, Vec3};
-use upbp_estimators::Technique;
+use upbp_estimators::{PerTechnique, Technique};
 
-use super::{Counts, TRUSTED, has_camera_factor};
-use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
+use super::{Counts, TRUSTED};
+use crate::auto::pilot_render::recorder::Sample;
 use crate::auto::pilot_render::{PilotRender, PixelPair};
 use crate::auto::roulette::{COUNT, relative_pass_probability};
 
@@ -34,7 +34,7 @@ struct ReadySample {
     /// iteration.
     of_pilot: f32,
     /// Balance-heuristic weights of all techniques on its path.
-    weights: [f32; TECHNIQUES],
+    weights: PerTechnique<f32>,
 }
 
 impl ReadySamples {
@@ -101,13 +101,13 @@ pub(super) struct Reweighted<'a> {
     samples: &'a ReadySamples,
     roulette: usize,
     /// Samples of each technique relative to the pilot render's plan.
-    relative: [f32; TECHNIQUES],
+    relative: PerTechnique<f32>,
     /// Samples of each technique, relative, times their factors in the weights.
-    weighted: [f32; TECHNIQUES],
+    weighted: PerTechnique<f32>,
     /// The factor of emission hits, next events and connections.
     camera_factor: f32,
     /// Extra weight of pairs of samples of one camera sub-path, which makes the queries for both or for none.
-    common: [f32; TECHNIQUES],
+    common: PerTechnique<f32>,
     /// Pairs of photons of one light sub-path that the plan has, less those of the pilot render: by points
     /// and by beams.
     more: [f32; 2],
@@ -115,7 +115,7 @@ pub(super) struct Reweighted<'a> {
     periodic: bool,
     /// Sums of what was found of a light sub-path: by class and, where queries are periodic, by technique.
     by_class: Vec<[Vec3; 2]>,
-    by_technique: Vec<[Vec3; TECHNIQUES]>,
+    by_technique: Vec<PerTechnique<Vec3>>,
 }
 
 impl<'a> Reweighted<'a> {
@@ -125,7 +125,7 @@ impl<'a> Reweighted<'a> {
             roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
             weighted: Technique::ALL.map(|technique| {
-                let factor = if has_camera_factor(technique) { counts.camera_factor } else { 1.0 };
+                let factor = if technique.is_per_camera_vertex() { counts.camera_factor } else { 1.0 };
                 (factor * counts.relative[technique as usize]) as f32
             }),
             camera_factor: counts.camera_factor as f32,
@@ -145,7 +145,7 @@ impl<'a> Reweighted<'a> {
     fn path_moments<const PERIODIC: bool>(&mut self, path: usize) -> PathMoments {
         let mut result = PathMoments::default();
         let mut all = [Vec3::ZERO; 2];
-        let mut all_by_technique = [Vec3::ZERO; TECHNIQUES];
+        let mut all_by_technique = [Vec3::ZERO; Technique::COUNT];
         let (samples, light_paths) = self.samples.of(path);
         self.by_class.clear();
         self.by_class.resize(light_paths as usize, all);
@@ -227,8 +227,8 @@ impl<'a> Reweighted<'a> {
 
     /// The densities of the plan at the path of a sample with these weights.
     #[inline]
-    pub(super) fn densities(&self, weights: &[f32; TECHNIQUES]) -> PathDensities {
-        let [a, b, c, d, e, f, g, h, i]: [f32; TECHNIQUES] =
+    pub(super) fn densities(&self, weights: &PerTechnique<f32>) -> PathDensities {
+        let [a, b, c, d, e, f, g, h, i]: PerTechnique<f32> =
             std::array::from_fn(|i| weights[i] * self.relative[i]);
         // Not one after the other: the search has nothing else to wait for.
         let (camera, light) = ((a + b) + c, (((e + f) + (g + h)) + i) + d);
@@ -298,11 +298,11 @@ impl Excess {
 
 /// Photons of each technique in a query of the pilot render's plan, mean over iterations, relative to the
 /// first iteration.
-pub(super) fn mean_photons(pilot: &PilotRender) -> [f32; TECHNIQUES] {
+pub(super) fn mean_photons(pilot: &PilotRender) -> PerTechnique<f32> {
     Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32)
 }
 
 /// Density of a path with the pilot render's plan, mean over iterations, relative to the first iteration.
-pub(super) fn density_of_pilot(weights: &[f32; TECHNIQUES], mean_photons: &[f32; TECHNIQUES]) -> f32 {
+pub(super) fn density_of_pilot(weights: &PerTechnique<f32>, mean_photons: &PerTechnique<f32>) -> f32 {
     weights.iter().zip(mean_photons).map(|(weight, photons)| weight * photons).sum()
 }

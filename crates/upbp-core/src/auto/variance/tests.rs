@@ -35,7 +35,7 @@ fn pilot_of(other: Technique) -> PilotRender {
     for i in 0..cells * passes {
         for (technique, x) in [(Technique::Hit, uniform(i, 0)), (other, uniform(i, 1).sqrt())] {
             let sum = 1.0 + 2.0 * x;
-            let mut weights = [0.0; TECHNIQUES];
+            let mut weights = [0.0; Technique::COUNT];
             weights[Technique::Hit as usize] = (1.0 / sum) as f32;
             weights[other as usize] = (2.0 * x / sum) as f32;
             let value = Vec3::splat((3.0 * x * x / sum) as f32);
@@ -91,9 +91,9 @@ pub(in crate::auto) fn planned(paths: u32) -> Plan {
 
 fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts {
     let mut counts = Counts {
-        relative: [0.0; TECHNIQUES],
+        relative: [0.0; Technique::COUNT],
         paths: [paths; 2],
-        active: [1.0; TECHNIQUES],
+        active: [1.0; Technique::COUNT],
         camera_factor: 1.0,
         roulette: PILOT,
         light_paths: 1.0,
@@ -127,7 +127,7 @@ fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
 fn light_that_is_hardly_there_excludes_no_plan() {
     let (mut faint, mut unique) = (pilot(), pilot());
     let connection = |of_hits| {
-        let mut densities = upbp_estimators::mis::ByTechnique { of: [0.0; TECHNIQUES] };
+        let mut densities = upbp_estimators::mis::ByTechnique { of: [0.0; Technique::COUNT] };
         densities.of[Technique::Connect as usize] = 1.0;
         densities.of[Technique::Hit as usize] = of_hits;
         let (technique, value) = (Technique::Connect, Vec3::splat(1e-41));
@@ -191,7 +191,7 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
     /// Light sub-paths for each one that comes by.
     const RARE: f64 = 400.0;
     let cells = (SIDE * SIDE) as usize;
-    let mut weights = [0.0; TECHNIQUES];
+    let mut weights = [0.0; Technique::COUNT];
     weights[Technique::Pb2d as usize] = 1.0;
     let value = Vec3::splat((RARE / (TRACED * PHOTONS) as f64) as f32);
     let (mut samples, mut ends, mut drawn) = (Vec::new(), Vec::new(), 0);
@@ -258,7 +258,7 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
     const PATHS: u32 = 256;
     const PILOTS: u32 = 200;
     const CELLS: u32 = 50;
-    let mut weights = [0.0; TECHNIQUES];
+    let mut weights = [0.0; Technique::COUNT];
     weights[Technique::Bb1d as usize] = 1.0;
     let (mut sums, mut errors) = (Vec::new(), 0.0);
     for number in 0..PILOTS {
@@ -298,7 +298,7 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
 fn photons_vary_at_least_as_independent_ones_do() {
     const PLANNED: f64 = 1000.0;
     const TRACED: f64 = 10.0;
-    let mut weights = [0.0; TECHNIQUES];
+    let mut weights = [0.0; Technique::COUNT];
     weights[Technique::Bb1d as usize] = 1.0;
     let photon =
         Sample { technique: Technique::Bb1d, merged: Some(0), albedos: 1.0, value: Vec3::ONE, weights };
@@ -327,7 +327,7 @@ fn photons_vary_at_least_as_independent_ones_do() {
 fn variances_know_where_walks_end() {
     const ALBEDO: f32 = 0.3;
     let reached = OF_PILOT.survival(ALBEDO);
-    let mut weights = [0.0; TECHNIQUES];
+    let mut weights = [0.0; Technique::COUNT];
     weights[Technique::Hit as usize] = 1.0;
     let (mut samples, mut ends) = (Vec::new(), Vec::new());
     for i in 0..(SIDE * SIDE * PASSES) as usize {
@@ -357,7 +357,7 @@ fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
     let mut pilot = pilot();
     for sample in &mut pilot.samples {
         if sample.technique == Technique::Connect {
-            sample.weights = [0.0; TECHNIQUES];
+            sample.weights = [0.0; Technique::COUNT];
             sample.weights[Technique::Connect as usize] = 1.0;
         }
     }
@@ -372,7 +372,7 @@ fn by_splats(rare: u32) -> impl Fn(u32) -> f64 {
     let mut pilot = PilotRender { samples: Vec::new(), ends: vec![0; 2 * (SIDE * SIDE) as usize], ..pilot() };
     let splat = |cell| {
         let own = if cell < rare { 0.1 } else { 1.0 };
-        let mut weights = [0.0; TECHNIQUES];
+        let mut weights = [0.0; Technique::COUNT];
         weights[Technique::LightTracing as usize] = own;
         weights[Technique::Bb1d as usize] = 1.0 - own;
         Sample { technique: Technique::LightTracing, merged: None, albedos: 1.0, value: Vec3::ONE, weights }
@@ -464,7 +464,7 @@ fn sample() -> impl Strategy<Value = Sample> {
     let technique = proptest::sample::select(Technique::ALL.to_vec());
     let albedos = proptest::sample::select(vec![1.0_f32, 0.9, 0.6, 0.4, 0.2, 0.01]);
     (technique, 0..4_u32, albedos, prop::array::uniform3(0.0_f32..2.0), prop::array::uniform(0.01_f32..1.0))
-        .prop_map(|(technique, path, albedos, value, densities): (_, _, _, _, [f32; TECHNIQUES])| {
+        .prop_map(|(technique, path, albedos, value, densities): (_, _, _, _, PerTechnique<f32>)| {
             let sum: f32 = densities.iter().sum();
             Sample {
                 technique,
@@ -484,7 +484,7 @@ fn variances_of_blocks_contain_what_pixels_share() {
     /// Light sub-paths for each one that comes by.
     const RARE: f64 = 400.0;
     let cells = SIDE * SIDE;
-    let mut weights = [0.0; TECHNIQUES];
+    let mut weights = [0.0; Technique::COUNT];
     weights[Technique::Bb1d as usize] = 1.0;
     let value = Vec3::splat((RARE / TRACED) as f32);
     let mut pilot = PilotRender { thinning: [TRACED / PLANNED; 2], plan: planned(PLANNED as u32), ..pilot() };
@@ -534,8 +534,8 @@ proptest! {
         camera_factor in 0.5_f64..16.0,
         weight in 0.1_f64..100.0,
     ) {
-        let periodic: [bool; TECHNIQUES] = periodic;
-        let active: [f64; TECHNIQUES] = std::array::from_fn(|i| if periodic[i] { 0.25 } else { 1.0 });
+        let periodic: PerTechnique<bool> = periodic;
+        let active: PerTechnique<f64> = std::array::from_fn(|i| if periodic[i] { 0.25 } else { 1.0 });
         let counts =
             Counts { relative: active.map(|p| 0.5 + p), paths, active, camera_factor, ..counts([], 1.0) };
         let mut expected = 0.0;
@@ -561,9 +561,9 @@ proptest! {
         thinning in prop::array::uniform2(0.1_f64..1.0),
         camera_factor in 0.5_f64..16.0,
     ) {
-        let periodic: [bool; TECHNIQUES] = periodic;
+        let periodic: PerTechnique<bool> = periodic;
         samples.sort_by_key(|sample| sample.merged);
-        let active: [f64; TECHNIQUES] = std::array::from_fn(|i| {
+        let active: PerTechnique<f64> = std::array::from_fn(|i| {
             if periodic[i] && Technique::ALL[i].merges() { 0.25 } else { 1.0 }
         });
         let relative = active.map(|p| 0.5 + p);
