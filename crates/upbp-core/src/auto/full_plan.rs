@@ -3,12 +3,11 @@
 use upbp_estimators::mis::Heuristic;
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{
-    IterationChoices, IterationPlan, LEAST_RADIUS, MergePeriods, PathLengths, PreparedScene, Technique,
-    TechniqueSet,
+    IterationChoices, IterationPlan, LEAST_RADIUS, MergePeriods, PathLengths, PerMerge, PreparedScene,
+    Technique, TechniqueSet,
 };
 
 use super::memory_limit::Room;
-use super::photon_distances::Neighbours;
 use super::roulette::usual_roulette;
 use super::statistics::Statistics;
 use crate::deadline::Budget;
@@ -16,14 +15,6 @@ use crate::plan::Plan;
 use crate::radius_schedule::{LARGEST_RADIUS, MOST_MEAN_FREE_PATHS, Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
 
-/// Largest automatic first radius of surface merging, relative to the [size](size) of what the picture shows.
-const LARGEST_SURF_RADIUS: f32 = 3e-3;
-/// Largest automatic first radius of photon points around points, relative to that size.
-const LARGEST_PP3D_RADIUS: f32 = 5e-3;
-/// Largest automatic first radius of photon points around query beams, relative to that size.
-const LARGEST_PB2D_RADIUS: f32 = 3e-3;
-/// Largest automatic first radius of photon beams, relative to that size.
-const LARGEST_BEAM_RADIUS: f32 = 3e-3;
 /// The smallest automatic first radii, relative to the largest ones.
 const SMALLEST: f32 = 0.1;
 /// The least first radius that settings give, scene units: single precision holds the values of all kernels.
@@ -34,6 +25,16 @@ const LIGHT_TIME: f64 = 0.05;
 /// Photons in the smallest automatic kernel from which on more light sub-paths are not worth their time.
 /// Where one kernel holds all that is lit, every query would visit every photon.
 const CROWD: f64 = 1024.0;
+
+/// Largest automatic first radius, relative to the [size](Planner::size) of what the picture shows.
+const fn largest_radius(technique: Technique) -> f32 {
+    if matches!(technique, Technique::Pp3d) { 5e-3 } else { 3e-3 }
+}
+
+/// Photons or beams within an automatic first kernel, mean over queries.
+const fn photons(technique: Technique) -> f64 {
+    if matches!(technique, Technique::Bb1d) { 15.0 } else { 8.0 }
+}
 
 /// What is decided before light sub-paths are counted.
 #[derive(Clone, Copy)]
@@ -108,15 +109,12 @@ impl<S: Scene> Planner<'_, '_, S> {
         let size = self.size();
         // No kernel holds more photons than there are.
         let all = CROWD / statistics.vertices_per_path.max(1.0);
-        let merges = [
-            (Technique::Surf, settings.radii.surf, LARGEST_SURF_RADIUS, statistics.surf),
-            (Technique::Pp3d, settings.radii.pp3d, LARGEST_PP3D_RADIUS, statistics.pp3d),
-            (Technique::Pb2d, settings.radii.pb2d, LARGEST_PB2D_RADIUS, statistics.pb2d),
-        ];
-        let paths = merges.into_iter().filter_map(|(technique, radius, largest, found)| {
-            let is_chosen = techniques.has(technique) && matches!(radius, Radius::Auto);
-            let found = found.filter(|_| is_chosen)?;
-            Some(found.paths(CROWD, f64::from(SMALLEST * largest * size)).max(all))
+        let is_chosen = |technique: &Technique| settings.radii.of(*technique) == Radius::Auto;
+        let points = techniques.without(TechniqueSet::BEAMS).iter().filter(is_chosen);
+        let paths = points.filter_map(|technique| {
+            let found = statistics.neighbours_of(technique)?;
+            let smallest = SMALLEST * largest_radius(technique) * size;
+            Some(found.paths(CROWD, f64::from(smallest)).max(all))
         });
         paths.fold(f64::INFINITY, f64::min)
     }
@@ -126,9 +124,9 @@ impl<S: Scene> Planner<'_, '_, S> {
     fn enough_beams(&self) -> u32 {
         /// Photon beams within the kernel of a query beam.
         const HITS: f64 = 1.0;
-        let Some(found) = self.statistics.bb1d else { return 1024 };
+        let Some(found) = self.statistics.neighbours.bb1d else { return 1024 };
         let radius = match self.inputs.settings.radii.bb1d {
-            Radius::Auto => LARGEST_BEAM_RADIUS * self.size(),
+            Radius::Auto => largest_radius(Technique::Bb1d) * self.size(),
             Radius::Scene(fraction) => fraction * self.scene.bounds.radius,
             Radius::Absolute(radius) => radius,
         };
@@ -152,28 +150,32 @@ impl<S: Scene> Planner<'_, '_, S> {
         let floor = 2.0 * LEAST_RADIUS * statistics.largest_coordinate;
         // Where coordinates have no digits for it, the least radius may be beyond the largest one.
         let given = |radius: f32| radius.max(floor.max(LEAST_GIVEN)).min(LARGEST_RADIUS);
-        let radius = |technique, choice, found: Option<Neighbours>, count: f64, paths: u32, most: f32| {
+        let radius = |technique: Technique| {
             if !techniques.has(technique) {
                 return 0.0;
             }
-            match choice {
+            let most = largest_radius(technique);
+            let paths = if technique.uses_beams() { beam_paths } else { light_paths };
+            match settings.radii.of(technique) {
                 Radius::Absolute(radius) => given(radius),
                 Radius::Scene(fraction) => given(fraction * self.scene.bounds.radius),
-                Radius::Auto => found
-                    .map_or(most * size, |n| n.radius(count, f64::from(paths)))
+                Radius::Auto => statistics
+                    .neighbours_of(technique)
+                    .map_or(most * size, |found| found.radius(photons(technique), f64::from(paths)))
                     .clamp(SMALLEST * most * size, most * size)
                     .min(statistics.radius_field.largest_radius()),
             }
         };
-        let radii = &settings.radii;
+        let PerMerge { surf, pp3d, pb2d, bp2d, bb1d } = PerMerge::from_fn(radius);
         RadiusSchedule {
-            surf: radius(Technique::Surf, radii.surf, statistics.surf, 8.0, light_paths, LARGEST_SURF_RADIUS),
-            pp3d: radius(Technique::Pp3d, radii.pp3d, statistics.pp3d, 8.0, light_paths, LARGEST_PP3D_RADIUS),
-            pb2d: radius(Technique::Pb2d, radii.pb2d, statistics.pb2d, 8.0, light_paths, LARGEST_PB2D_RADIUS),
-            bp2d: radius(Technique::Bp2d, radii.bp2d, statistics.bp2d, 8.0, beam_paths, LARGEST_BEAM_RADIUS),
-            bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
+            surf,
+            pp3d,
+            pb2d,
+            bp2d,
+            bb1d,
             field: statistics.radius_field,
-            most_mean_free_paths: radii
+            most_mean_free_paths: settings
+                .radii
                 .are_auto(techniques.intersection(TechniqueSet::VOLUME_MERGES))
                 .then_some(MOST_MEAN_FREE_PATHS),
             progressive: settings.progressive,

@@ -9,7 +9,7 @@ use upbp_estimators::scene::{BoundingSphere, Camera, CameraRay, Scene};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, NO_LIMIT,
-    PathLengths, PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
+    PathLengths, PerMerge, PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
 };
 use upbp_media::Lanes;
 
@@ -65,16 +65,15 @@ pub(crate) struct Statistics {
     pub(crate) largest_coordinate: f32,
     /// The field that kernel radii follow.
     pub(crate) radius_field: RadiusField,
-    /// Photons on surfaces around points of camera sub-paths there; `None` where there is nothing.
-    pub(crate) surf: Option<Neighbours>,
-    /// Photons in media around points.
-    pub(crate) pp3d: Option<Neighbours>,
-    /// Photons in media around query beams.
-    pub(crate) pb2d: Option<Neighbours>,
-    /// Photon beams around points.
-    pub(crate) bp2d: Option<Neighbours>,
-    /// Photon beams around query beams.
-    pub(crate) bb1d: Option<Neighbours>,
+    /// Photons or beams around the queries of each technique; `None` where there is nothing.
+    pub(crate) neighbours: PerMerge<Option<Neighbours>>,
+}
+
+impl Statistics {
+    /// Photons or beams around the queries of a technique, if it merges and there are any.
+    pub(crate) fn neighbours_of(&self, technique: Technique) -> Option<Neighbours> {
+        *self.neighbours.get(technique)?
+    }
 }
 
 /// Measures sub-paths in the lanes `L` with at most `light_paths` light sub-paths; with fewer, and fewer
@@ -226,7 +225,7 @@ impl TracedPaths {
         let beams = SegmentTree::build(segments, SplitParams::default());
         let near = Nearest { paths: near_paths, scale };
         let near_beams = Nearest { paths: beam_paths, scale };
-        // Distances in terms of radii: divided by what those are multiplied by.
+        // Distances are divided by the radius field.
         let of = |technique, found: &dyn Fn() -> Option<Neighbours>| {
             plan.techniques.has(technique).then(found).flatten()
         };
@@ -246,29 +245,35 @@ impl TracedPaths {
             medium_per_path: per_path(plan.stores_medium_photons(), true),
             pieces_per_path: beams.pieces() as f64 / beam_paths,
             beams_per_path: self.beams.len() as f64 / beam_paths,
-            surf: of(Technique::Surf, &|| around_points(&queries.surfaces, &surface, 2.0)),
-            pp3d: of(Technique::Pp3d, &|| around_points(&queries.media, &medium, 3.0)),
-            pb2d: of(Technique::Pb2d, &|| {
-                near.of(&queries.edges, medium.len(), 2.0, &|edge, radius, found| {
-                    medium.around_ray(edge, field.search_radius(radius, f32::INFINITY), |_, t, distance2| {
-                        found(distance2.sqrt() / field.at(edge.at(t)));
+            neighbours: PerMerge {
+                surf: of(Technique::Surf, &|| around_points(&queries.surfaces, &surface, 2.0)),
+                pp3d: of(Technique::Pp3d, &|| around_points(&queries.media, &medium, 3.0)),
+                pb2d: of(Technique::Pb2d, &|| {
+                    near.of(&queries.edges, medium.len(), 2.0, &|edge, radius, found| {
+                        medium.around_ray(
+                            edge,
+                            field.search_radius(radius, f32::INFINITY),
+                            |_, t, distance2| {
+                                found(distance2.sqrt() / field.at(edge.at(t)));
+                            },
+                        );
+                    })
+                }),
+                bp2d: of(Technique::Bp2d, &|| {
+                    near_beams.of(&queries.media, self.beams.len(), 2.0, &|point, radius, found| {
+                        let scale = field.at(*point);
+                        beams.around_point(*point, scale * radius, |_, _, distance2| {
+                            found(distance2.sqrt() / scale);
+                        });
+                    })
+                }),
+                // Tells how many beams are enough, too.
+                bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, &|edge, radius, found| {
+                    beams.around_ray(edge, field.search_radius(radius, f32::INFINITY), |_, approach| {
+                        found(approach.distance / field.at(edge.at(approach.t_ray)));
                     });
-                })
-            }),
-            bp2d: of(Technique::Bp2d, &|| {
-                near_beams.of(&queries.media, self.beams.len(), 2.0, &|point, radius, found| {
-                    let scale = field.at(*point);
-                    beams.around_point(*point, scale * radius, |_, _, distance2| {
-                        found(distance2.sqrt() / scale);
-                    });
-                })
-            }),
-            // Tells how many beams are enough, too.
-            bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, &|edge, radius, found| {
-                beams.around_ray(edge, field.search_radius(radius, f32::INFINITY), |_, approach| {
-                    found(approach.distance / field.at(edge.at(approach.t_ray)));
-                });
-            }),
+                }),
+            },
         }
     }
 }
