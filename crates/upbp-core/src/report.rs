@@ -7,7 +7,7 @@ use serde::Serialize;
 use upbp_estimators::{Counters, PerMerge, Technique};
 
 use crate::auto::technique_support::TechniqueSupport;
-use crate::film::{ErrorEstimate, ErrorMap, IterationSet};
+use crate::film::{ErrorEstimate, IterationSet};
 use crate::plan::Plan;
 use crate::state::{ErrorPoint, ErrorSeries, PassSeconds, State};
 
@@ -63,18 +63,11 @@ impl State {
     /// A summary of all that was done so far.
     #[must_use]
     pub fn report(&self) -> Report {
-        Report::new(self, self.film.error_map().as_ref())
-    }
-}
-
-impl Report {
-    /// The report with an estimate of the error that is there already.
-    pub(crate) fn new(state: &State, error: Option<&ErrorMap>) -> Self {
-        let State { identity, record, film } = state;
+        let Self { identity, record, film } = self;
         let last = film.iteration_set().last().unwrap_or(0);
         let radii = identity.plan.radii.kernels(last);
-        let error = error.map(ErrorMap::estimate);
-        Self {
+        let error = film.error_map().map(|map| map.estimate());
+        Report {
             version: identity.version.clone(),
             support: identity.support.clone(),
             resolution: [film.rect().width, film.rect().height],
@@ -98,7 +91,9 @@ impl Report {
             series: record.series.clone(),
         }
     }
+}
 
+impl Report {
     /// Sentences about whatever makes the picture wrong; they are part of the text of the report.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {

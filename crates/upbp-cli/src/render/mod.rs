@@ -211,7 +211,7 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
     let rendered = !state.film().is_empty();
     let mut hint = None;
     if rendered {
-        hint = images.write_render(state, options.image.look.tones(), &mut attempt);
+        hint = images.write_render(state, &report, options.image.look.tones(), &mut attempt);
     }
     Failure::all(&failures)?;
     // Whoever asked for a picture is not to take an older one for it.
