@@ -230,34 +230,17 @@ mod tests {
     use std::collections::VecDeque;
 
     use super::*;
-    use crate::radius_schedule::RadiusSchedule;
-    use upbp_estimators::RadiusField;
+    use crate::plan::tests::plan;
 
     #[test]
     fn beams_come_from_light_sub_paths() {
-        let radii = RadiusSchedule {
-            surf: 1e-3,
-            pp3d: 1e-3,
-            pb2d: 1e-3,
-            bp2d: 1e-3,
-            bb1d: 1e-3,
-            field: RadiusField::Uniform,
-            most_mean_free_paths: None,
-            progressive: true,
-            floor: 1e-6,
-        };
         let full = Plan {
             techniques: TechniqueSet::ALL,
             light_paths: 1600,
             beam_paths: 800,
-            connections: 1.0,
-            next_events: 1.0,
-            camera_factor: 1.0,
             roulette: roulette::OF_PILOT,
             periods: MergePeriods::ONE,
-            vertices_per_light_path: 1.0,
-            lanes: None,
-            radii,
+            ..plan()
         };
         let candidates = Candidates {
             full,
@@ -265,7 +248,7 @@ mod tests {
             safeguard: TechniqueSet::EMPTY,
             light_paths: vec![100, 400, 1600],
             beam_paths: vec![200, 800],
-            surf_radii: vec![1e-3],
+            surf_radii: vec![full.radii.surf],
             roulettes: vec![roulette::OF_PILOT],
         };
         let mut found = candidates.starts().to_vec();

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use proptest::prelude::*;
 use upbp_estimators::scene::PixelRect;
-use upbp_estimators::{MergePeriods, RadiusField, Technique};
+use upbp_estimators::{MergePeriods, Technique};
 
 use super::limits::{DARKNESS, LARGEST_PART, largest, relative_to, surroundings};
 use super::*;
@@ -11,7 +11,7 @@ use crate::auto::pilot_render::grid::Grid;
 use crate::auto::pilot_render::recorder::mis_weights;
 use crate::auto::pilot_render::{PASSES, Work};
 use crate::auto::roulette::{self, COUNT, OF_PILOT, PILOT, relative_pass_probability};
-use crate::radius_schedule::RadiusSchedule;
+use crate::plan::tests::plan;
 
 const SIDE: u32 = 128;
 
@@ -63,29 +63,14 @@ fn pilot_of(other: Technique) -> PilotRender {
 
 /// Samples of some techniques, and light sub-paths, relative to those of the plan.
 pub(in crate::auto) fn planned(paths: u32) -> Plan {
-    let radii = RadiusSchedule {
-        surf: 0.0,
-        pp3d: 0.0,
-        pb2d: 0.0,
-        bp2d: 0.0,
-        bb1d: 0.0,
-        field: RadiusField::Uniform,
-        most_mean_free_paths: None,
-        progressive: true,
-        floor: 1e-6,
-    };
     Plan {
         techniques: TechniqueSet::ALL,
         light_paths: paths,
         beam_paths: paths,
-        connections: 1.0,
-        next_events: 1.0,
         camera_factor: 1.0,
         roulette: OF_PILOT,
         periods: MergePeriods::ONE,
-        vertices_per_light_path: 1.0,
-        lanes: None,
-        radii,
+        ..plan()
     }
 }
 
@@ -102,6 +87,13 @@ fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts
         counts.relative[technique as usize] = number;
     }
     counts
+}
+
+/// Weights on a path that only one technique finds.
+fn only(technique: Technique) -> PerTechnique<f32> {
+    let mut weights = [0.0; Technique::COUNT];
+    weights[technique as usize] = 1.0;
+    weights
 }
 
 pub(in crate::auto) fn pilot() -> PilotRender {
@@ -191,8 +183,7 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
     /// Light sub-paths for each one that comes by.
     const RARE: f64 = 400.0;
     let cells = (SIDE * SIDE) as usize;
-    let mut weights = [0.0; Technique::COUNT];
-    weights[Technique::Pb2d as usize] = 1.0;
+    let weights = only(Technique::Pb2d);
     let value = Vec3::splat((RARE / (TRACED * PHOTONS) as f64) as f32);
     let (mut samples, mut ends, mut drawn) = (Vec::new(), Vec::new(), 0);
     for _ in 0..cells * PASSES as usize {
@@ -258,8 +249,7 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
     const PATHS: u32 = 256;
     const PILOTS: u32 = 200;
     const CELLS: u32 = 50;
-    let mut weights = [0.0; Technique::COUNT];
-    weights[Technique::Bb1d as usize] = 1.0;
+    let weights = only(Technique::Bb1d);
     let (mut sums, mut errors) = (Vec::new(), 0.0);
     for number in 0..PILOTS {
         let mut pilot = PilotRender { plan: planned(1000), ..pilot() };
@@ -298,8 +288,7 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
 fn photons_vary_at_least_as_independent_ones_do() {
     const PLANNED: f64 = 1000.0;
     const TRACED: f64 = 10.0;
-    let mut weights = [0.0; Technique::COUNT];
-    weights[Technique::Bb1d as usize] = 1.0;
+    let weights = only(Technique::Bb1d);
     let photon =
         Sample { technique: Technique::Bb1d, merged: Some(0), albedos: 1.0, value: Vec3::ONE, weights };
     let camera_paths = (SIDE * SIDE * PASSES) as usize;
@@ -327,8 +316,7 @@ fn photons_vary_at_least_as_independent_ones_do() {
 fn variances_know_where_walks_end() {
     const ALBEDO: f32 = 0.3;
     let reached = OF_PILOT.survival(ALBEDO);
-    let mut weights = [0.0; Technique::COUNT];
-    weights[Technique::Hit as usize] = 1.0;
+    let weights = only(Technique::Hit);
     let (mut samples, mut ends) = (Vec::new(), Vec::new());
     for i in 0..(SIDE * SIDE * PASSES) as usize {
         let mut find = |albedos, value| {
@@ -357,8 +345,7 @@ fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
     let mut pilot = pilot();
     for sample in &mut pilot.samples {
         if sample.technique == Technique::Connect {
-            sample.weights = [0.0; Technique::COUNT];
-            sample.weights[Technique::Connect as usize] = 1.0;
+            sample.weights = only(Technique::Connect);
         }
     }
     let prediction = Variance::of(pilot);
@@ -484,8 +471,7 @@ fn variances_of_blocks_contain_what_pixels_share() {
     /// Light sub-paths for each one that comes by.
     const RARE: f64 = 400.0;
     let cells = SIDE * SIDE;
-    let mut weights = [0.0; Technique::COUNT];
-    weights[Technique::Bb1d as usize] = 1.0;
+    let weights = only(Technique::Bb1d);
     let value = Vec3::splat((RARE / TRACED) as f32);
     let mut pilot = PilotRender { thinning: [TRACED / PLANNED; 2], plan: planned(PLANNED as u32), ..pilot() };
     (pilot.samples, pilot.ends) = (Vec::new(), Vec::new());
