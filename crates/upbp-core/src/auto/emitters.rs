@@ -94,7 +94,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let enough = CONTRIBUTIONS.min(room.items::<NextEvent>() as f64);
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
     let camera_paths = CAMERA_PATHS * if is_much { MORE_CAMERA_PATHS } else { 1 };
-    // What tells enough of so many emitters, or of starts.
+    // Fewer emitters need fewer sub-paths.
     let part = if is_guided { 1.0 } else { emitters.min(MANY) as f64 / MANY as f64 };
     let paths = [light_paths, f64::from(camera_paths)].map(|paths| ((paths * part) as u32).max(1));
     // Light is weighted as with so many light sub-paths, for a plan may have far fewer than the full one.
@@ -253,13 +253,9 @@ fn measure<S: Scene, L: Lanes>(
     };
     let context = Context { prepared: scene, plan };
     // Light tracing fills the crop. Without light sub-paths, a crop shows what the whole film does there.
-    let (width, height) = scene.scene.camera().resolution();
-    let film = if plan.needs_light_paths() {
-        scene.scene.camera().crop()
-    } else {
-        PixelRect { x: 0, y: 0, width, height }
-    };
-    let pixels = u64::from(film.width) * u64::from(film.height);
+    let camera = scene.scene.camera();
+    let film = if plan.needs_light_paths() { camera.crop() } else { PixelRect::whole(camera.resolution()) };
+    let pixels = film.pixels();
     let emitters = scene.scene.emitters().len();
     let emission_probability = |emitter| f64::from(scene.emission_probability(emitter));
     let mut emission = Vec::new();

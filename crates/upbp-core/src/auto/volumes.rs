@@ -69,13 +69,13 @@ pub(crate) fn choose<S: Scene>(
         Some(Walks { paths, passes: passes.collect::<Option<_>>()? })
     };
     let walks = budget.part(TIME_FOR_VOLUMES).largest(run).ok_or(RenderError::Cancelled)?;
-    let reductions = walks.relative_to(PixelRect::whole(scene.scene.camera().resolution()));
+    let factors = walks.relative_to(PixelRect::whole(scene.scene.camera().resolution()));
     let least = if scene.scene.has_specular_surfaces() {
         SELDOM * f64::from(PASSES * walks.paths)
     } else {
         LEAST_MET
     };
-    scene.leave_out_volumes(|emitter| walks.are_hits_enough(emitter, &reductions, least));
+    scene.leave_out_volumes(|emitter| walks.are_hits_enough(emitter, &factors, least));
     Ok(())
 }
 
@@ -197,11 +197,11 @@ impl Walks {
 
     /// Whether hits alone find the light of a volume about as well as together with next events; `least` are
     /// the camera sub-paths that must have met it.
-    fn are_hits_enough(&self, emitter: EmitterId, reductions: &[f64], least: f64) -> bool {
+    fn are_hits_enough(&self, emitter: EmitterId, factors: &[f64], least: f64) -> bool {
         let (mut shared, mut hits, mut unseen) = (0.0, 0.0, 0.0);
         let (mut sum, mut squares) = (0.0, 0.0);
-        for (index, reduction) in reductions.iter().enumerate() {
-            let square = reduction * reduction;
+        for (index, factor) in factors.iter().enumerate() {
+            let square = factor * factor;
             let lights = [0, 1].map(|pass: usize| self.passes[pass][index].of(emitter));
             // Two walks at a pixel, which begin alike: half the square of their difference is their variance.
             let variance = |of: fn(&Light) -> f64| 0.5 * square * (of(&lights[0]) - of(&lights[1])).powi(2);
@@ -209,7 +209,7 @@ impl Walks {
             hits += variance(|light| light.hits);
             for light in lights {
                 unseen += 0.5 * square * (light.expected_squares - light.squares);
-                sum += reduction * light.hits;
+                sum += factor * light.hits;
                 squares += square * light.hits * light.hits;
             }
         }

@@ -30,8 +30,8 @@ impl Grid {
     }
 
     /// Pixels of the picture.
-    pub(crate) fn pixels(&self) -> f64 {
-        f64::from(self.rect.width) * f64::from(self.rect.height)
+    pub(crate) const fn pixels(&self) -> f64 {
+        self.rect.pixels() as f64
     }
 
     pub(crate) const fn columns(&self) -> usize {

@@ -75,16 +75,14 @@ impl Size {
 
     /// Pixels beyond which too little would be learnt.
     pub(super) fn most_pixels<S: Scene>(scene: &PreparedScene<'_, S>) -> u32 {
-        let crop = scene.scene.camera().crop();
-        crop.width.saturating_mul(crop.height).min(16_384)
+        scene.scene.camera().crop().pixels().min(16_384) as u32
     }
 
     /// Pixels from which on a choice is trusted: more where no media make them slow.
     pub(super) fn enough_pixels<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> u32 {
-        let crop = scene.scene.camera().crop();
         let media = techniques.intersects(TechniqueSet::VOLUME_MERGES);
         let part = if media { 12 } else { 4 };
-        (crop.width.saturating_mul(crop.height) / part).clamp(400, 2048)
+        (scene.scene.camera().crop().pixels() / part).clamp(400, 2048) as u32
     }
 }
 

@@ -18,7 +18,7 @@ use upbp_estimators::{PerTechnique, Technique, TechniqueSet};
 use super::pilot_render::recorder::Sample;
 use super::pilot_render::{PilotRender, PixelPair};
 use crate::plan::Plan;
-use limits::{reductions, relative_to, surroundings};
+use limits::{limiting_factors, relative_to, surroundings};
 use sample_pairs::{Excess, ReadySamples, Reweighted, density_of_pilot, mean_photons};
 
 /// The least variance, relative to the second moments of single samples.
@@ -94,10 +94,10 @@ impl Variance {
         let per_path = 1.0 / (pilot.cells * pilot.passes) as f64;
         let mut parts: Vec<f64> = pilot.samples.iter().map(|s| per_path * pilot.second_moment(s)).collect();
         parts.extend(pilot.splats.iter().map(|(_, splat)| pilot.per_splat() * pilot.second_moment(splat)));
-        let by_sample = reductions(&parts);
+        let by_sample = limiting_factors(&parts);
         let splats = pilot.splats.iter_mut().map(|(_, splat)| splat);
-        for (sample, reduction) in pilot.samples.iter_mut().chain(splats).zip(by_sample) {
-            sample.value *= reduction;
+        for (sample, factor) in pilot.samples.iter_mut().chain(splats).zip(by_sample) {
+            sample.value *= factor;
         }
         let camera_paths = (0..pilot.cells).flat_map(|cell| (0..pilot.passes).map(move |pass| (cell, pass)));
         let together = |(cell, pass)| {
@@ -105,9 +105,9 @@ impl Variance {
             sum.length_squared()
         };
         let parts: Vec<f64> = camera_paths.clone().map(together).collect();
-        for ((cell, pass), reduction) in camera_paths.zip(reductions(&parts)) {
+        for ((cell, pass), factor) in camera_paths.zip(limiting_factors(&parts)) {
             let range = pilot.range(cell, pass);
-            pilot.samples[range].iter_mut().for_each(|sample| sample.value *= reduction);
+            pilot.samples[range].iter_mut().for_each(|sample| sample.value *= factor);
         }
         let samples = ReadySamples::new(&pilot);
         pilot.samples = Vec::new();
