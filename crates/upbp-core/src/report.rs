@@ -19,8 +19,8 @@ pub struct Report {
     pub version: String,
     /// Techniques that the scene can use.
     pub support: TechniqueSupport,
-    /// Width and height of the picture.
-    pub resolution: [u32; 2],
+    /// Width and height of what is rendered: of the crop, if there is one.
+    pub size: [u32; 2],
     /// Seed of the random numbers.
     pub seed: u64,
     /// Iterations done.
@@ -70,7 +70,7 @@ impl State {
         Report {
             version: identity.version.clone(),
             support: identity.support.clone(),
-            resolution: [film.rect().width, film.rect().height],
+            size: [film.rect().width, film.rect().height],
             seed: identity.settings.seed,
             iterations: film.iterations(),
             iteration_set: film.iteration_set().clone(),
@@ -134,7 +134,7 @@ impl Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [width, height] = self.resolution;
+        let [width, height] = self.size;
         writeln!(f, "{}\nplan: {}", self.support, self.plan)?;
         let s = &self.seconds;
         write!(f, "{width} x {height}, {} iterations", self.iterations)?;

@@ -128,6 +128,9 @@ impl Job {
                 let name = options.messages.reference.as_deref().unwrap_or(Path::new("reference"));
                 Failure::Input(format!("{}: {error}", name.display()))
             }
+            RenderError::Memory { .. } | RenderError::PlanMemory { .. } => {
+                Failure::Input(format!("{error} (at the command line: `--memory MIB`)"))
+            }
             error => Failure::input(error),
         })?;
         let hash = self.scene.hash();

@@ -282,7 +282,7 @@ mod tests {
         ] {
             let text = budget.1.to_string();
             assert_eq!(budget.0, mebibytes << 20);
-            assert!(text.starts_with(reason) && text.contains("`--memory MIB`"), "{text}");
+            assert!(text.starts_with(reason) && text.contains("`memory` in the settings"), "{text}");
         }
     }
 
