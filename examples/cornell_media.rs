@@ -69,8 +69,9 @@ fn render(path: &Path, exr: &Path) -> Result<(), Box<dyn Error>> {
     bar.finish();
 
     // All that is known of the render is in its state.
-    write_exr(exr, renderer.state())?;
+    let report = renderer.report();
+    write_exr(exr, renderer.state(), &report)?;
     write_png(&png, &renderer.film().image(), ToneMapping::default())?;
-    println!("{}wrote {} and {}", renderer.report(), exr.display(), png.display());
+    println!("{report}wrote {} and {}", exr.display(), png.display());
     Ok(())
 }

@@ -25,8 +25,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{:3.0} %, estimated relMSE {}", 100.0 * now.fraction, now.estimated_error);
         ControlFlow::Continue(())
     });
-    println!("{}", renderer.report());
-    write_exr(Path::new("host_renderer.exr"), renderer.state())?;
+    let report = renderer.report();
+    println!("{report}");
+    write_exr(Path::new("host_renderer.exr"), renderer.state(), &report)?;
     write_png(Path::new("host_renderer.png"), &renderer.film().image(), ToneMapping::default())?;
     Ok(())
 }

@@ -54,11 +54,12 @@ impl Images {
     pub(crate) fn write_render(
         &self,
         state: &State,
+        report: &Report,
         tones: ToneMapping,
         mut attempt: impl FnMut(Result<(), OutputError>),
     ) -> Option<String> {
         if let Some(path) = &self.exr {
-            attempt(write_exr(path, state));
+            attempt(write_exr(path, state, report));
         }
         let image = state.film().image();
         attempt(write_png(&self.png, &image, tones));

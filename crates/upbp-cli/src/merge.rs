@@ -71,7 +71,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     }
     let mut hint = None;
     if let Some(images) = &options.image.output {
-        hint = images.write_render(&merged, options.image.look.tones(), &mut attempt);
+        hint = images.write_render(&merged, &report, options.image.look.tones(), &mut attempt);
     }
     if let Some(path) = &options.report {
         attempt(files::write_report(&report, path));

@@ -150,8 +150,7 @@ impl fmt::Display for MemoryLimit {
                 (mebibytes, "are taken, since this system does not tell what is free")
             }
         };
-        let more = "`memory` in the settings or `--memory MIB` at the command line allows more";
-        write!(f, "{mebibytes} MiB {reason}; {more}")
+        write!(f, "{mebibytes} MiB {reason}; `memory` in the settings allows more")
     }
 }
 

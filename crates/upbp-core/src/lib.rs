@@ -38,6 +38,6 @@ pub use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerge, Volu
 pub use upbp_estimators::{
     BodyId, Counters, EmissionGuide, EmissionSample, EmitterChoice, FootprintField, Interior,
     IterationChoices, IterationPlan, Kernel, Kernels, Layer, MediumId, MediumStack, MergePeriods,
-    PathLengths, PerMerge, PrepareError, RAY_OFFSET, RadiusField, Ray, Roulette, Spectrum, Technique,
-    TechniqueSet, UnknownTechnique, check, offset_origin, scene,
+    PathLengths, PerMerge, PerTechnique, PrepareError, RAY_OFFSET, RadiusField, Ray, Roulette, Spectrum,
+    Technique, TechniqueSet, UnknownTechnique, check, offset_origin, scene,
 };

@@ -69,10 +69,9 @@ impl Plan {
     /// Checks every value, since a host may have set it.
     pub(crate) fn validate(&self) -> Result<(), String> {
         let radii = &self.radii;
-        let lengths = [radii.surf, radii.pp3d, radii.pb2d, radii.bp2d, radii.bb1d];
+        let lengths = Technique::MERGES.map(|technique| radii.first(technique));
         let possible = |x: &f32| (0.0..=LARGEST_RADIUS).contains(x);
-        let merges = [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bp2d, Technique::Bb1d];
-        let mut radii_of = merges.into_iter().zip(lengths);
+        let is_missing = |technique: &Technique| technique.merges() && !(radii.first(*technique) > 0.0);
         if self.techniques.is_empty() {
             Err("techniques: expected at least one".into())
         } else if self.light_paths == 0 && self.uses_light_paths() {
@@ -97,9 +96,7 @@ impl Plan {
             Err(format!("vertices_per_light_path: expected a number, found {}", self.vertices_per_light_path))
         } else if !(lengths.iter().all(possible) && possible(&radii.floor)) {
             Err(format!("radii: expected lengths up to {LARGEST_RADIUS:e}, found {radii:?}"))
-        } else if let Some((technique, _)) =
-            radii_of.find(|(technique, radius)| self.techniques.has(*technique) && !(*radius > 0.0))
-        {
+        } else if let Some(technique) = self.techniques.iter().find(is_missing) {
             Err(format!(
                 "radii.{0}: expected a number above 0, since {0} is one of its techniques",
                 technique.name()

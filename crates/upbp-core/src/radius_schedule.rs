@@ -51,17 +51,21 @@ impl Radii {
         Self { surf: radius, pp3d: radius, pb2d: radius, bp2d: radius, bb1d: radius }
     }
 
+    /// The first radius of a technique; [automatic](Radius::Auto) if it does not merge.
+    pub(crate) const fn of(&self, technique: Technique) -> Radius {
+        match technique {
+            Technique::Surf => self.surf,
+            Technique::Pp3d => self.pp3d,
+            Technique::Pb2d => self.pb2d,
+            Technique::Bp2d => self.bp2d,
+            Technique::Bb1d => self.bb1d,
+            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => Radius::Auto,
+        }
+    }
+
     /// Whether all that `techniques` use are [automatic](Radius::Auto).
     pub(crate) fn are_auto(&self, techniques: TechniqueSet) -> bool {
-        [
-            (Technique::Surf, self.surf),
-            (Technique::Pp3d, self.pp3d),
-            (Technique::Pb2d, self.pb2d),
-            (Technique::Bp2d, self.bp2d),
-            (Technique::Bb1d, self.bb1d),
-        ]
-        .iter()
-        .all(|(technique, radius)| *radius == Radius::Auto || !techniques.has(*technique))
+        techniques.iter().all(|technique| self.of(technique) == Radius::Auto)
     }
 }
 
@@ -98,26 +102,26 @@ pub struct RadiusSchedule {
 }
 
 impl RadiusSchedule {
-    /// The first radius of a technique, 0 if it does not merge, and the dimensions of its kernel.
-    const fn first(&self, technique: Technique) -> (f32, i32) {
+    /// The first radius of a technique, 0 if it does not merge.
+    pub(crate) const fn first(&self, technique: Technique) -> f32 {
         match technique {
-            Technique::Surf => (self.surf, 2),
-            Technique::Pp3d => (self.pp3d, 3),
-            Technique::Pb2d => (self.pb2d, 2),
-            Technique::Bp2d => (self.bp2d, 2),
-            Technique::Bb1d => (self.bb1d, 1),
-            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => (0.0, 0),
+            Technique::Surf => self.surf,
+            Technique::Pp3d => self.pp3d,
+            Technique::Pb2d => self.pb2d,
+            Technique::Bp2d => self.bp2d,
+            Technique::Bb1d => self.bb1d,
+            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 0.0,
         }
     }
 
     /// The radius of a technique in some iteration, or between two.
     fn at(&self, technique: Technique, iteration: f64) -> f32 {
-        let (first, dimension) = self.first(technique);
+        let first = self.first(technique);
         if first <= 0.0 {
             return 0.0;
         }
-        let shrink =
-            if self.progressive { (1.0 + iteration).powf(-1.0 / (f64::from(dimension) + 4.0)) } else { 1.0 };
+        let gamma = 1.0 / (f64::from(dimension(technique)) + 4.0);
+        let shrink = if self.progressive { (1.0 + iteration).powf(-gamma) } else { 1.0 };
         ((f64::from(first) * shrink) as f32).max(first.min(self.floor / self.field.least()))
     }
 
@@ -130,7 +134,7 @@ impl RadiusSchedule {
     pub(crate) fn mean_free_paths(&self, iteration: u64) -> VolumeMerges<f32> {
         let Some(most) = self.most_mean_free_paths else { return NO_LIMIT };
         VolumeMerges::from_fn(|technique| {
-            let (first, _) = self.first(technique);
+            let first = self.first(technique);
             if first > 0.0 { most * (self.at(technique, iteration as f64) / first) } else { f32::INFINITY }
         })
     }
@@ -138,12 +142,23 @@ impl RadiusSchedule {
     /// Photons within a kernel over those of the first iteration, mean over a number of iterations, which is
     /// about that of the one at a third of them; 1 for techniques that do not merge.
     pub(crate) fn mean_photons(&self, technique: Technique, iterations: f64) -> f64 {
-        let (first, dimension) = self.first(technique);
+        let first = self.first(technique);
         if first > 0.0 {
-            (f64::from(self.at(technique, (iterations - 1.0) / 3.0)) / f64::from(first)).powi(dimension)
+            let ratio = f64::from(self.at(technique, (iterations - 1.0) / 3.0)) / f64::from(first);
+            ratio.powi(dimension(technique))
         } else {
             1.0
         }
+    }
+}
+
+/// Dimensions of the kernel of a technique, 0 if it does not merge.
+const fn dimension(technique: Technique) -> i32 {
+    match technique {
+        Technique::Pp3d => 3,
+        Technique::Surf | Technique::Pb2d | Technique::Bp2d => 2,
+        Technique::Bb1d => 1,
+        Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 0,
     }
 }
 
@@ -177,8 +192,7 @@ mod tests {
         assert_eq!(schedule.mean_photons(Technique::Connect, 999.0), 1.0);
         for technique in [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bb1d] {
             for iterations in [1, 2, 5, 10, 100, 3000] {
-                let (_, dimension) = schedule.first(technique);
-                let photons = |i| f64::from(schedule.at(technique, f64::from(i))).powi(dimension);
+                let photons = |i| f64::from(schedule.at(technique, f64::from(i))).powi(dimension(technique));
                 let mean = (0..iterations).map(photons).sum::<f64>() / f64::from(iterations);
                 let found = schedule.mean_photons(technique, f64::from(iterations));
                 assert!((found / mean - 1.0).abs() < 0.1, "{technique:?}, {iterations}: {found}, {mean}");

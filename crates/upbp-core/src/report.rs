@@ -7,7 +7,7 @@ use serde::Serialize;
 use upbp_estimators::{Counters, PerMerge, Technique};
 
 use crate::auto::technique_support::TechniqueSupport;
-use crate::film::{ErrorEstimate, ErrorMap, IterationSet};
+use crate::film::{ErrorEstimate, IterationSet};
 use crate::plan::Plan;
 use crate::state::{ErrorPoint, ErrorSeries, PassSeconds, State};
 
@@ -19,8 +19,8 @@ pub struct Report {
     pub version: String,
     /// Techniques that the scene can use.
     pub support: TechniqueSupport,
-    /// Width and height of the picture.
-    pub resolution: [u32; 2],
+    /// Width and height of what is rendered: of the crop, if there is one.
+    pub size: [u32; 2],
     /// Seed of the random numbers.
     pub seed: u64,
     /// Iterations done.
@@ -63,21 +63,14 @@ impl State {
     /// A summary of all that was done so far.
     #[must_use]
     pub fn report(&self) -> Report {
-        Report::new(self, self.film.error_map().as_ref())
-    }
-}
-
-impl Report {
-    /// The report with an estimate of the error that is there already.
-    pub(crate) fn new(state: &State, error: Option<&ErrorMap>) -> Self {
-        let State { identity, record, film } = state;
+        let Self { identity, record, film } = self;
         let last = film.iteration_set().last().unwrap_or(0);
         let radii = identity.plan.radii.kernels(last);
-        let error = error.map(ErrorMap::estimate);
-        Self {
+        let error = film.error_map().map(|map| map.estimate());
+        Report {
             version: identity.version.clone(),
             support: identity.support.clone(),
-            resolution: [film.rect().width, film.rect().height],
+            size: [film.rect().width, film.rect().height],
             seed: identity.settings.seed,
             iterations: film.iterations(),
             iteration_set: film.iteration_set().clone(),
@@ -98,7 +91,9 @@ impl Report {
             series: record.series.clone(),
         }
     }
+}
 
+impl Report {
     /// Sentences about whatever makes the picture wrong; they are part of the text of the report.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
@@ -139,7 +134,7 @@ impl Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [width, height] = self.resolution;
+        let [width, height] = self.size;
         writeln!(f, "{}\nplan: {}", self.support, self.plan)?;
         let s = &self.seconds;
         write!(f, "{width} x {height}, {} iterations", self.iterations)?;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use upbp_media::Spectrum;
 
-use crate::technique::Technique;
+use crate::technique::{PerTechnique, Technique};
 
 /// Counters of one pass or of a whole render; they add up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,8 +18,8 @@ pub struct Counters {
     pub light_vertices: u64,
     /// Photon beams stored.
     pub photon_beams: u64,
-    /// Contributions of each technique, in the order of [`Technique::ALL`].
-    pub contributions: [u64; 9],
+    /// Contributions of each technique.
+    pub contributions: PerTechnique<u64>,
     /// Contributions, throughputs of light sub-paths, and values of an iteration's pixels, that were not
     /// finite or negative, and were dropped.
     pub dropped: u64,

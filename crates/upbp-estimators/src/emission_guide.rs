@@ -21,7 +21,7 @@ const SPLIT_LIGHT: f64 = 1.0 / 2048.0;
 const MOST_SPLITS: u8 = 20;
 /// Places of random numbers.
 const STEPS: f64 = 16_777_216.0;
-/// Shares are multiples of one over this.
+/// Shares are stored in units of 1/4096.
 const SHARES: u16 = 4096;
 /// The least share of a half.
 const LEAST_SHARE: u16 = 4;

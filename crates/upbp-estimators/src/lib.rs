@@ -40,6 +40,6 @@ pub use prepared_scene::{PrepareError, PreparedScene};
 pub use radius_field::{FootprintField, RadiusField};
 pub use random::{Decision, Stream, StreamKind, half, pixel_index};
 pub use roulette::{Roulette, Surroundings, Survival};
-pub use technique::{Layer, PerMerge, Technique, TechniqueSet, UnknownTechnique};
+pub use technique::{Layer, PerMerge, PerTechnique, Technique, TechniqueSet, UnknownTechnique};
 pub use upbp_accel::{RAY_OFFSET, Ray, offset_origin};
 pub use upbp_media::{BodyId, Interior, MediumId, MediumStack, Spectrum};

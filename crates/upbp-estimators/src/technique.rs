@@ -30,8 +30,11 @@ pub enum Technique {
 }
 
 impl Technique {
+    /// Number of techniques.
+    pub const COUNT: usize = 9;
+
     /// All techniques, in the order of their bits and layers.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; Self::COUNT] = [
         Self::Hit,
         Self::Nee,
         Self::Connect,
@@ -42,6 +45,15 @@ impl Technique {
         Self::Bp2d,
         Self::Bb1d,
     ];
+
+    /// The techniques that [merge](Self::merges), in the same order.
+    pub const MERGES: [Self; 5] = [Self::Surf, Self::Pp3d, Self::Pb2d, Self::Bp2d, Self::Bb1d];
+
+    /// Whether a camera vertex makes its samples, however many light sub-paths there are.
+    #[must_use]
+    pub const fn is_per_camera_vertex(self) -> bool {
+        matches!(self, Self::Hit | Self::Nee | Self::Connect)
+    }
 
     /// Whether it merges light sub-paths with camera sub-paths within a kernel.
     #[must_use]
@@ -87,6 +99,9 @@ impl Technique {
         }
     }
 }
+
+/// One value for each technique, in the order of [`Technique::ALL`].
+pub type PerTechnique<T> = [T; Technique::COUNT];
 
 /// One value for each technique that merges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

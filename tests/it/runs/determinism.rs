@@ -76,7 +76,7 @@ fn a_crop_shows_the_same_camera_samples_as_the_whole() {
         let mut renderer = upbp_testing::renderer(&scene, settings);
         assert!(renderer.iterate());
         let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("crop_{crop}.exr"));
-        write_exr(&path, renderer.state()).expect("a folder for tests");
+        write_exr(&path, renderer.state(), &renderer.report()).expect("a folder for tests");
         (renderer.film().image(), path)
     };
     let ((whole, whole_file), (part, part_file)) = (render(false), render(true));

@@ -180,7 +180,7 @@ fn films_take_what_was_expected() {
             let report = renderer.report();
             assert!(report.estimated_over_scales.is_some(), "two halves are compared");
             let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("memory_film.exr");
-            write_exr(&path, renderer.state()).expect("a folder for tests");
+            write_exr(&path, renderer.state(), &report).expect("a folder for tests");
             report.expected_bytes as f64
         })
     };

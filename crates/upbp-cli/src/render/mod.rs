@@ -128,6 +128,9 @@ impl Job {
                 let name = options.messages.reference.as_deref().unwrap_or(Path::new("reference"));
                 Failure::Input(format!("{}: {error}", name.display()))
             }
+            RenderError::Memory { .. } | RenderError::PlanMemory { .. } => {
+                Failure::Input(format!("{error} (at the command line: `--memory MIB`)"))
+            }
             error => Failure::input(error),
         })?;
         let hash = self.scene.hash();
@@ -211,7 +214,7 @@ fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Fai
     let rendered = !state.film().is_empty();
     let mut hint = None;
     if rendered {
-        hint = images.write_render(state, options.image.look.tones(), &mut attempt);
+        hint = images.write_render(state, &report, options.image.look.tones(), &mut attempt);
     }
     Failure::all(&failures)?;
     // Whoever asked for a picture is not to take an older one for it.

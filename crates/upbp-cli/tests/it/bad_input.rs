@@ -221,7 +221,7 @@ fn settings_and_options_that_make_no_sense_are_refused() {
         (&["--state", "image.exr"], &["image.exr", ".state"]),
         (&["--state", "image.state"], &["image.state", "not a state"]),
         (&["--state", "no/such/folder/a.state"], &["no/such/folder/a.state"]),
-        (&["--size", "4000x4000", "--memory", "100"], &["4000 x 4000", "100 MiB"]),
+        (&["--size", "4000x4000", "--memory", "100"], &["4000 x 4000", "100 MiB", "`--memory MIB`"]),
         (&["--target-error", "0"], &["--target-error"]),
         (&["--threads", "0"], &["--threads", "from 1 to", "16 per core"]),
         (&["--threads", "1000000"], &["--threads", "from 1 to", "16 per core"]),

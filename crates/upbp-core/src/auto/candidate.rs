@@ -3,15 +3,16 @@
 use std::num::NonZeroU32;
 
 use upbp_estimators::scene::Scene;
-use upbp_estimators::{MergePeriods, PreparedScene, Roulette, Technique, TechniqueSet};
+use upbp_estimators::{MergePeriods, Roulette, Technique, TechniqueSet};
 
 use super::cost::Cost;
+use super::full_plan::{Inputs, Planner};
 use super::roulette;
 use super::statistics::Statistics;
 use super::technique_support::TechniqueSupport;
 use crate::plan::Plan;
 use crate::radius_schedule::Radius;
-use crate::settings::{CheckedSettings, LightPaths};
+use crate::settings::LightPaths;
 
 /// Numbers of light sub-paths, relative to the full plan's: more than one per pixel where what matters is
 /// found by them alone, as what the sun throws through water is.
@@ -50,14 +51,13 @@ impl Candidates {
     /// with beams than it has, if there `is_room` for such numbers of light sub-paths and of those with
     /// beams.
     pub(super) fn new<S: Scene>(
-        scene: &PreparedScene<'_, S>,
-        settings: &CheckedSettings,
+        planner: &Planner<'_, '_, S>,
         support: &TechniqueSupport,
-        statistics: &Statistics,
         full: Plan,
         most: u32,
         is_room: impl Fn([u32; 2]) -> bool,
     ) -> Self {
+        let Planner { scene, inputs: Inputs { settings, .. }, statistics } = *planner;
         let counts = |full: u32, parts: &[f64], is_fixed: bool, is_possible: &dyn Fn(u32) -> bool| {
             let count = |part: &f64| ((f64::from(full) * part) as u32).max(1);
             let is_candidate = |count: &u32| *count <= full || is_possible(*count);
@@ -230,34 +230,17 @@ mod tests {
     use std::collections::VecDeque;
 
     use super::*;
-    use crate::radius_schedule::RadiusSchedule;
-    use upbp_estimators::RadiusField;
+    use crate::plan::tests::plan;
 
     #[test]
     fn beams_come_from_light_sub_paths() {
-        let radii = RadiusSchedule {
-            surf: 1e-3,
-            pp3d: 1e-3,
-            pb2d: 1e-3,
-            bp2d: 1e-3,
-            bb1d: 1e-3,
-            field: RadiusField::Uniform,
-            most_mean_free_paths: None,
-            progressive: true,
-            floor: 1e-6,
-        };
         let full = Plan {
             techniques: TechniqueSet::ALL,
             light_paths: 1600,
             beam_paths: 800,
-            connections: 1.0,
-            next_events: 1.0,
-            camera_factor: 1.0,
             roulette: roulette::OF_PILOT,
             periods: MergePeriods::ONE,
-            vertices_per_light_path: 1.0,
-            lanes: None,
-            radii,
+            ..plan()
         };
         let candidates = Candidates {
             full,
@@ -265,7 +248,7 @@ mod tests {
             safeguard: TechniqueSet::EMPTY,
             light_paths: vec![100, 400, 1600],
             beam_paths: vec![200, 800],
-            surf_radii: vec![1e-3],
+            surf_radii: vec![full.radii.surf],
             roulettes: vec![roulette::OF_PILOT],
         };
         let mut found = candidates.starts().to_vec();

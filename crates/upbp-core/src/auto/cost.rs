@@ -5,9 +5,8 @@
 //! to the last bit, on any machine and beside any other work. With one it depends on the number of threads,
 //! which tells how many iterations there will be, and on the clock, by which the preparation sizes its runs.
 
-use upbp_estimators::{Technique, TechniqueSet};
+use upbp_estimators::{PerTechnique, Technique, TechniqueSet};
 
-use super::pilot_render::recorder::PerTechnique;
 use super::pilot_render::{PilotRender, Work};
 use crate::deadline::Stop;
 use crate::plan::Plan;
@@ -158,7 +157,6 @@ impl<'a> Cost<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::pilot_render::recorder::TECHNIQUES;
     use super::super::roulette::{COUNT, OF_PILOT};
     use super::super::variance::tests::{pilot, planned};
     use super::*;
@@ -175,13 +173,12 @@ mod tests {
 
     #[test]
     fn queries_cost_what_they_look_at() {
-        let everywhere = |count: f64| [[count; COUNT]; TECHNIQUES];
+        let everywhere = |count: f64| [[count; COUNT]; Technique::COUNT];
         let work =
             Work { calls: everywhere(1.0), tests: everywhere(10.0), points: [4.0, 16.0], ..Work::default() };
         // A quarter of the light sub-paths were traced.
         let cost = |technique, paths| costs(&work, [0.25; 2], only(technique, paths))[0];
-        for technique in [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bp2d, Technique::Bb1d]
-        {
+        for technique in Technique::MERGES {
             let call = NS_PER_CAMERA_PATH + NS_PER_CALL[technique as usize];
             let test = NS_PER_TEST[technique as usize];
             let [as_run, more] = [400, 3200].map(|paths| (cost(technique, paths) - call) / test);

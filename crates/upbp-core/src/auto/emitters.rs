@@ -14,21 +14,19 @@ use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVe
 use upbp_estimators::path::{Context, LightChunk, LightVertex};
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::{
-    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet,
-    effective_samples,
+    Counters, EmitterSample, EmitterShares, IterationPlan, LightMap, PerTechnique, PreparedScene, Technique,
+    TechniqueSet, effective_samples,
 };
 use upbp_media::Lanes;
 
-use super::full_plan::{full_plan, pilot_plan, plan_with};
+use super::full_plan::{Inputs, Planner, pilot_plan};
 use super::guides::{self, Evidence};
 use super::memory_limit::Room;
 use super::parallel_walks::{PilotRun, SampleRoom, camera_path, in_pieces, light_path, pixel};
-use super::pilot_render::recorder::{PerTechnique, TECHNIQUES};
 use super::statistics::{self, PATHS_PER_BEAM_PATH};
 use super::thinned::Thinned;
 use crate::deadline::{Budget, Halt};
 use crate::error::RenderError;
-use crate::settings::CheckedSettings;
 
 /// Camera sub-paths of a round with [many](MANY) emitters, or with guides.
 const CAMERA_PATHS: u32 = 2048;
@@ -61,22 +59,20 @@ pub(super) const TIME_FOR_EMITTERS: f64 = 0.2;
 const QUICK_LOOK: f64 = 0.2;
 
 /// Lets the scene choose its emitters, and the starts of light sub-paths on them, by what they contribute
-/// under a plan with `techniques`; returns the light that each technique brought from light sub-paths, in any
+/// under a plan with all techniques; returns the light that each brought from light sub-paths, in any
 /// unit. The scene has to be as it was prepared.
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
 pub(crate) fn choose<S: Scene, L: Lanes>(
     scene: &mut PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    lanes: Option<[f64; 3]>,
+    inputs: Inputs<'_>,
     room: &Room,
     budget: &Budget<'_>,
 ) -> Result<PerTechnique<f64>, RenderError> {
-    let mut by_technique = [0.0; TECHNIQUES];
+    let mut by_technique = [0.0; Technique::COUNT];
     let emitters = scene.scene.emitters().len();
-    let is_guided = guides::can_guide(scene, techniques);
+    let is_guided = guides::can_guide(scene, inputs.techniques);
     if emitters < 2 && !is_guided {
         return Ok(by_technique);
     }
@@ -86,7 +82,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     }
     let quick = budget.part(QUICK_LOOK * TIME_FOR_EMITTERS);
     let few = statistics::FEW_LIGHT_PATHS;
-    let statistics = statistics::measure::<S, L>(scene, settings, techniques, lanes, few, room, &quick)?;
+    let statistics = statistics::measure::<S, L>(scene, inputs, few, room, &quick)?;
     let rounds: &[_] = if is_guided { &GUIDED_ROUNDS } else { &[(1.0, 1)] };
     let most_times = f64::from(rounds.iter().map(|(_, times)| *times).max().unwrap_or(1));
     let vertices =
@@ -98,14 +94,14 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
     let enough = CONTRIBUTIONS.min(room.items::<NextEvent>() as f64);
     let is_much = emitters >= MANY && scene.can_choose_by_receiver();
     let camera_paths = CAMERA_PATHS * if is_much { MORE_CAMERA_PATHS } else { 1 };
-    // What tells enough of so many emitters, or of starts.
+    // Fewer emitters need fewer sub-paths.
     let part = if is_guided { 1.0 } else { emitters.min(MANY) as f64 / MANY as f64 };
     let paths = [light_paths, f64::from(camera_paths)].map(|paths| ((paths * part) as u32).max(1));
     // Light is weighted as with so many light sub-paths, for a plan may have far fewer than the full one.
-    let small =
-        plan_with(scene, settings, techniques, &statistics, [paths[0], paths[0] / PATHS_PER_BEAM_PATH]);
-    let full = full_plan(scene, settings, techniques, &statistics, room, budget);
-    let [small, full] = [small, full].map(|plan| pilot_plan(scene, settings, &plan));
+    let planner = Planner { scene, inputs, statistics: &statistics };
+    let small = planner.plan_with([paths[0], paths[0] / PATHS_PER_BEAM_PATH]);
+    let full = planner.full_plan(room, budget);
+    let [small, full] = [small, full].map(|plan| pilot_plan(scene, inputs.settings, &plan));
     // Kernels are those of the full one, and so are the most that they may be in a medium.
     let mut mis = small.mis;
     for (small, full) in mis.volume.iter_mut().zip(&full.mis.volume) {
@@ -267,13 +263,9 @@ fn measure<S: Scene, L: Lanes>(
     };
     let context = Context { prepared: scene, plan };
     // Light tracing fills the crop. Without light sub-paths, a crop shows what the whole film does there.
-    let (width, height) = scene.scene.camera().resolution();
-    let film = if plan.needs_light_paths() {
-        scene.scene.camera().crop()
-    } else {
-        PixelRect { x: 0, y: 0, width, height }
-    };
-    let pixels = u64::from(film.width) * u64::from(film.height);
+    let camera = scene.scene.camera();
+    let film = if plan.needs_light_paths() { camera.crop() } else { PixelRect::whole(camera.resolution()) };
+    let pixels = film.pixels();
     let emitters = scene.scene.emitters().len();
     let emission_probability = |emitter| f64::from(scene.emission_probability(emitter));
     let mut emission = Vec::new();
@@ -308,7 +300,7 @@ fn measure<S: Scene, L: Lanes>(
     let relative = |contribution: Contribution| {
         if mean > 0.0 { mean / (mean + contribution.pixel) } else { 1.0 }
     };
-    let mut by_technique = [0.0; TECHNIQUES];
+    let mut by_technique = [0.0; Technique::COUNT];
     let mut by_path = |seen: &[(u32, Contribution)], scale: f64| {
         for &(path, contribution) in seen {
             if let Some((end, light)) = &mut starts[path as usize] {

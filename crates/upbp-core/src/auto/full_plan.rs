@@ -3,12 +3,11 @@
 use upbp_estimators::mis::Heuristic;
 use upbp_estimators::scene::{Camera, Scene};
 use upbp_estimators::{
-    IterationChoices, IterationPlan, LEAST_RADIUS, MergePeriods, PathLengths, PreparedScene, Technique,
-    TechniqueSet,
+    IterationChoices, IterationPlan, LEAST_RADIUS, MergePeriods, PathLengths, PerMerge, PreparedScene,
+    Technique, TechniqueSet,
 };
 
-use super::memory_limit::{LightCounts, Room};
-use super::photon_distances::Neighbours;
+use super::memory_limit::Room;
 use super::roulette::usual_roulette;
 use super::statistics::Statistics;
 use crate::deadline::Budget;
@@ -16,14 +15,6 @@ use crate::plan::Plan;
 use crate::radius_schedule::{LARGEST_RADIUS, MOST_MEAN_FREE_PATHS, Radius, RadiusSchedule};
 use crate::settings::{CheckedSettings, LightPaths, Settings};
 
-/// Largest automatic first radius of surface merging, relative to the [size](size) of what the picture shows.
-const LARGEST_SURF_RADIUS: f32 = 3e-3;
-/// Largest automatic first radius of photon points around points, relative to that size.
-const LARGEST_PP3D_RADIUS: f32 = 5e-3;
-/// Largest automatic first radius of photon points around query beams, relative to that size.
-const LARGEST_PB2D_RADIUS: f32 = 3e-3;
-/// Largest automatic first radius of photon beams, relative to that size.
-const LARGEST_BEAM_RADIUS: f32 = 3e-3;
 /// The smallest automatic first radii, relative to the largest ones.
 const SMALLEST: f32 = 0.1;
 /// The least first radius that settings give, scene units: single precision holds the values of all kernels.
@@ -35,170 +26,161 @@ const LIGHT_TIME: f64 = 0.05;
 /// Where one kernel holds all that is lit, every query would visit every photon.
 const CROWD: f64 = 1024.0;
 
-/// A plan with all of `techniques`, and with a light sub-path per pixel, or as many as settings, memory and
-/// time allow.
-pub(super) fn full_plan<S: Scene>(
-    scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    statistics: &Statistics,
-    room: &Room,
-    budget: &Budget<'_>,
-) -> Plan {
-    let crop = scene.scene.camera().crop();
-    let pixels = crop.width.saturating_mul(crop.height);
-    let wanted = match settings.light_paths {
-        LightPaths::Count(count) => count,
-        LightPaths::Auto => {
-            let most = in_time(statistics, budget).min(crowding(scene, settings, techniques, statistics));
-            (most as u32).clamp(1, pixels)
-        }
-    };
-    let wanted_beams = settings
-        .beams
-        .unwrap_or_else(|| enough_beams(scene, settings, statistics).min(wanted / 10).max(1))
-        .min(wanted)
-        .max(1);
-    let paths = room.limited::<S>([wanted, wanted_beams], statistics);
-    plan_with(scene, settings, techniques, statistics, paths)
+/// Largest automatic first radius, relative to the [size](Planner::size) of what the picture shows.
+const fn largest_radius(technique: Technique) -> f32 {
+    if matches!(technique, Technique::Pp3d) { 5e-3 } else { 3e-3 }
 }
 
-/// The most light sub-paths that memory and time allow, and that do not crowd kernels.
-pub(super) fn most_light_paths<S: Scene>(
-    scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    statistics: &Statistics,
-    full: &Plan,
-    room: &Room,
-    budget: &Budget<'_>,
-) -> u32 {
-    // Beams are no more than in the full plan: so this is a little less than what there is room for.
-    let need = LightCounts::of(full, statistics).peak_bytes::<S::Bsdf>();
-    let in_room = f64::from(full.light_paths) * room.light_bytes as f64 / need.max(1.0);
-    let most = in_time(statistics, budget).min(crowding(scene, settings, full.techniques, statistics));
-    most.min(in_room) as u32
+/// Photons or beams within an automatic first kernel, mean over queries.
+const fn photons(technique: Technique) -> f64 {
+    if matches!(technique, Technique::Bb1d) { 15.0 } else { 8.0 }
 }
 
-/// Light sub-paths that are traced in the part of a limit of time that is theirs in an iteration.
-fn in_time(statistics: &Statistics, budget: &Budget<'_>) -> f64 {
-    let seconds = budget.stop.seconds.filter(|_| statistics.light_path_seconds > 0.0);
-    seconds.map_or(f64::INFINITY, |seconds| LIGHT_TIME * seconds / statistics.light_path_seconds)
+/// What is decided before light sub-paths are counted.
+#[derive(Clone, Copy)]
+pub(super) struct Inputs<'a> {
+    pub(super) settings: &'a CheckedSettings,
+    pub(super) techniques: TechniqueSet,
+    /// The probability of each lane, if walks run in lanes.
+    pub(super) lanes: Option<[f64; 3]>,
 }
 
-/// A plan with given numbers of light sub-paths, and of those with beams.
-pub(super) fn plan_with<S: Scene>(
-    scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    statistics: &Statistics,
-    [light_paths, beam_paths]: [u32; 2],
-) -> Plan {
-    let uses = |set: TechniqueSet, paths: u32| if techniques.intersects(set) { paths } else { 0 };
-    Plan {
-        techniques,
-        light_paths: uses(TechniqueSet::LIGHT_PATHS, light_paths),
-        beam_paths: uses(TechniqueSet::BEAMS, beam_paths),
-        connections: settings.connections.unwrap_or(1.0),
-        next_events: settings.next_events.unwrap_or(1.0),
-        camera_factor: 1.0,
-        roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
-        periods: MergePeriods::ONE,
-        vertices_per_light_path: statistics.vertices_per_path,
-        radii: first_radii(scene, settings, techniques, statistics, [light_paths, beam_paths]),
-        lanes: statistics.lanes,
+/// Makes plans that have all techniques, by the statistics of sub-paths.
+pub(super) struct Planner<'a, 's, S: Scene> {
+    pub(super) scene: &'a PreparedScene<'s, S>,
+    pub(super) inputs: Inputs<'a>,
+    pub(super) statistics: &'a Statistics,
+}
+
+impl<S: Scene> Planner<'_, '_, S> {
+    /// A plan with a light sub-path per pixel, or as many as settings, memory and time allow.
+    pub(super) fn full_plan(&self, room: &Room, budget: &Budget<'_>) -> Plan {
+        let settings = self.inputs.settings;
+        let crop = self.scene.scene.camera().crop();
+        let pixels = crop.width.saturating_mul(crop.height);
+        let wanted = match settings.light_paths {
+            LightPaths::Count(count) => count,
+            LightPaths::Auto => (self.in_time(budget).min(self.crowding()) as u32).clamp(1, pixels),
+        };
+        let wanted_beams =
+            settings.beams.unwrap_or_else(|| self.enough_beams().min(wanted / 10).max(1)).min(wanted).max(1);
+        self.plan_with(room.limited::<S>([wanted, wanted_beams], self.statistics))
     }
-}
 
-/// Number of light sub-paths with which the smallest kernels that are chosen hold a [crowd](CROWD) of photon
-/// points; infinite without such kernels.
-fn crowding<S: Scene>(
-    scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    statistics: &Statistics,
-) -> f64 {
-    let size = size(scene, statistics);
-    // No kernel holds more photons than there are.
-    let all = CROWD / statistics.vertices_per_path.max(1.0);
-    let merges = [
-        (Technique::Surf, settings.radii.surf, LARGEST_SURF_RADIUS, statistics.surf),
-        (Technique::Pp3d, settings.radii.pp3d, LARGEST_PP3D_RADIUS, statistics.pp3d),
-        (Technique::Pb2d, settings.radii.pb2d, LARGEST_PB2D_RADIUS, statistics.pb2d),
-    ];
-    let paths = merges.into_iter().filter_map(|(technique, radius, largest, found)| {
-        let is_chosen = techniques.has(technique) && matches!(radius, Radius::Auto);
-        let found = found.filter(|_| is_chosen)?;
-        Some(found.paths(CROWD, f64::from(SMALLEST * largest * size)).max(all))
-    });
-    paths.fold(f64::INFINITY, f64::min)
-}
+    /// The most light sub-paths that memory and time allow beside the beams of the full plan, and that do not
+    /// crowd kernels.
+    pub(super) fn most_light_paths(&self, full: &Plan, room: &Room, budget: &Budget<'_>) -> u32 {
+        // Beams are no more than in the full plan: so this is a little less than what there is room for.
+        let in_room = room.most_paths::<S>(full, self.statistics);
+        self.in_time(budget).min(self.crowding()).min(in_room) as u32
+    }
 
-/// Light sub-paths with beams such that a query beam meets a few beams. More cost more than they tell: their
-/// queries soon take most of an iteration.
-fn enough_beams<S: Scene>(
-    scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    statistics: &Statistics,
-) -> u32 {
-    /// Photon beams within the kernel of a query beam.
-    const HITS: f64 = 1.0;
-    let largest = LARGEST_BEAM_RADIUS * size(scene, statistics);
-    let (found, radius) = match (statistics.bb1d, settings.radii.bb1d) {
-        (Some(found), Radius::Auto) => (found, largest),
-        (Some(found), Radius::Scene(fraction)) => (found, fraction * scene.bounds.radius),
-        (Some(found), Radius::Absolute(radius)) => (found, radius),
-        (None, _) => return 1024,
-    };
-    found.paths(HITS, f64::from(radius)).clamp(64.0, 1e6) as u32
-}
+    /// Light sub-paths that are traced in the part of a limit of time that is theirs in an iteration.
+    fn in_time(&self, budget: &Budget<'_>) -> f64 {
+        let each = self.statistics.light_path_seconds;
+        let seconds = budget.stop.seconds.filter(|_| each > 0.0);
+        seconds.map_or(f64::INFINITY, |seconds| LIGHT_TIME * seconds / each)
+    }
 
-/// Width of what the picture shows, where its camera sub-paths first scatter, and at most the radius of the
-/// scene: what kernels may blur has nothing to do with what lies around the picture.
-fn size<S: Scene>(scene: &PreparedScene<'_, S>, statistics: &Statistics) -> f32 {
-    let (width, height) = scene.scene.camera().resolution();
-    let picture = statistics.footprint * width.max(height) as f32;
-    if picture > 0.0 { picture.min(scene.bounds.radius) } else { scene.bounds.radius }
-}
-
-/// First radii for numbers of light sub-paths, and of those with beams.
-fn first_radii<S: Scene>(
-    scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    statistics: &Statistics,
-    [light_paths, beam_paths]: [u32; 2],
-) -> RadiusSchedule {
-    let scene_radius = scene.bounds.radius;
-    let size = size(scene, statistics);
-    let floor = 2.0 * LEAST_RADIUS * statistics.largest_coordinate;
-    // Where coordinates have no digits for it, the least radius may be beyond the largest one.
-    let given = |radius: f32| radius.max(floor.max(LEAST_GIVEN)).min(LARGEST_RADIUS);
-    let radius = |technique, choice, found: Option<Neighbours>, count: f64, paths: u32, most: f32| {
-        if !techniques.has(technique) {
-            return 0.0;
+    /// A plan with given numbers of light sub-paths, and of those with beams.
+    pub(super) fn plan_with(&self, [light_paths, beam_paths]: [u32; 2]) -> Plan {
+        let Inputs { settings, techniques, lanes } = self.inputs;
+        let uses = |set: TechniqueSet, paths: u32| if techniques.intersects(set) { paths } else { 0 };
+        Plan {
+            techniques,
+            light_paths: uses(TechniqueSet::LIGHT_PATHS, light_paths),
+            beam_paths: uses(TechniqueSet::BEAMS, beam_paths),
+            connections: settings.connections.unwrap_or(1.0),
+            next_events: settings.next_events.unwrap_or(1.0),
+            camera_factor: 1.0,
+            roulette: settings.roulette.unwrap_or(usual_roulette(techniques)),
+            periods: MergePeriods::ONE,
+            vertices_per_light_path: self.statistics.vertices_per_path,
+            radii: self.first_radii([light_paths, beam_paths]),
+            lanes,
         }
-        match choice {
-            Radius::Absolute(radius) => given(radius),
-            Radius::Scene(fraction) => given(fraction * scene_radius),
-            Radius::Auto => found
-                .map_or(most * size, |n| n.radius(count, f64::from(paths)))
-                .clamp(SMALLEST * most * size, most * size)
-                .min(statistics.radius_field.largest_radius()),
+    }
+
+    /// Number of light sub-paths with which the smallest kernels that are chosen hold a [crowd](CROWD) of
+    /// photon points; infinite without such kernels.
+    fn crowding(&self) -> f64 {
+        let Inputs { settings, techniques, .. } = self.inputs;
+        let statistics = self.statistics;
+        let size = self.size();
+        // No kernel holds more photons than there are.
+        let all = CROWD / statistics.vertices_per_path.max(1.0);
+        let is_chosen = |technique: &Technique| settings.radii.of(*technique) == Radius::Auto;
+        let points = techniques.without(TechniqueSet::BEAMS).iter().filter(is_chosen);
+        let paths = points.filter_map(|technique| {
+            let found = statistics.neighbours_of(technique)?;
+            let smallest = SMALLEST * largest_radius(technique) * size;
+            Some(found.paths(CROWD, f64::from(smallest)).max(all))
+        });
+        paths.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Light sub-paths with beams such that a query beam meets a few beams. More cost more than they tell:
+    /// their queries soon take most of an iteration.
+    fn enough_beams(&self) -> u32 {
+        /// Photon beams within the kernel of a query beam.
+        const HITS: f64 = 1.0;
+        let Some(found) = self.statistics.neighbours.bb1d else { return 1024 };
+        let radius = match self.inputs.settings.radii.bb1d {
+            Radius::Auto => largest_radius(Technique::Bb1d) * self.size(),
+            Radius::Scene(fraction) => fraction * self.scene.bounds.radius,
+            Radius::Absolute(radius) => radius,
+        };
+        found.paths(HITS, f64::from(radius)).clamp(64.0, 1e6) as u32
+    }
+
+    /// Width of what the picture shows, where its camera sub-paths first scatter, and at most the radius of
+    /// the scene: what kernels may blur has nothing to do with what lies around the picture.
+    fn size(&self) -> f32 {
+        let (width, height) = self.scene.scene.camera().resolution();
+        let (picture, radius) =
+            (self.statistics.footprint * width.max(height) as f32, self.scene.bounds.radius);
+        if picture > 0.0 { picture.min(radius) } else { radius }
+    }
+
+    /// First radii for numbers of light sub-paths, and of those with beams.
+    fn first_radii(&self, [light_paths, beam_paths]: [u32; 2]) -> RadiusSchedule {
+        let Inputs { settings, techniques, .. } = self.inputs;
+        let statistics = self.statistics;
+        let size = self.size();
+        let floor = 2.0 * LEAST_RADIUS * statistics.largest_coordinate;
+        // Where coordinates have no digits for it, the least radius may be beyond the largest one.
+        let given = |radius: f32| radius.max(floor.max(LEAST_GIVEN)).min(LARGEST_RADIUS);
+        let radius = |technique: Technique| {
+            if !techniques.has(technique) {
+                return 0.0;
+            }
+            let most = largest_radius(technique);
+            let paths = if technique.uses_beams() { beam_paths } else { light_paths };
+            match settings.radii.of(technique) {
+                Radius::Absolute(radius) => given(radius),
+                Radius::Scene(fraction) => given(fraction * self.scene.bounds.radius),
+                Radius::Auto => statistics
+                    .neighbours_of(technique)
+                    .map_or(most * size, |found| found.radius(photons(technique), f64::from(paths)))
+                    .clamp(SMALLEST * most * size, most * size)
+                    .min(statistics.radius_field.largest_radius()),
+            }
+        };
+        let PerMerge { surf, pp3d, pb2d, bp2d, bb1d } = PerMerge::from_fn(radius);
+        RadiusSchedule {
+            surf,
+            pp3d,
+            pb2d,
+            bp2d,
+            bb1d,
+            field: statistics.radius_field,
+            most_mean_free_paths: settings
+                .radii
+                .are_auto(techniques.intersection(TechniqueSet::VOLUME_MERGES))
+                .then_some(MOST_MEAN_FREE_PATHS),
+            progressive: settings.progressive,
+            floor,
         }
-    };
-    let radii = &settings.radii;
-    RadiusSchedule {
-        surf: radius(Technique::Surf, radii.surf, statistics.surf, 8.0, light_paths, LARGEST_SURF_RADIUS),
-        pp3d: radius(Technique::Pp3d, radii.pp3d, statistics.pp3d, 8.0, light_paths, LARGEST_PP3D_RADIUS),
-        pb2d: radius(Technique::Pb2d, radii.pb2d, statistics.pb2d, 8.0, light_paths, LARGEST_PB2D_RADIUS),
-        bp2d: radius(Technique::Bp2d, radii.bp2d, statistics.bp2d, 8.0, beam_paths, LARGEST_BEAM_RADIUS),
-        bb1d: radius(Technique::Bb1d, radii.bb1d, statistics.bb1d, 15.0, beam_paths, LARGEST_BEAM_RADIUS),
-        field: statistics.radius_field,
-        most_mean_free_paths: radii
-            .are_auto(techniques.intersection(TechniqueSet::VOLUME_MERGES))
-            .then_some(MOST_MEAN_FREE_PATHS),
-        progressive: settings.progressive,
-        floor,
     }
 }
 

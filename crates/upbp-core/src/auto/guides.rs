@@ -13,6 +13,8 @@ use upbp_estimators::{
     EmissionGuide, EmissionSample, IterationPlan, PreparedScene, StreamKind, TechniqueSet,
 };
 
+use super::photon_distances::median;
+
 /// Part of the first guide that leads to specular surfaces; the rest leads to lit points.
 const SPECULAR: f64 = 0.6;
 /// Part of all further guides that leads where the first one leads: the few starts that have brought light do
@@ -103,15 +105,11 @@ pub(super) fn can_guide<S: Scene>(scene: &PreparedScene<'_, S>, techniques: Tech
 /// without light from infinity that comes from many directions: for any other the place on a disc does not
 /// depend on the direction.
 pub(super) fn focus<S: Scene>(scene: &PreparedScene<'_, S>, seen: &Evidence) -> Option<Vec3> {
-    let from_all_sides = scene.scene.emitters().iter().any(|light| light.kind() == EmitterKind::Environment);
-    let median = |axis: usize| {
-        let mut places: Vec<f32> = seen.specular.iter().map(|point| point[axis]).collect();
-        let middle = places.len() / 2;
-        *places.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
-    (from_all_sides && !seen.specular.is_empty())
-        .then(|| Vec3::from_array([0, 1, 2].map(median)))
-        .filter(|focus| focus.is_finite())
+    if !scene.scene.emitters().iter().any(|light| light.kind() == EmitterKind::Environment) {
+        return None;
+    }
+    let along = |axis: usize| median(&mut seen.specular.iter().map(|p| p[axis]).collect::<Vec<_>>());
+    Some(Vec3::new(along(0)?, along(1)?, along(2)?)).filter(|focus| focus.is_finite())
 }
 
 /// Starts, by emitter, that lead to where camera sub-paths have been; none without specular surfaces, since

@@ -35,6 +35,8 @@ pub(crate) struct Room {
     limit: MemoryLimit,
     /// Light vertices, beams, and their trees.
     pub(crate) light_bytes: u64,
+    /// Whether light vertices and beams carry densities of three lanes.
+    in_lanes: bool,
 }
 
 impl Room {
@@ -47,6 +49,7 @@ impl Room {
         scene: &PreparedScene<'_, S>,
         settings: &Settings,
         techniques: TechniqueSet,
+        in_lanes: bool,
         is_given: bool,
     ) -> Result<Self, RenderError> {
         let rect = scene.scene.camera().crop();
@@ -68,15 +71,15 @@ impl Room {
             None if settings.deterministic => LIGHT_BYTES,
             _ => total - film - estimate,
         };
-        Ok(Self { film, estimate, output, total, limit, light_bytes })
+        Ok(Self { film, estimate, output, total, limit, light_bytes, in_lanes })
     }
 
-    /// Checks that the iterations of a plan fit, and returns it. They may need a tenth more than a setting
+    /// Checks that the iterations of a plan fit. They may need a tenth more than a setting
     /// allows: a plan that was made to fit is measured anew, and in another time, when its render goes on.
     ///
     /// # Errors
     /// [`RenderError::PlanMemory`].
-    pub(crate) fn fits<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Result<Plan, RenderError> {
+    pub(crate) fn fits<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> Result<(), RenderError> {
         let needed = self.iteration_bytes::<S>(plan, statistics);
         // Of what is free there is no more, and a plan was made for half of it.
         let more = if matches!(self.limit, MemoryLimit::Free(_)) { 0 } else { self.total / 10 };
@@ -84,22 +87,32 @@ impl Room {
             let needed = needed.div_ceil(1 << 20);
             return Err(RenderError::PlanMemory { needed, limit: self.limit });
         }
-        Ok(*plan)
+        Ok(())
     }
 
     /// As many of so many light sub-paths, and of those with beams, as there is room for, at least one if
     /// there are any.
     pub(super) fn limited<S: Scene>(&self, paths: [u32; 2], statistics: &Statistics) -> [u32; 2] {
         // Need grows in proportion: a part of the sub-paths takes this part of the memory.
-        let need = LightCounts::expected(statistics, paths[0], paths[1]).peak_bytes::<S::Bsdf>();
+        let need = self.light_need::<S>(paths, statistics);
         let part = (self.light_bytes as f64 / need.max(1.0)).min(1.0);
         paths.map(|count| ((f64::from(count) * part) as u32).max(count.min(1)))
     }
 
     /// Whether there is room for a number of light sub-paths, and of those with beams.
-    pub(crate) fn holds<S: Scene>(&self, [paths, beam_paths]: [u32; 2], statistics: &Statistics) -> bool {
-        let need = LightCounts::expected(statistics, paths, beam_paths).peak_bytes::<S::Bsdf>();
-        need <= self.light_bytes as f64
+    pub(super) fn holds<S: Scene>(&self, paths: [u32; 2], statistics: &Statistics) -> bool {
+        self.light_need::<S>(paths, statistics) <= self.light_bytes as f64
+    }
+
+    /// The most light sub-paths that there is room for in the proportion of those of a plan.
+    pub(super) fn most_paths<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> f64 {
+        let need = self.light_need::<S>([plan.light_paths, plan.beam_paths], statistics);
+        f64::from(plan.light_paths) * self.light_bytes as f64 / need.max(1.0)
+    }
+
+    /// The most bytes that a number of light sub-paths, and of those with beams, take at one time.
+    fn light_need<S: Scene>(&self, [paths, beam_paths]: [u32; 2], statistics: &Statistics) -> f64 {
+        LightCounts::expected(statistics, paths, beam_paths).peak_bytes::<S::Bsdf>(self.in_lanes)
     }
 
     /// Items that a small run of the preparation may have, with as many bytes of others beside them.
@@ -117,7 +130,8 @@ impl Room {
 
     /// Bytes that an iteration takes, with an estimate of the error after it.
     fn iteration_bytes<S: Scene>(&self, plan: &Plan, statistics: &Statistics) -> u64 {
-        self.film + self.estimate + LightCounts::of(plan, statistics).peak_bytes::<S::Bsdf>() as u64
+        let light = self.light_need::<S>([plan.light_paths, plan.beam_paths], statistics);
+        self.film + self.estimate + light as u64
     }
 }
 
@@ -197,16 +211,9 @@ pub(crate) struct LightCounts {
     pub(crate) beams: f64,
     /// The pieces that they are cut into.
     pub(crate) pieces: f64,
-    /// Whether they carry densities of three lanes.
-    pub(crate) in_lanes: bool,
 }
 
 impl LightCounts {
-    /// The numbers that an iteration of a plan leaves.
-    pub(crate) fn of(plan: &Plan, statistics: &Statistics) -> Self {
-        Self::expected(statistics, plan.light_paths, plan.beam_paths)
-    }
-
     /// The numbers that light sub-paths leave, some of which leave beams.
     pub(crate) fn expected(statistics: &Statistics, light_paths: u32, beam_paths: u32) -> Self {
         let (paths, beam_paths) = (f64::from(light_paths), f64::from(beam_paths));
@@ -216,12 +223,11 @@ impl LightCounts {
             medium: paths * statistics.medium_per_path,
             beams: beam_paths * statistics.beams_per_path,
             pieces: beam_paths * statistics.pieces_per_path,
-            in_lanes: statistics.lanes.is_some(),
         }
     }
 
     /// The most bytes that they take at one time, from the first vertex to the end of the iteration.
-    pub(crate) fn peak_bytes<B>(&self) -> f64 {
+    fn peak_bytes<B>(&self, in_lanes: bool) -> f64 {
         /// The boxes of a tree, per item: those of leaves, rounded for points, and the nodes above them.
         const NODES: f64 = 256.0 / 512.0 * 8.0 / 7.0;
         const POINT_BOXES: f64 = 1.0 + NODES;
@@ -235,7 +241,7 @@ impl LightCounts {
         const PIECE: f64 = 12.0;
         const CENTRE: f64 = 16.0;
         const PLACED: f64 = 40.0;
-        let [vertex, beam] = if self.in_lanes {
+        let [vertex, beam] = if in_lanes {
             [size_of::<LightVertex<B, f64, [f64; 3]>>(), size_of::<PhotonBeam<f64, [f64; 3]>>()]
         } else {
             [size_of::<LightVertex<B>>(), size_of::<PhotonBeam>()]
@@ -276,7 +282,7 @@ mod tests {
         ] {
             let text = budget.1.to_string();
             assert_eq!(budget.0, mebibytes << 20);
-            assert!(text.starts_with(reason) && text.contains("`--memory MIB`"), "{text}");
+            assert!(text.starts_with(reason) && text.contains("`memory` in the settings"), "{text}");
         }
     }
 

@@ -50,10 +50,10 @@ use crate::plan::{FrozenPlan, Plan};
 use crate::settings::{CheckedSettings, Techniques};
 use candidate::Candidates;
 use cost::Cost;
+use full_plan::{Inputs, Planner};
 use memory_limit::Room;
-use pilot_render::recorder::TECHNIQUES;
 use pilot_render::{Limits, PilotRender, Size};
-use statistics::Statistics;
+use statistics::{FEW_LIGHT_PATHS, LIGHT_PATHS, Statistics};
 use technique_support::TechniqueSupport;
 use variance::Variance;
 
@@ -100,86 +100,118 @@ pub(crate) fn choose<S: Scene>(
     budget: &mut Budget<'_>,
 ) -> Result<Choice, RenderError> {
     budget.step("measuring lights", 0.0)?;
-    if let Some(frozen) = &given {
-        frozen.plan.validate().map_err(RenderError::PlanValue)?;
-    }
-    match &given {
-        Some(frozen) => scene.set_emitter_choice(&frozen.emitters)?,
-        None => volumes::choose(scene, settings, settings.techniques.candidates(), budget)?,
-    }
-    let support = TechniqueSupport::of(scene, settings, given.as_ref())?;
-    let room = Room::of(scene, settings, support.techniques, given.is_some())?;
-    let lanes = match &given {
-        Some(frozen) => lanes::of_plan(scene, &frozen.plan, settings)?,
-        None => lanes::choose(scene, settings),
+    let choice = match given {
+        Some(frozen) => check(scene, settings, &frozen, budget)?,
+        None => choose_anew(scene, settings, budget)?,
     };
-    if lanes.is_some() {
-        choose_in::<S, [f64; 3]>(scene, settings, given, support, room, lanes, budget)
+    if budget.canceller.is_cancelled() { Err(RenderError::Cancelled) } else { Ok(choice) }
+}
+
+/// Checks a plan that is given, and lets the scene choose emitters as it says.
+fn check<S: Scene>(
+    scene: &mut PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    frozen: &FrozenPlan,
+    budget: &mut Budget<'_>,
+) -> Result<Choice, RenderError> {
+    let plan = frozen.plan;
+    plan.validate().map_err(RenderError::PlanValue)?;
+    scene.set_emitter_choice(&frozen.emitters)?;
+    let support = TechniqueSupport::of(scene, settings)?;
+    support.check(&plan)?;
+    let room = Room::of(scene, settings, support.techniques, plan.lanes.is_some(), true)?;
+    let lanes = lanes::of_plan(scene, &plan, settings)?;
+    let inputs = Inputs { settings, techniques: plan.techniques, lanes };
+    let statistics = if lanes.is_some() {
+        measure::<S, [f64; 3]>(scene, inputs, &room, budget)?
     } else {
-        choose_in::<S, f64>(scene, settings, given, support, room, lanes, budget)
+        measure::<S, f64>(scene, inputs, &room, budget)?
+    };
+    room.fits::<S>(&plan, &statistics)?;
+    Ok(Choice { support, room, statistics, plan })
+}
+
+/// Chooses a plan, and the emitters for it.
+fn choose_anew<S: Scene>(
+    scene: &mut PreparedScene<'_, S>,
+    settings: &CheckedSettings,
+    budget: &mut Budget<'_>,
+) -> Result<Choice, RenderError> {
+    volumes::choose(scene, settings, settings.techniques.candidates(), budget)?;
+    let support = TechniqueSupport::of(scene, settings)?;
+    let lanes = lanes::choose(scene, settings);
+    let room = Room::of(scene, settings, support.techniques, lanes.is_some(), false)?;
+    let inputs = Inputs { settings, techniques: support.techniques, lanes };
+    if lanes.is_some() {
+        choose_in::<S, [f64; 3]>(scene, inputs, support, room, budget)
+    } else {
+        choose_in::<S, f64>(scene, inputs, support, room, budget)
     }
 }
 
-/// Chooses as [`choose`] does, with walks in the lanes `L`.
+/// Chooses among the techniques that the scene can use, with walks in the lanes `L`.
 fn choose_in<S: Scene, L: Lanes>(
     scene: &mut PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    given: Option<FrozenPlan>,
+    inputs: Inputs<'_>,
     support: TechniqueSupport,
     room: Room,
-    lanes: Option<[f64; 3]>,
     budget: &mut Budget<'_>,
 ) -> Result<Choice, RenderError> {
-    let is_auto = settings.techniques == Techniques::Auto;
-    let techniques = given.as_ref().map_or(support.techniques, |frozen| frozen.plan.techniques);
-    let found = match &given {
-        Some(_) => [0.0; TECHNIQUES],
-        None => emitters::choose::<S, L>(scene, settings, techniques, lanes, &room, budget)?,
-    };
+    let found = emitters::choose::<S, L>(scene, inputs, &room, budget)?;
+    let statistics = measure::<S, L>(scene, inputs, &room, budget)?;
+    let planner = Planner { scene, inputs, statistics: &statistics };
+    let full = planner.full_plan(&room, budget);
+    if inputs.settings.techniques != Techniques::Auto || !full.uses_light_paths() {
+        return Ok(Choice { support, room, statistics, plan: full });
+    }
+    let most = planner.most_light_paths(&full, &room, budget);
+    let is_room = |counts| room.holds::<S>(counts, &statistics);
+    let candidates = Candidates::new(&planner, &support, full, most, is_room);
+    let limits = Limits::of::<S, L>(&room);
+    let plan = best_plan::<S, L>(scene, inputs.settings, &candidates, limits, budget);
+    let mut choice = Choice { support, room, statistics, plan };
+    let missed: f64 = inputs.techniques.without(plan.techniques).iter().map(|off| found[off as usize]).sum();
+    if !plan.uses_light_paths() || missed > MUCH * found.iter().sum::<f64>() {
+        let inputs = Inputs { techniques: plan.techniques, ..inputs };
+        choose_emitters_again::<S, L>(scene, inputs, &mut choice, budget)?;
+    }
+    Ok(choice)
+}
+
+/// Chooses emitters once more, for the techniques that are on: what the others miss is left to these.
+fn choose_emitters_again<S: Scene, L: Lanes>(
+    scene: &mut PreparedScene<'_, S>,
+    inputs: Inputs<'_>,
+    Choice { room, statistics, plan, .. }: &mut Choice,
+    budget: &Budget<'_>,
+) -> Result<(), RenderError> {
+    scene.choose_emitters_by_power();
+    emitters::choose::<S, L>(scene, inputs, room, budget)?;
+    let allowance = budget.part(TIME_FOR_VERTICES);
+    let again = statistics::measure::<S, L>(scene, inputs, FEW_LIGHT_PATHS, room, &allowance)?;
+    if again.vertices_per_path > 0.0 {
+        plan.vertices_per_light_path = again.vertices_per_path;
+    }
+    if again.vertices_per_path + again.beams_per_path > 0.0 {
+        let paths = [plan.light_paths, plan.beam_paths];
+        [plan.light_paths, plan.beam_paths] = room.limited::<S>(paths, &again);
+        *statistics = again;
+    }
+    Ok(())
+}
+
+/// Measures sub-paths for radii and memory.
+fn measure<S: Scene, L: Lanes>(
+    scene: &PreparedScene<'_, S>,
+    inputs: Inputs<'_>,
+    room: &Room,
+    budget: &mut Budget<'_>,
+) -> Result<Statistics, RenderError> {
     budget.step("looking around", 0.3)?;
     let allowance = budget.part(TIME_FOR_STATISTICS);
-    let most = statistics::LIGHT_PATHS;
-    let mut statistics =
-        statistics::measure::<S, L>(scene, settings, techniques, lanes, most, &room, &allowance)?;
+    let statistics = statistics::measure::<S, L>(scene, inputs, LIGHT_PATHS, room, &allowance)?;
     budget.step("choosing techniques", 0.5)?;
-    let plan = if let Some(frozen) = given {
-        room.fits::<S>(&frozen.plan, &statistics)?
-    } else {
-        let full = full_plan::full_plan(scene, settings, techniques, &statistics, &room, budget);
-        if is_auto && full.uses_light_paths() {
-            let most = full_plan::most_light_paths(scene, settings, &statistics, &full, &room, budget);
-            let is_room = |counts| room.holds::<S>(counts, &statistics);
-            let candidates = Candidates::new(scene, settings, &support, &statistics, full, most, is_room);
-            let limits = Limits::of::<S, L>(&room);
-            let mut plan = best_plan::<S, L>(scene, settings, &candidates, limits, budget);
-            let missed: f64 = techniques.without(plan.techniques).iter().map(|off| found[off as usize]).sum();
-            if !plan.uses_light_paths() || missed > MUCH * found.iter().sum::<f64>() {
-                // What they miss is left to the techniques that are on.
-                scene.choose_emitters_by_power();
-                emitters::choose::<S, L>(scene, settings, plan.techniques, lanes, &room, budget)?;
-                let allowance = budget.part(TIME_FOR_VERTICES);
-                let few = statistics::FEW_LIGHT_PATHS;
-                let on = plan.techniques;
-                let again = statistics::measure::<S, L>(scene, settings, on, lanes, few, &room, &allowance)?;
-                if again.vertices_per_path > 0.0 {
-                    plan.vertices_per_light_path = again.vertices_per_path;
-                }
-                if again.vertices_per_path + again.beams_per_path > 0.0 {
-                    let paths = [plan.light_paths, plan.beam_paths];
-                    [plan.light_paths, plan.beam_paths] = room.limited::<S>(paths, &again);
-                    statistics = again;
-                }
-            }
-            plan
-        } else {
-            full
-        }
-    };
-    if budget.canceller.is_cancelled() {
-        Err(RenderError::Cancelled)
-    } else {
-        Ok(Choice { support, room, statistics, plan })
-    }
+    Ok(statistics)
 }
 
 /// The best of the candidates by a pilot render that is large enough, or by the largest that there is time

@@ -175,38 +175,13 @@ impl Judge<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::num::NonZeroU32;
-
-    use upbp_estimators::{MergePeriods, RadiusField, Roulette, TechniqueSet};
+    use upbp_estimators::TechniqueSet;
 
     use super::*;
-    use crate::radius_schedule::RadiusSchedule;
+    use crate::plan::tests::plan;
 
     fn judged(variance: [f64; GROUPS], cost: f64) -> Judged {
-        let radii = RadiusSchedule {
-            surf: 0.0,
-            pp3d: 0.0,
-            pb2d: 0.0,
-            bp2d: 0.0,
-            bb1d: 0.0,
-            field: RadiusField::Uniform,
-            most_mean_free_paths: None,
-            progressive: true,
-            floor: 1e-6,
-        };
-        let plan = Plan {
-            techniques: TechniqueSet::BPT,
-            light_paths: 1,
-            beam_paths: 0,
-            connections: 1.0,
-            next_events: 1.0,
-            camera_factor: 1.0,
-            roulette: Roulette::Off,
-            periods: MergePeriods::from_fn(|_| NonZeroU32::MIN),
-            vertices_per_light_path: 1.0,
-            lanes: None,
-            radii,
-        };
+        let plan = Plan { techniques: TechniqueSet::BPT, light_paths: 1, ..plan() };
         Judged { plan, variance, cost }
     }
 

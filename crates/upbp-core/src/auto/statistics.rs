@@ -9,10 +9,11 @@ use upbp_estimators::scene::{BoundingSphere, Camera, CameraRay, Scene};
 use upbp_estimators::trace::trace_light_path;
 use upbp_estimators::{
     Counters, IterationChoices, IterationPlan, Kernel, Kernels, LightMap, MergePeriods, NO_LIMIT,
-    PathLengths, PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
+    PathLengths, PerMerge, PreparedScene, RadiusField, StreamKind, Technique, TechniqueSet,
 };
 use upbp_media::Lanes;
 
+use super::full_plan::Inputs;
 use super::memory_limit::Room;
 use super::parallel_walks::{PIECE, PilotRun, camera_path, in_pieces, pixel};
 use super::photon_distances::{Nearest, Neighbours, median};
@@ -21,7 +22,6 @@ use super::roulette::usual_roulette;
 use super::thinned::Thinned;
 use crate::deadline::{Allowance, Clock, Halt};
 use crate::error::RenderError;
-use crate::settings::CheckedSettings;
 
 /// Light sub-paths of a quick look.
 pub(crate) const FEW_LIGHT_PATHS: u32 = 1024;
@@ -45,8 +45,6 @@ const NEIGHBOURS: usize = 16384;
 /// Averages over light sub-paths, and typical distances between photons and queries.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Statistics {
-    /// The probability of each lane, if walks run in lanes.
-    pub(crate) lanes: Option<[f64; 3]>,
     /// Wall seconds per light sub-path, with all threads at work: for limits of time, which are kept by the
     /// clock.
     pub(crate) light_path_seconds: f64,
@@ -67,16 +65,15 @@ pub(crate) struct Statistics {
     pub(crate) largest_coordinate: f32,
     /// The field that kernel radii follow.
     pub(crate) radius_field: RadiusField,
-    /// Photons on surfaces around points of camera sub-paths there; `None` where there is nothing.
-    pub(crate) surf: Option<Neighbours>,
-    /// Photons in media around points.
-    pub(crate) pp3d: Option<Neighbours>,
-    /// Photons in media around query beams.
-    pub(crate) pb2d: Option<Neighbours>,
-    /// Photon beams around points.
-    pub(crate) bp2d: Option<Neighbours>,
-    /// Photon beams around query beams.
-    pub(crate) bb1d: Option<Neighbours>,
+    /// Photons or beams around the queries of each technique; `None` where there is nothing.
+    pub(crate) neighbours: PerMerge<Option<Neighbours>>,
+}
+
+impl Statistics {
+    /// Photons or beams around the queries of a technique, if it merges and there are any.
+    pub(crate) fn neighbours_of(&self, technique: Technique) -> Option<Neighbours> {
+        *self.neighbours.get(technique)?
+    }
 }
 
 /// Measures sub-paths in the lanes `L` with at most `light_paths` light sub-paths; with fewer, and fewer
@@ -84,24 +81,23 @@ pub(crate) struct Statistics {
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
-pub(crate) fn measure<S: Scene, L: Lanes>(
+pub(super) fn measure<S: Scene, L: Lanes>(
     scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    lanes: Option<[f64; 3]>,
+    inputs: Inputs<'_>,
     light_paths: u32,
     room: &Room,
     allowance: &Allowance<'_>,
 ) -> Result<Statistics, RenderError> {
+    let Inputs { settings, techniques, .. } = inputs;
     let use_nothing = [Technique::Hit, Technique::Nee, Technique::LightTracing].into_iter().collect();
     let only_light_tracing = techniques.without(use_nothing).is_empty();
     if only_light_tracing && !(allowance.is_limited() && techniques.has(Technique::LightTracing)) {
-        return Ok(Statistics { lanes, ..Statistics::default() });
+        return Ok(Statistics::default());
     }
     let run = |part: f64, halt: &Halt<'_>| {
         let light_paths = (part * f64::from(light_paths)).ceil() as u32;
         let camera_paths = (part * f64::from(CAMERA_PATHS)).ceil() as u32;
-        let plan = |paths| nominal_plan(scene, settings, techniques, lanes, paths);
+        let plan = |paths| nominal_plan(scene, inputs, paths);
         let most_vertices = room.items::<LightVertex<S::Bsdf, f64, L>>().min(MOST_VERTICES);
         let light = TracedPaths::trace::<_, L>(scene, plan, light_paths, most_vertices as f64, halt)?;
         let plan = plan(light.paths);
@@ -112,7 +108,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
         } else {
             RadiusField::Uniform
         };
-        Some(Statistics { lanes, ..light.statistics(&plan, field, &queries, scene.bounds.radius) })
+        Some(light.statistics(&plan, field, &queries, scene.bounds.radius))
     };
     allowance.largest(run).ok_or(RenderError::Cancelled)
 }
@@ -121,9 +117,7 @@ pub(crate) fn measure<S: Scene, L: Lanes>(
 /// importance.
 fn nominal_plan<S: Scene>(
     scene: &PreparedScene<'_, S>,
-    settings: &CheckedSettings,
-    techniques: TechniqueSet,
-    lanes: Option<[f64; 3]>,
+    Inputs { settings, techniques, lanes }: Inputs<'_>,
     light_paths: u32,
 ) -> IterationPlan {
     let nominal = 1e-3 * scene.bounds.radius;
@@ -231,7 +225,7 @@ impl TracedPaths {
         let beams = SegmentTree::build(segments, SplitParams::default());
         let near = Nearest { paths: near_paths, scale };
         let near_beams = Nearest { paths: beam_paths, scale };
-        // Distances in terms of radii: divided by what those are multiplied by.
+        // Distances are divided by the radius field.
         let of = |technique, found: &dyn Fn() -> Option<Neighbours>| {
             plan.techniques.has(technique).then(found).flatten()
         };
@@ -242,7 +236,6 @@ impl TracedPaths {
             })
         };
         Statistics {
-            lanes: None,
             light_path_seconds: self.seconds,
             vertices_per_path: self.photons.len() as f64 / paths,
             footprint: queries.footprint(),
@@ -252,29 +245,35 @@ impl TracedPaths {
             medium_per_path: per_path(plan.stores_medium_photons(), true),
             pieces_per_path: beams.pieces() as f64 / beam_paths,
             beams_per_path: self.beams.len() as f64 / beam_paths,
-            surf: of(Technique::Surf, &|| around_points(&queries.surfaces, &surface, 2.0)),
-            pp3d: of(Technique::Pp3d, &|| around_points(&queries.media, &medium, 3.0)),
-            pb2d: of(Technique::Pb2d, &|| {
-                near.of(&queries.edges, medium.len(), 2.0, &|edge, radius, found| {
-                    medium.around_ray(edge, field.search_radius(radius, f32::INFINITY), |_, t, distance2| {
-                        found(distance2.sqrt() / field.at(edge.at(t)));
+            neighbours: PerMerge {
+                surf: of(Technique::Surf, &|| around_points(&queries.surfaces, &surface, 2.0)),
+                pp3d: of(Technique::Pp3d, &|| around_points(&queries.media, &medium, 3.0)),
+                pb2d: of(Technique::Pb2d, &|| {
+                    near.of(&queries.edges, medium.len(), 2.0, &|edge, radius, found| {
+                        medium.around_ray(
+                            edge,
+                            field.search_radius(radius, f32::INFINITY),
+                            |_, t, distance2| {
+                                found(distance2.sqrt() / field.at(edge.at(t)));
+                            },
+                        );
+                    })
+                }),
+                bp2d: of(Technique::Bp2d, &|| {
+                    near_beams.of(&queries.media, self.beams.len(), 2.0, &|point, radius, found| {
+                        let scale = field.at(*point);
+                        beams.around_point(*point, scale * radius, |_, _, distance2| {
+                            found(distance2.sqrt() / scale);
+                        });
+                    })
+                }),
+                // Tells how many beams are enough, too.
+                bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, &|edge, radius, found| {
+                    beams.around_ray(edge, field.search_radius(radius, f32::INFINITY), |_, approach| {
+                        found(approach.distance / field.at(edge.at(approach.t_ray)));
                     });
-                })
-            }),
-            bp2d: of(Technique::Bp2d, &|| {
-                near_beams.of(&queries.media, self.beams.len(), 2.0, &|point, radius, found| {
-                    let scale = field.at(*point);
-                    beams.around_point(*point, scale * radius, |_, _, distance2| {
-                        found(distance2.sqrt() / scale);
-                    });
-                })
-            }),
-            // Tells how many beams are enough, too.
-            bb1d: near_beams.of(&queries.edges, self.beams.len(), 1.0, &|edge, radius, found| {
-                beams.around_ray(edge, field.search_radius(radius, f32::INFINITY), |_, approach| {
-                    found(approach.distance / field.at(edge.at(approach.t_ray)));
-                });
-            }),
+                }),
+            },
         }
     }
 }

@@ -11,7 +11,7 @@ use upbp_estimators::{MediumId, PreparedScene, Technique, TechniqueSet};
 
 use crate::error::RenderError;
 use crate::media::Medium;
-use crate::plan::FrozenPlan;
+use crate::plan::Plan;
 use crate::settings::Settings;
 
 /// The techniques that remain, and why others do not.
@@ -33,11 +33,10 @@ impl TechniqueSupport {
     /// The support of the techniques that the settings allow.
     ///
     /// # Errors
-    /// If none of them can make any light in the scene, or if a `given` plan has others.
+    /// [`RenderError::NoLight`].
     pub(crate) fn of<S: Scene>(
         scene: &PreparedScene<'_, S>,
         settings: &Settings,
-        given: Option<&FrozenPlan>,
     ) -> Result<Self, RenderError> {
         let (chosen, max_length) = (settings.techniques.candidates(), settings.max_length);
         let support = Self::find(scene, chosen, max_length);
@@ -47,11 +46,17 @@ impl TechniqueSupport {
             let (possible, reasons) = (possible.techniques, reasons.join("; "));
             return Err(RenderError::NoLight { chosen, possible, reasons });
         }
-        let techniques = support.techniques;
-        match given.map(|frozen| frozen.plan.techniques.without(techniques)) {
-            Some(extra) if !extra.is_empty() => Err(RenderError::Plan { extra, techniques }),
-            _ => Ok(support),
-        }
+        Ok(support)
+    }
+
+    /// Checks that the scene can use all techniques of a plan.
+    ///
+    /// # Errors
+    /// [`RenderError::Plan`].
+    pub(super) fn check(&self, plan: &Plan) -> Result<(), RenderError> {
+        let techniques = self.techniques;
+        let extra = plan.techniques.without(techniques);
+        if extra.is_empty() { Ok(()) } else { Err(RenderError::Plan { extra, techniques }) }
     }
 
     /// Looks at the scene and at path lengths of up to `max_length` edges.

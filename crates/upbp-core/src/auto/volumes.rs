@@ -14,7 +14,7 @@ use upbp_estimators::path::Context;
 use upbp_estimators::scene::{Camera, EmitterId, PixelRect, Scene};
 use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet};
 
-use super::full_plan::{pilot_plan, plan_with};
+use super::full_plan::{Inputs, Planner, pilot_plan};
 use super::parallel_walks::{PilotRun, camera_path, in_pieces, pixel};
 use super::statistics::Statistics;
 use crate::deadline::{Budget, Halt};
@@ -61,7 +61,8 @@ pub(crate) fn choose<S: Scene>(
         scene.leave_out_volumes(|_| true);
         return Ok(());
     }
-    let plan = plan_with(scene, settings, TechniqueSet::PT, &Statistics::default(), [0; 2]);
+    let inputs = Inputs { settings, techniques: TechniqueSet::PT, lanes: None };
+    let plan = Planner { scene, inputs, statistics: &Statistics::default() }.plan_with([0; 2]);
     let plan = pilot_plan(scene, settings, &plan);
     let run = |part: f64, halt: &Halt<'_>| {
         let paths = (part * f64::from(PATHS)).ceil() as u32;
@@ -69,13 +70,13 @@ pub(crate) fn choose<S: Scene>(
         Some(Walks { paths, passes: passes.collect::<Option<_>>()? })
     };
     let walks = budget.part(TIME_FOR_VOLUMES).largest(run).ok_or(RenderError::Cancelled)?;
-    let reductions = walks.relative_to(PixelRect::whole(scene.scene.camera().resolution()));
+    let factors = walks.relative_to(PixelRect::whole(scene.scene.camera().resolution()));
     let least = if scene.scene.has_specular_surfaces() {
         SELDOM * f64::from(PASSES * walks.paths)
     } else {
         LEAST_MET
     };
-    scene.leave_out_volumes(|emitter| walks.are_hits_enough(emitter, &reductions, least));
+    scene.leave_out_volumes(|emitter| walks.are_hits_enough(emitter, &factors, least));
     Ok(())
 }
 
@@ -197,11 +198,11 @@ impl Walks {
 
     /// Whether hits alone find the light of a volume about as well as together with next events; `least` are
     /// the camera sub-paths that must have met it.
-    fn are_hits_enough(&self, emitter: EmitterId, reductions: &[f64], least: f64) -> bool {
+    fn are_hits_enough(&self, emitter: EmitterId, factors: &[f64], least: f64) -> bool {
         let (mut shared, mut hits, mut unseen) = (0.0, 0.0, 0.0);
         let (mut sum, mut squares) = (0.0, 0.0);
-        for (index, reduction) in reductions.iter().enumerate() {
-            let square = reduction * reduction;
+        for (index, factor) in factors.iter().enumerate() {
+            let square = factor * factor;
             let lights = [0, 1].map(|pass: usize| self.passes[pass][index].of(emitter));
             // Two walks at a pixel, which begin alike: half the square of their difference is their variance.
             let variance = |of: fn(&Light) -> f64| 0.5 * square * (of(&lights[0]) - of(&lights[1])).powi(2);
@@ -209,7 +210,7 @@ impl Walks {
             hits += variance(|light| light.hits);
             for light in lights {
                 unseen += 0.5 * square * (light.expected_squares - light.squares);
-                sum += reduction * light.hits;
+                sum += factor * light.hits;
                 squares += square * light.hits * light.hits;
             }
         }

@@ -90,7 +90,7 @@ fn black(rect: PixelRect) -> Vec<Sum3> {
 }
 
 const fn pixels(rect: PixelRect) -> usize {
-    rect.width as usize * rect.height as usize
+    rect.pixels() as usize
 }
 
 impl Film {

@@ -30,18 +30,16 @@ struct Metadata<'a> {
 
 /// Writes the mean of a render's film, its layers, variance, halves, estimated error and features, as far as
 /// the film has them, in float32. The attribute `upbp` of the file holds the name of the scene, the settings
-/// and the report as RON text.
+/// and the [report](State::report) as RON text.
 ///
 /// # Errors
 /// Those of the file system or of the encoder.
-pub fn write_exr(path: &Path, state: &State) -> std::result::Result<(), OutputError> {
+pub fn write_exr(path: &Path, state: &State, report: &Report) -> std::result::Result<(), OutputError> {
     let fail = |reason: String| OutputError::Encode { path: path.to_owned(), reason };
     let film = state.film();
     let mut channels = SmallVec::<[AnyChannel<FlatSamples>; 4]>::new();
     // First what takes memory besides.
-    let error = film.error_map();
-    let report = Report::new(state, error.as_ref());
-    if let Some(error) = error {
+    if let Some(error) = film.error_map() {
         let (width, height) = (film.rect().width, film.rect().height);
         push(&mut channels, "error.", &Picture { width, height, pixels: error.relative });
     }
@@ -68,7 +66,7 @@ pub fn write_exr(path: &Path, state: &State) -> std::result::Result<(), OutputEr
 
     let mut attributes = LayerAttributes::default();
     let Identity { scene, settings, .. } = state.identity();
-    let metadata = Metadata { scene, settings, report: &report };
+    let metadata = Metadata { scene, settings, report };
     let text = ron::to_string(&metadata).map_err(|error| fail(error.to_string()))?;
     // Not `Text::from`, which takes nothing but Latin-1.
     let text = Text::from_slice_unchecked(text.as_bytes());

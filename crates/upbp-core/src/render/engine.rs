@@ -5,12 +5,12 @@
 
 use std::ops::Range;
 
-use upbp_estimators::path::Context;
+use upbp_estimators::path::{Context, LightChunk};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene};
 use upbp_media::Lanes;
 
-use super::passes::{Buffers, Lists, add_splats, blacken, camera_pass, light_pass};
+use super::passes::{Buffers, add_splats, blacken, camera_pass, light_pass};
 use crate::auto;
 use crate::auto::memory_limit::LightCounts;
 use crate::auto::statistics::Statistics;
@@ -79,12 +79,25 @@ impl<S: Scene, L: Lanes> Engine for SceneEngine<'_, S, L> {
         pixels: &mut [Pixel],
         halt: &Halt<'_>,
     ) -> Option<LightDone> {
+        // The lists of the iteration before are used again: the allocator need not find a use for what was
+        // given back to it. The trees have no part in that, and are gone before there is anything new.
+        let LightMap { vertices, beams, .. } = std::mem::replace(&mut self.map, LightMap::empty());
+        let lists = LightChunk { vertices, beams, ..LightChunk::default() };
+        let mut times = PassTimes::default();
+        let mut clock = Clock::start();
+        blacken(pixels);
+        let stores = plan.stores_vertices() || plan.stores_beams();
+        let expected = LightCounts::expected(&self.statistics, plan.light_paths, plan.beam_paths);
+        let expected = if stores { expected } else { LightCounts::default() };
         let context = Context { prepared: &self.scene, plan };
-        // The lists of the iteration before are used again.
-        let lists = Lists::of(std::mem::replace(&mut self.map, LightMap::empty()));
-        let (map, done) = trace_light(&context, &self.statistics, lists, rect, pixels, halt)?;
-        self.map = map;
-        Some(done)
+        let all = light_pass(&context, &expected, lists, halt, |splats| {
+            add_splats(rect, splats, pixels);
+        })?;
+        times.light = clock.lap();
+        self.map = LightMap::build(plan, all.vertices, all.beams);
+        times.build = clock.lap();
+        let map_bytes = self.map.memory_bytes() as u64;
+        Some(LightDone { counters: all.counters, map_bytes, times })
     }
 
     fn trace_camera(
@@ -102,32 +115,4 @@ impl<S: Scene, L: Lanes> Engine for SceneEngine<'_, S, L> {
     fn shrink(&mut self) {
         self.map = LightMap::empty();
     }
-}
-
-/// Photons, and what their pass has done.
-type Photons<B, L> = (LightMap<B, f64, L>, LightDone);
-
-fn trace_light<S: Scene, L: Lanes>(
-    context: &Context<'_, S>,
-    statistics: &Statistics,
-    mut lists: Lists<S::Bsdf, L>,
-    rect: PixelRect,
-    pixels: &mut [Pixel],
-    halt: &Halt<'_>,
-) -> Option<Photons<S::Bsdf, L>> {
-    let plan = context.plan;
-    let mut times = PassTimes::default();
-    let mut clock = Clock::start();
-    blacken(pixels);
-    let stores = plan.stores_vertices() || plan.stores_beams();
-    let expected = LightCounts::expected(statistics, plan.light_paths, plan.beam_paths);
-    let expected = if stores { expected } else { LightCounts::default() };
-    let counters = light_pass(context, &expected, &mut lists, halt, |splats| {
-        add_splats(rect, splats, pixels);
-    })?;
-    times.light = clock.lap();
-    let map = LightMap::build(plan, lists.vertices, lists.beams);
-    times.build = clock.lap();
-    let map_bytes = map.memory_bytes() as u64;
-    Some((map, LightDone { counters, map_bytes, times }))
 }

@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use upbp_estimators::observer::NoObserver;
-use upbp_estimators::path::{Context, LightChunk, LightVertex, PhotonBeam, Scratch, Splat};
+use upbp_estimators::path::{Context, LightChunk, Scratch, Splat};
 use upbp_estimators::scene::{PixelRect, Scene};
 use upbp_estimators::trace::{trace_camera_path, trace_light_path};
 use upbp_estimators::{Counters, Features, LightMap, StreamKind, pixel_index};
@@ -30,39 +30,19 @@ const LIGHT_CHUNK_ITEMS: f64 = 4096.0;
 /// Most pixels per piece of work.
 const CAMERA_CHUNK: usize = 64;
 
-/// Lists that are used again in the next iteration: the allocator need not find a use for what was given back
-/// to it.
-pub(crate) struct Lists<B, L: Lanes> {
-    pub(crate) vertices: Vec<LightVertex<B, f64, L>>,
-    pub(crate) beams: Vec<PhotonBeam<f64, L>>,
-}
-
-impl<B, L: Lanes> Default for Lists<B, L> {
-    fn default() -> Self {
-        Self { vertices: Vec::new(), beams: Vec::new() }
-    }
-}
-
-impl<B, L: Lanes> Lists<B, L> {
-    /// The lists of a map that is no longer needed.
-    pub(crate) fn of(map: LightMap<B, f64, L>) -> Self {
-        Self { vertices: map.vertices, beams: map.beams }
-    }
-}
-
-/// Traces all light sub-paths of the plan into `lists`, and hands their splats over in the order of the
-/// sub-paths. `expected` is how many vertices and beams there will be, as far as anyone knows. `None` if it
-/// was halted: then lists and splats mean nothing.
+/// Traces all light sub-paths of the plan, and hands their splats over in the order of the sub-paths.
+/// `expected` is how many vertices and beams there will be, as far as anyone knows; the lists of `all` are
+/// used again. `None` if it was halted: then the splats mean nothing.
 ///
 /// Pieces are traced in waves, whose buffers are emptied into the lists and used again: so there is never
 /// more than a fraction of all in two places.
 pub(crate) fn light_pass<S: Scene, L: Lanes>(
     context: &Context<'_, S>,
     expected: &LightCounts,
-    lists: &mut Lists<S::Bsdf, L>,
+    mut all: LightChunk<S::Bsdf, f64, L>,
     halt: &Halt<'_>,
     mut take_splats: impl FnMut(&[Splat]),
-) -> Option<Counters> {
+) -> Option<LightChunk<S::Bsdf, f64, L>> {
     let paths = context.plan.traced_light_paths();
     let items = expected.vertices.max(expected.beams) / f64::from(paths.max(1));
     let chunk = ((LIGHT_CHUNK_ITEMS / items) as u32).clamp(1, LIGHT_CHUNK);
@@ -72,12 +52,11 @@ pub(crate) fn light_pass<S: Scene, L: Lanes>(
     let wave = (chunks / 32).clamp(16 * threads, 256 * threads);
     let mut buffers: Vec<LightChunk<S::Bsdf, f64, L>> = Vec::new();
     buffers.resize_with(wave.min(chunks) as usize, LightChunk::default);
-    let mut counters = Counters::default();
-    lists.vertices.clear();
-    lists.beams.clear();
+    all.vertices.clear();
+    all.beams.clear();
     // A little more than expected. What cannot be had at once may still turn out not to be needed.
-    let _ = lists.vertices.try_reserve_exact((1.05 * expected.vertices) as usize);
-    let _ = lists.beams.try_reserve_exact((1.05 * expected.beams) as usize);
+    let _ = all.vertices.try_reserve_exact((1.05 * expected.vertices) as usize);
+    let _ = all.beams.try_reserve_exact((1.05 * expected.beams) as usize);
     for start in (0..chunks).step_by(wave as usize) {
         let buffers = &mut buffers[..(chunks - start).min(wave) as usize];
         let done =
@@ -95,14 +74,14 @@ pub(crate) fn light_pass<S: Scene, L: Lanes>(
             return None;
         }
         for out in buffers {
-            lists.vertices.append(&mut out.vertices);
-            lists.beams.append(&mut out.beams);
-            counters.add(&std::mem::take(&mut out.counters));
+            all.vertices.append(&mut out.vertices);
+            all.beams.append(&mut out.beams);
+            all.counters.add(&std::mem::take(&mut out.counters));
             take_splats(&out.splats);
             out.splats.clear();
         }
     }
-    Some(counters)
+    Some(all)
 }
 
 /// Room for one iteration.

@@ -7,6 +7,7 @@ use upbp_estimators::scene::{Camera, PixelRect, Scene};
 use upbp_estimators::{LightMap, PreparedScene};
 
 use super::engine::{Engine, SceneEngine};
+use super::renderer::Renderer;
 use crate::auto;
 use crate::deadline::{Budget, Canceller, Preparing, Stop};
 use crate::error::RenderError;
@@ -14,14 +15,6 @@ use crate::film::{Film, Image};
 use crate::plan::FrozenPlan;
 use crate::settings::CheckedSettings;
 use crate::state::{Identity, PassTimes, Record, SAMPLES, State};
-
-/// A render that has not begun.
-pub(super) struct Prepared<'a> {
-    pub(super) engine: Box<dyn Engine + 'a>,
-    pub(super) canceller: Canceller,
-    pub(super) reference: Option<Image>,
-    pub(super) state: State,
-}
 
 /// Circumstances of a render, besides its scene and settings.
 #[derive(Default)]
@@ -71,12 +64,12 @@ fn check_reference(image: &Image, rect: PixelRect) -> Result<(), RenderError> {
     Err(RenderError::Reference { expected: [rect.width, rect.height], found })
 }
 
-/// Prepares the scene, and chooses the plan unless one is given.
+/// Prepares the scene, and chooses the plan unless one is given: a render that has not begun.
 pub(super) fn prepare<'a, S: Scene>(
     scene: &'a S,
     settings: CheckedSettings,
     start: Start<'_>,
-) -> Result<Prepared<'a>, RenderError> {
+) -> Result<Renderer<'a>, RenderError> {
     let begun = Instant::now();
     let Start { plan, canceller, stop, reference, progress } = start;
     stop.check()?;
@@ -113,5 +106,5 @@ pub(super) fn prepare<'a, S: Scene>(
     } else {
         Box::new(SceneEngine::<S, f64> { scene: prepared, statistics, map: LightMap::empty() })
     };
-    Ok(Prepared { engine, canceller, reference, state: State { identity, record, film } })
+    Ok(Renderer::begin(engine, State { identity, record, film }, reference, canceller))
 }

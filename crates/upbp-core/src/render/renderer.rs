@@ -9,7 +9,7 @@ use upbp_estimators::{Counters, Features, IterationPlan};
 
 use super::engine::Engine;
 use super::passes::Buffers;
-use super::prepare::{Prepared, Start, prepare};
+use super::prepare::{Start, prepare};
 use super::stop::{Progress, StopReason};
 use crate::auto::technique_support::TechniqueSupport;
 use crate::deadline::{Canceller, Clock, Halt, Stop};
@@ -35,7 +35,7 @@ pub struct Renderer<'a> {
     pixels: Vec<Pixel>,
     /// One per pixel, or none if the film keeps none.
     features: Vec<Features>,
-    /// Sets of pixels that were last traced together, or would have been if the iteration had so many left.
+    /// Pixel sets per portion; adapts to `set_time`.
     portion: u32,
     /// Time that the camera sub-paths of a set of pixels took there.
     set_time: Duration,
@@ -91,14 +91,19 @@ impl<'a> Renderer<'a> {
         settings: CheckedSettings,
         start: Start<'_>,
     ) -> Result<Self, RenderError> {
-        Ok(Self::begin(prepare(scene, settings, start)?))
+        prepare(scene, settings, start)
     }
 
-    fn begin(Prepared { engine, canceller, reference, state }: Prepared<'a>) -> Self {
+    /// A render that is prepared, before its first iteration.
+    pub(super) fn begin(
+        engine: Box<dyn Engine + 'a>,
+        state: State,
+        reference: Option<Image>,
+        canceller: Canceller,
+    ) -> Self {
         /// Nanoseconds per sum of a pixel, where its memory is used for the first time.
         const SUM: u64 = 60;
-        let rect = state.film.rect();
-        let sums = u64::from(rect.width) * u64::from(rect.height) * (state.film.layers().len() as u64 + 2);
+        let sums = state.film.rect().pixels() * (state.film.layers().len() as u64 + 2);
         Self {
             engine,
             state,
@@ -229,7 +234,7 @@ impl<'a> Renderer<'a> {
                 if progress(&self.progress(stop)).is_break() {
                     return Err(StopReason::Cancelled);
                 }
-                // Does not count.
+                // Time in `progress` extends the deadline.
                 let spent = clock.lap();
                 halt.deadline = halt.deadline.and_then(|deadline| deadline.checked_add(spent));
                 shown = Instant::now();

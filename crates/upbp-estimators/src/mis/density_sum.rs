@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::{Add, Mul};
 
-use crate::technique::Technique;
+use crate::technique::{PerTechnique, Technique};
 
 /// A sum of densities of techniques, with their counts, as the heuristic takes them.
 ///
@@ -43,8 +43,8 @@ fn times(density: f64, factor: f64) -> f64 {
 /// Densities by technique.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ByTechnique {
-    /// Density of each technique, by its number.
-    pub of: [f64; Technique::ALL.len()],
+    /// Density of each technique.
+    pub of: PerTechnique<f64>,
 }
 
 impl Add for ByTechnique {
@@ -66,7 +66,7 @@ impl Mul<f64> for ByTechnique {
 }
 
 impl Densities for ByTechnique {
-    const ZERO: Self = Self { of: [0.0; Technique::ALL.len()] };
+    const ZERO: Self = Self { of: [0.0; Technique::COUNT] };
 
     #[inline]
     fn of(technique: Technique, density: f64) -> Self {

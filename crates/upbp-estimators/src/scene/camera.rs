@@ -60,6 +60,12 @@ impl PixelRect {
         Self { x: 0, y: 0, width, height }
     }
 
+    /// Number of pixels.
+    #[must_use]
+    pub const fn pixels(&self) -> u64 {
+        self.width as u64 * self.height as u64
+    }
+
     /// Whether this is a part of a film of some width and height, and not empty.
     #[must_use]
     pub fn is_part_of(&self, (width, height): (u32, u32)) -> bool {

@@ -1,10 +1,10 @@
-//! The pixels that a pilot render looks at.
+//! The pixels of a pilot render.
 
 use upbp_estimators::scene::PixelRect;
 
 use super::blocks;
 
-/// Cells of the picture, one pixel of each of which a pilot render looks at.
+/// Cells of the picture, one pixel of each of which a pilot render has.
 pub(crate) struct Grid {
     rect: PixelRect,
     side: f64,
@@ -30,8 +30,8 @@ impl Grid {
     }
 
     /// Pixels of the picture.
-    pub(crate) fn pixels(&self) -> f64 {
-        f64::from(self.rect.width) * f64::from(self.rect.height)
+    pub(crate) const fn pixels(&self) -> f64 {
+        self.rect.pixels() as f64
     }
 
     pub(crate) const fn columns(&self) -> usize {

@@ -1,8 +1,8 @@
 //! The pilot render: a few hundred pixels or more with all techniques, written down so that any plan can be
 //! judged by it.
 //!
-//! The walks carry the densities of every technique for itself, so that a sample comes with the part of each
-//! in its weight.
+//! The walks carry the densities of every technique for itself, so that a sample comes with the weights of
+//! all.
 
 mod blocks;
 pub(super) mod grid;
@@ -13,7 +13,9 @@ use std::ops::Range;
 use upbp_estimators::mis;
 use upbp_estimators::path::{Context, LightChunk, LightVertex, Splat};
 use upbp_estimators::scene::{Camera, Scene};
-use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Technique, TechniqueSet};
+use upbp_estimators::{
+    Counters, IterationPlan, LightMap, PerTechnique, PreparedScene, Technique, TechniqueSet,
+};
 use upbp_media::Lanes;
 
 use super::full_plan::pilot_plan;
@@ -24,7 +26,7 @@ use crate::deadline::Halt;
 use crate::plan::Plan;
 use crate::settings::CheckedSettings;
 use grid::Grid;
-use recorder::{ByRoulette, PerTechnique, Recorder, Sample, TECHNIQUES, add, passed};
+use recorder::{ByRoulette, Recorder, Sample, add, passed};
 
 /// Times that a pilot render samples each of its pixels: products of two samples tell what they have in
 /// common, as iterations that are stratified do.
@@ -60,7 +62,7 @@ impl Limits {
 /// The size of a pilot render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Size {
-    /// Pixels that it looks at.
+    /// Pixels that it renders.
     pub(super) pixels: u32,
     /// Light sub-paths for each of them. Some plans differ in rare bright photons only, as a few in front of
     /// the camera are.
@@ -73,21 +75,19 @@ impl Size {
 
     /// Pixels beyond which too little would be learnt.
     pub(super) fn most_pixels<S: Scene>(scene: &PreparedScene<'_, S>) -> u32 {
-        let crop = scene.scene.camera().crop();
-        crop.width.saturating_mul(crop.height).min(16_384)
+        scene.scene.camera().crop().pixels().min(16_384) as u32
     }
 
     /// Pixels from which on a choice is trusted: more where no media make them slow.
     pub(super) fn enough_pixels<S: Scene>(scene: &PreparedScene<'_, S>, techniques: TechniqueSet) -> u32 {
-        let crop = scene.scene.camera().crop();
         let media = techniques.intersects(TechniqueSet::VOLUME_MERGES);
         let part = if media { 12 } else { 4 };
-        (crop.width.saturating_mul(crop.height) / part).clamp(400, 2048)
+        (scene.scene.camera().crop().pixels() / part).clamp(400, 2048) as u32
     }
 }
 
 /// Samples and work of a pilot render. The picture is divided into cells, of each of which one pixel is
-/// looked at, several times.
+/// rendered, in several passes.
 pub(super) struct PilotRender {
     /// The plan that it is of, which it ran with [fewer light sub-paths](Self::plan_as_run).
     pub(super) plan: Plan,
@@ -96,14 +96,14 @@ pub(super) struct PilotRender {
     pub(super) cells: usize,
     /// Cells in a row.
     pub(super) columns: usize,
-    /// Looks at each cell.
+    /// Camera sub-paths of each cell.
     pub(super) passes: usize,
     /// Samples of camera sub-paths, by cell, then by pass, then by the light sub-path that was merged.
     pub(super) samples: Vec<Sample>,
     /// Ends of samples: `ends[cell * passes + pass]` is behind the last one of each.
     pub(super) ends: Vec<u32>,
     /// Contributions of light sub-paths to two pixels of a block, by merges or by splats.
-    pub(super) shared: Vec<Shared>,
+    pub(super) pairs: Vec<PixelPair>,
     /// Splats by cell. Light sub-paths fill the whole picture.
     pub(super) splats: Vec<(u32, Sample)>,
     /// Light sub-paths per pass over those of the plan, and the same of those with beams.
@@ -118,7 +118,7 @@ pub(super) struct PilotRender {
 }
 
 /// Merges with one light sub-path, or splats of one, at a pixel of a cell and at another one near it.
-pub(super) struct Shared {
+pub(super) struct PixelPair {
     pub(super) cell: u32,
     /// Number of the light sub-path.
     pub(super) path: u32,
@@ -175,7 +175,7 @@ impl PilotRender {
             passes: PASSES as usize,
             samples: Vec::new(),
             ends: Vec::new(),
-            shared: Vec::new(),
+            pairs: Vec::new(),
             splats: Vec::new(),
             thinning: [part(paths, plan.light_paths), part(beam_paths, plan.beam_paths)],
             work: Work::default(),
@@ -204,9 +204,9 @@ impl PilotRender {
         let camera_paths = f64::from(grid.cells() * PASSES);
         pilot.work = pilot.work(&passes, camera_paths, [paths, beam_paths].map(|n| f64::from(n * PASSES)));
         let partners = std::mem::take(&mut passes[0].partners);
-        pilot.shared = std::mem::take(&mut passes[0].shared_splats);
+        pilot.pairs = std::mem::take(&mut passes[0].splat_pairs);
         pilot.sort(passes);
-        pilot.share(&partners, &grid);
+        pilot.pair_partners(&partners, &grid);
         Some(pilot)
     }
 
@@ -227,10 +227,7 @@ impl PilotRender {
 
     /// Samples that the pilot render has over those that an iteration of the plan has.
     pub(super) const fn thinning(&self, technique: Technique) -> f64 {
-        match technique {
-            Technique::Hit | Technique::Nee | Technique::Connect => 1.0,
-            _ => self.thinning[technique.uses_beams() as usize],
-        }
+        if technique.is_per_camera_vertex() { 1.0 } else { self.thinning[technique.uses_beams() as usize] }
     }
 
     /// Light sub-paths that a technique's samples under another plan come from, relative to the plan of this
@@ -259,7 +256,7 @@ impl PilotRender {
     fn work(&self, passes: &[Pass], camera_paths: f64, [light_paths, beam_paths]: [f64; 2]) -> Work {
         let mut counters = Counters::default();
         let mut edges = ByRoulette::default();
-        let [mut calls, mut tests, mut samples] = [[edges; TECHNIQUES]; 3];
+        let [mut calls, mut tests, mut samples] = [[edges; Technique::COUNT]; 3];
         let mut points = [0.0; 2];
         for pass in passes {
             counters.add(&pass.counters);
@@ -318,8 +315,8 @@ impl PilotRender {
         }
     }
 
-    /// Keeps what pixels have in common with their partners, which had the light sub-paths of the first pass.
-    fn share(&mut self, partners: &[Recorder], grid: &Grid) {
+    /// Pairs pixels with their partners by the light sub-paths of the first pass that brought merges to both.
+    fn pair_partners(&mut self, partners: &[Recorder], grid: &Grid) {
         for cell in 0..self.cells {
             let Some((_, weight)) = grid.partner(cell as u32) else { continue };
             let Some(recorder) = partners.get(cell / PIECE) else { continue };
@@ -333,22 +330,22 @@ impl PilotRender {
                 let length = own[start..].partition_point(|sample| sample.merged == group[0].merged);
                 if length > 0 {
                     let samples = [own[start..start + length].to_vec(), group.to_vec()];
-                    self.shared.push(Shared { cell: cell as u32, path, weight, samples });
+                    self.pairs.push(PixelPair { cell: cell as u32, path, weight, samples });
                 }
             }
         }
     }
 
-    /// The samples of a look.
-    pub(super) fn look(&self, cell: usize, pass: usize) -> &[Sample] {
+    /// The samples of the camera sub-path of a cell in a pass.
+    pub(super) fn samples_of(&self, cell: usize, pass: usize) -> &[Sample] {
         &self.samples[self.range(cell, pass)]
     }
 
-    /// The places of the samples of a look.
+    /// The places of these samples among all.
     pub(super) fn range(&self, cell: usize, pass: usize) -> Range<usize> {
-        let look = cell * self.passes + pass;
-        let start = if look == 0 { 0 } else { self.ends[look - 1] };
-        start as usize..self.ends[look] as usize
+        let path = cell * self.passes + pass;
+        let start = if path == 0 { 0 } else { self.ends[path - 1] };
+        start as usize..self.ends[path] as usize
     }
 }
 
@@ -362,7 +359,7 @@ struct Pass {
     partners: Vec<Recorder>,
     splats: Vec<(u32, Sample)>,
     /// Pairs of splats of one light sub-path, if there are partners.
-    shared_splats: Vec<Shared>,
+    splat_pairs: Vec<PixelPair>,
     counters: Counters,
     /// Photon points on surfaces and in media, where they are queried.
     points: [usize; 2],
@@ -390,7 +387,7 @@ impl Pass {
             camera: Vec::new(),
             partners: Vec::new(),
             splats: Vec::new(),
-            shared_splats: Vec::new(),
+            splat_pairs: Vec::new(),
             counters: Counters::default(),
             points: [0; 2],
         };
@@ -403,7 +400,7 @@ impl Pass {
             pass.counters.add(&out.counters);
             if with_partners {
                 let firsts = [piece * PIECE, pass.splats.len()];
-                pass.shared_splats.extend(shared_splats(&recorder, &out.splats, firsts, step, grid));
+                pass.splat_pairs.extend(splat_pairs(&recorder, &out.splats, firsts, step, grid));
             }
             // A splat goes with each sample.
             let cells = out.splats.iter().map(|splat| grid.cell(splat.pixel));
@@ -442,13 +439,13 @@ impl Pass {
 /// Pairs of splats of one light sub-path at pixels of one block: every splat in `step` with another one,
 /// which is drawn and stands for all others. Light sub-path and splat that come first have these numbers in
 /// their pass.
-fn shared_splats<'a>(
+fn splat_pairs<'a>(
     recorder: &'a Recorder,
     splats: &'a [Splat],
     [first_path, first]: [usize; 2],
     step: usize,
     grid: &'a Grid,
-) -> impl Iterator<Item = Shared> + 'a {
+) -> impl Iterator<Item = PixelPair> + 'a {
     let per_pixel = f64::from(grid.cells()) / grid.pixels();
     let of_path = move |(path, range): (usize, Range<usize>)| {
         let count = range.len();
@@ -459,7 +456,7 @@ fn shared_splats<'a>(
             let [from, to] = [own, other].map(|i| splats[i].pixel.map(u32::cast_signed));
             let others = ((count - 1) * step) as f64;
             let weight = per_pixel * others * blocks::weight([to[0] - from[0], to[1] - from[1]]);
-            (weight > 0.0).then(|| Shared {
+            (weight > 0.0).then(|| PixelPair {
                 cell: grid.cell(splats[own].pixel),
                 path: (first_path + path) as u32,
                 weight,
@@ -495,7 +492,7 @@ mod tests {
                         merged: None,
                         albedos: 1.0,
                         value,
-                        shares: [0.0; TECHNIQUES],
+                        weights: [0.0; Technique::COUNT],
                     });
                     let pixel = [(11 * i % 24) as u32, (7 * i % 20) as u32];
                     splats.push(Splat { pixel, value: Spectrum::splat(1.0) });
@@ -513,9 +510,9 @@ mod tests {
             let draws = 30_000;
             let mut found = 0.0;
             for first in 0..draws {
-                for shared in shared_splats(&recorder, &splats, [0, first], step, &grid) {
-                    let [own, other] = shared.samples.each_ref().map(|samples| f64::from(samples[0].value.x));
-                    found += shared.weight * own * other / draws as f64;
+                for pair in splat_pairs(&recorder, &splats, [0, first], step, &grid) {
+                    let [own, other] = pair.samples.each_ref().map(|samples| f64::from(samples[0].value.x));
+                    found += pair.weight * own * other / draws as f64;
                 }
             }
             assert!((found / expected - 1.0).abs() < 0.01, "{step}: {found}, expected {expected}");

@@ -1,28 +1,21 @@
-//! Samples with the parts of all techniques in their weights, and counts of work, as the walks of a pilot
-//! render make them.
+//! Samples with the weights of all techniques, and counts of work, as the walks of a pilot render make them.
 
 use std::ops::Range;
 
 use glam::{Vec2, Vec3};
-use upbp_estimators::Technique;
 use upbp_estimators::mis;
 use upbp_estimators::mis::Densities;
 use upbp_estimators::observer::{Completion, LightEnd, ObservedSample, ObservedVertex, Observer};
 use upbp_estimators::scene::CameraRay;
+use upbp_estimators::{PerTechnique, Technique};
 
 use crate::auto::parallel_walks::SampleRoom;
 use crate::auto::roulette;
 
-/// The least part of a technique that can find a path. A connection through a hundred mean free paths has
-/// next to no value, and no other technique has a part of it that single precision could divide by: that must
-/// not look as if only connections found this light.
-const LEAST_SHARE: f64 = 1e-30;
-
-/// The number of techniques.
-pub(crate) const TECHNIQUES: usize = Technique::ALL.len();
-
-/// A value for each technique.
-pub(crate) type PerTechnique<T> = [T; TECHNIQUES];
+/// The least weight of a technique that can find a path. A connection through a hundred mean free paths has
+/// next to no value, and no other technique has a weight there that single precision could divide by: that
+/// must not look as if only connections found this light.
+const LEAST_WEIGHT: f64 = 1e-30;
 
 /// A sample, weighted as when everything runs.
 #[derive(Clone, Copy, Debug)]
@@ -33,8 +26,8 @@ pub(crate) struct Sample {
     pub(crate) value: Vec3,
     /// Product of the albedos of the camera vertices that scattered before.
     pub(crate) albedos: f32,
-    /// [Parts](shares) of all techniques in the weights of its path; they sum to one.
-    pub(crate) shares: [f32; TECHNIQUES],
+    /// [Weights](mis_weights) of all techniques on its path; they sum to one.
+    pub(crate) weights: PerTechnique<f32>,
 }
 
 /// Counts of camera sub-paths' work, by the number of a roulette.
@@ -97,15 +90,15 @@ impl<B> Observer<B> for Recorder {
             merged,
             albedos: self.albedos,
             value: Vec3::from((value * weight.value() as f32).to_array()),
-            shares: shares(&weight.all),
+            weights: mis_weights(&weight.all),
         });
     }
 }
 
-/// Parts of all techniques in the sum of their densities.
-pub(crate) fn shares(densities: &mis::ByTechnique) -> PerTechnique<f32> {
+/// Weights of all techniques by the balance heuristic: their parts in the sum of all densities.
+pub(crate) fn mis_weights(densities: &mis::ByTechnique) -> PerTechnique<f32> {
     let total = densities.total();
-    densities.of.map(|density| if density > 0.0 { (density / total).max(LEAST_SHARE) as f32 } else { 0.0 })
+    densities.of.map(|density| if density > 0.0 { (density / total).max(LEAST_WEIGHT) as f32 } else { 0.0 })
 }
 
 impl Recorder {

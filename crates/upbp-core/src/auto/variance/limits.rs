@@ -33,7 +33,7 @@ pub(super) fn relative_to(means: &[DVec3]) -> Vec<DVec3> {
 }
 
 /// Factors of values, by the parts that their squares have: none is to be above the [limit](largest).
-pub(super) fn reductions(parts: &[f64]) -> Vec<f32> {
+pub(super) fn limiting_factors(parts: &[f64]) -> Vec<f32> {
     let most = largest(parts.to_vec());
     parts.iter().map(|part| if *part > most { (most / part).sqrt() as f32 } else { 1.0 }).collect()
 }

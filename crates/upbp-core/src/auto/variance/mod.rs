@@ -3,24 +3,23 @@
 //! With the balance heuristic, the second moment of single samples is `∫ f²/S`, `S` the sum of the densities
 //! of all techniques with their counts; it can be estimated for every `S` by the samples of a pilot render
 //! (`docs/theory.md`, section 6.2), and knows of paths that the techniques of a plan would find once in a
-//! million years. What samples of one camera sub-path have in common is added: photons that are merged with
-//! one vertex share its error, and those of one light sub-path share that of their own.
+//! million years. Products of the samples of one camera sub-path are added: photons that are merged with one
+//! vertex share its error, and those of one light sub-path share that of their own.
 
 mod limits;
 mod sample_pairs;
-mod shared_sub_paths;
 #[cfg(test)]
 pub(super) mod tests;
 
 use glam::DVec3;
 
-use upbp_estimators::{Technique, TechniqueSet};
+use upbp_estimators::{PerTechnique, Technique, TechniqueSet};
 
-use super::pilot_render::recorder::{PerTechnique, Sample, TECHNIQUES};
-use super::pilot_render::{PilotRender, Shared};
+use super::pilot_render::recorder::Sample;
+use super::pilot_render::{PilotRender, PixelPair};
 use crate::plan::Plan;
-use limits::{reductions, relative_to, surroundings};
-use sample_pairs::{Excess, Looks, View, density_of_pilot, mean_photons};
+use limits::{limiting_factors, relative_to, surroundings};
+use sample_pairs::{Excess, ReadySamples, Reweighted, density_of_pilot, mean_photons};
 
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
@@ -55,9 +54,9 @@ impl Counts {
         // Camera sub-paths are never told apart by how they find the light.
         let techniques = plan.techniques.union(TechniqueSet::PT);
         let mut counts = Self {
-            relative: [0.0; TECHNIQUES],
+            relative: [0.0; Technique::COUNT],
             paths: [Technique::Surf, Technique::Bb1d].map(|technique| pilot.relative_paths(technique, plan)),
-            active: [1.0; TECHNIQUES],
+            active: [1.0; Technique::COUNT],
             camera_factor: f64::from(plan.camera_factor),
             roulette: pilot.roulette(plan),
             light_paths: f64::from(if plan.techniques.intersects(TechniqueSet::BEAMS) {
@@ -70,7 +69,7 @@ impl Counts {
         for technique in techniques.iter() {
             let active = plan.active_part(technique);
             counts.active[technique as usize] = active;
-            counts.relative[technique as usize] = if has_camera_factor(technique) {
+            counts.relative[technique as usize] = if technique.is_per_camera_vertex() {
                 1.0
             } else {
                 active * pilot.relative_photons(technique, plan)
@@ -80,50 +79,44 @@ impl Counts {
     }
 }
 
-/// Whether a technique has the camera factor in its weights: as many samples as camera vertices make, however
-/// many light sub-paths there are.
-const fn has_camera_factor(technique: Technique) -> bool {
-    matches!(technique, Technique::Hit | Technique::Nee | Technique::Connect)
-}
-
 /// A pilot render, made ready for predictions.
 pub(super) struct Variance {
     /// Splats and counts; values are relative to the radiance around them.
     pilot: PilotRender,
-    looks: Looks,
+    samples: ReadySamples,
 }
 
 impl Variance {
     /// Takes a pilot render. Samples that say too much are made smaller, and so are those of camera sub-paths
-    /// that do together. Not so what pixels have in common: it is in few light sub-paths by its nature.
+    /// that do together. Not so pairs of pixels: what these share is in few light sub-paths by its nature.
     pub(super) fn of(mut pilot: PilotRender) -> Self {
         pilot.make_relative(&relative_to(&surroundings(&pilot.means(), pilot.columns)));
-        let per_look = 1.0 / (pilot.cells * pilot.passes) as f64;
-        let mut parts: Vec<f64> = pilot.samples.iter().map(|s| per_look * pilot.second_moment(s)).collect();
+        let per_path = 1.0 / (pilot.cells * pilot.passes) as f64;
+        let mut parts: Vec<f64> = pilot.samples.iter().map(|s| per_path * pilot.second_moment(s)).collect();
         parts.extend(pilot.splats.iter().map(|(_, splat)| pilot.per_splat() * pilot.second_moment(splat)));
-        let by_sample = reductions(&parts);
+        let by_sample = limiting_factors(&parts);
         let splats = pilot.splats.iter_mut().map(|(_, splat)| splat);
-        for (sample, reduction) in pilot.samples.iter_mut().chain(splats).zip(by_sample) {
-            sample.value *= reduction;
+        for (sample, factor) in pilot.samples.iter_mut().chain(splats).zip(by_sample) {
+            sample.value *= factor;
         }
-        let looks = (0..pilot.cells).flat_map(|cell| (0..pilot.passes).map(move |pass| (cell, pass)));
+        let camera_paths = (0..pilot.cells).flat_map(|cell| (0..pilot.passes).map(move |pass| (cell, pass)));
         let together = |(cell, pass)| {
-            let sum: DVec3 = pilot.look(cell, pass).iter().map(|s| s.value.as_dvec3()).sum();
+            let sum: DVec3 = pilot.samples_of(cell, pass).iter().map(|s| s.value.as_dvec3()).sum();
             sum.length_squared()
         };
-        let parts: Vec<f64> = looks.clone().map(together).collect();
-        for ((cell, pass), reduction) in looks.clone().zip(reductions(&parts)) {
+        let parts: Vec<f64> = camera_paths.clone().map(together).collect();
+        for ((cell, pass), factor) in camera_paths.zip(limiting_factors(&parts)) {
             let range = pilot.range(cell, pass);
-            pilot.samples[range].iter_mut().for_each(|sample| sample.value *= reduction);
+            pilot.samples[range].iter_mut().for_each(|sample| sample.value *= factor);
         }
-        let looks = Looks::new(&pilot);
+        let samples = ReadySamples::new(&pilot);
         pilot.samples = Vec::new();
-        Self { pilot, looks }
+        Self { pilot, samples }
     }
 
     /// Whether the pilot render met any light.
     pub(super) fn sees_light(&self) -> bool {
-        !self.looks.is_empty() || !self.pilot.splats.is_empty()
+        !self.samples.is_empty() || !self.pilot.splats.is_empty()
     }
 
     /// The pilot render, without its samples.
@@ -138,7 +131,7 @@ impl Variance {
     }
 
     /// Variances of blocks of pixels, times their pixels, mean over [sides](crate::film::BLOCK_SIDES) of
-    /// blocks: what pixels have in common counts once for each of them.
+    /// blocks: what a pair of pixels shares counts once for each of them.
     ///
     /// The gain of more light sub-paths than the pilot render's is told by rare paths at their face value:
     /// the charge for them guards against techniques that a pilot render knows too little of, and numbers of
@@ -155,13 +148,13 @@ impl Variance {
         std::array::from_fn(|group| finite_or_infinite((variance[group] + charges[group]) * more))
     }
 
-    /// Variances of blocks without what rare paths are charged for, and those charges. What pixels have in
-    /// common is grouped by light sub-path: all cells meet the same ones.
+    /// Variances of blocks without what rare paths are charged for, and those charges. Pairs of pixels are
+    /// grouped by light sub-path: all cells meet the same ones.
     fn over_scales_with(&self, counts: &Counts) -> [[f64; GROUPS]; 2] {
         let [mut variance, charges] = self.parts(counts);
-        let view = View::new(&self.pilot, &self.looks, counts);
-        for shared in &self.pilot.shared {
-            variance[group(shared.path as usize)] += view.in_common(shared) / self.pilot.cells as f64;
+        let reweighted = Reweighted::new(&self.pilot, &self.samples, counts);
+        for pair in &self.pilot.pairs {
+            variance[group(pair.path as usize)] += reweighted.pair_product(pair) / self.pilot.cells as f64;
         }
         [variance, charges]
     }
@@ -174,20 +167,20 @@ impl Variance {
     /// Variances of pixels without what rare paths are charged for, and those charges.
     fn parts(&self, counts: &Counts) -> [[f64; GROUPS]; 2] {
         let pilot = &self.pilot;
-        let mut view = View::new(pilot, &self.looks, counts);
+        let mut reweighted = Reweighted::new(pilot, &self.samples, counts);
         let mut groups = [Moments::default(); GROUPS];
         let mut charges = RareCharges::default();
         for cell in 0..pilot.cells {
-            groups[group(cell)].add(&self.of_cell(cell, &mut view, &mut charges));
+            groups[group(cell)].add(&self.of_cell(cell, &mut reweighted, &mut charges));
         }
         let mut variance = variances(&groups, counts.light_paths).map(|sum| sum / pilot.cells as f64);
         let mean_photons = mean_photons(pilot);
         for (cell, splat) in &pilot.splats {
             let group = group(*cell as usize);
-            let share = view.share(&splat.shares);
+            let densities = reweighted.densities(&splat.weights);
             let square = pilot.second_moment(splat) as f32;
-            variance[group] += pilot.per_splat() * f64::from(share.single(square));
-            if let Some(excess) = share.excess(square, density_of_pilot(&splat.shares, &mean_photons)) {
+            variance[group] += pilot.per_splat() * f64::from(densities.single(square));
+            if let Some(excess) = densities.excess(square, density_of_pilot(&splat.weights, &mean_photons)) {
                 charges.add(group, pilot.per_splat(), &excess);
             }
         }
@@ -195,18 +188,18 @@ impl Variance {
     }
 
     /// Moments of the samples of a cell.
-    fn of_cell(&self, cell: usize, view: &mut View<'_>, charges: &mut RareCharges) -> Moments {
+    fn of_cell(&self, cell: usize, reweighted: &mut Reweighted<'_>, charges: &mut RareCharges) -> Moments {
         let passes = self.pilot.passes as f64;
         let mut moments = Moments::default();
         let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
         for pass in 0..self.pilot.passes {
-            let look = view.look(cell * self.pilot.passes + pass);
-            moments.single += look.single / passes;
-            moments.light += look.light / passes;
-            moments.pairs += look.products / passes;
-            charges.add(group(cell), 1.0 / (passes * self.pilot.cells as f64), &look.excess);
-            sum += look.sum;
-            squares += look.sum.length_squared();
+            let path = reweighted.moments(cell * self.pilot.passes + pass);
+            moments.single += path.single / passes;
+            moments.light += path.light / passes;
+            moments.pairs += path.products / passes;
+            charges.add(group(cell), 1.0 / (passes * self.pilot.cells as f64), &path.excess);
+            sum += path.sum;
+            squares += path.sum.length_squared();
         }
         // Products of different passes have no part of their own variance.
         moments.mean_square = (sum.length_squared() - squares) / (passes * (passes - 1.0));
@@ -302,7 +295,7 @@ impl PilotRender {
     fn means(&self) -> Vec<DVec3> {
         let passes = self.passes as f64;
         let of_cell = |cell| {
-            let samples = (0..self.passes).flat_map(|pass| self.look(cell, pass));
+            let samples = (0..self.passes).flat_map(|pass| self.samples_of(cell, pass));
             samples.map(|sample| sample.value.as_dvec3()).sum::<DVec3>() / passes
         };
         let mut means: Vec<DVec3> = (0..self.cells).map(of_cell).collect();
@@ -324,7 +317,7 @@ impl PilotRender {
         for (cell, splat) in &mut self.splats {
             times(splat, factors[*cell as usize]);
         }
-        for Shared { cell, samples, .. } in &mut self.shared {
+        for PixelPair { cell, samples, .. } in &mut self.pairs {
             samples.iter_mut().flatten().for_each(|sample| times(sample, factors[*cell as usize]));
         }
     }

@@ -1,27 +1,28 @@
-//! Covariances of the samples of one camera sub-path.
+//! Samples of the pilot render under another plan: their moments, and products of pairs of them. A pair is of
+//! one camera sub-path, or of one light sub-path at two pixels.
 
 use std::num::NonZeroU32;
 
 use glam::{DVec3, Vec3};
-use upbp_estimators::Technique;
+use upbp_estimators::{PerTechnique, Technique};
 
-use super::{Counts, TRUSTED, has_camera_factor};
-use crate::auto::pilot_render::PilotRender;
-use crate::auto::pilot_render::recorder::{Sample, TECHNIQUES};
+use super::{Counts, TRUSTED};
+use crate::auto::pilot_render::recorder::Sample;
+use crate::auto::pilot_render::{PilotRender, PixelPair};
 use crate::auto::roulette::{COUNT, relative_pass_probability};
 
 /// The samples of a pilot render, ready for the predictions of many plans.
-pub(super) struct Looks {
-    /// By look, those after most albedos first.
+pub(super) struct ReadySamples {
+    /// By camera sub-path, those after most albedos first.
     samples: Vec<ReadySample>,
-    /// Index behind the last of each look, and its number of light sub-paths with several photons.
+    /// Index behind the last of each camera sub-path, and its number of light sub-paths with several photons.
     ends: Vec<(u32, u32)>,
 }
 
 /// A sample, with all that no plan changes.
 struct ReadySample {
     technique: Technique,
-    /// The number, in its look and from 1, of a light sub-path with several photons.
+    /// The number, in its camera sub-path and from 1, of a light sub-path with several photons.
     light_path: Option<NonZeroU32>,
     albedos: f32,
     /// Weight relative to that in the pilot render, by the number of a roulette: walks get to it less often.
@@ -32,22 +33,23 @@ struct ReadySample {
     /// Density of the path with the pilot render's plan, mean over iterations, relative to the first
     /// iteration.
     of_pilot: f32,
-    shares: [f32; TECHNIQUES],
+    /// Balance-heuristic weights of all techniques on its path.
+    weights: PerTechnique<f32>,
 }
 
-impl Looks {
-    /// Takes the samples of a pilot.
+impl ReadySamples {
+    /// Takes the samples of a pilot render.
     pub(super) fn new(pilot: &PilotRender) -> Self {
-        let mut looks = Self { samples: Vec::with_capacity(pilot.samples.len()), ends: Vec::new() };
+        let mut ready = Self { samples: Vec::with_capacity(pilot.samples.len()), ends: Vec::new() };
         let mean_photons = mean_photons(pilot);
         let of_one_path = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
-        for look in 0..pilot.cells * pilot.passes {
-            let start = looks.samples.len();
+        for path in 0..pilot.cells * pilot.passes {
+            let start = ready.samples.len();
             let mut light_paths = 0;
-            for photons in pilot.look(look / pilot.passes, look % pilot.passes).chunk_by(of_one_path) {
+            for photons in pilot.samples_of(path / pilot.passes, path % pilot.passes).chunk_by(of_one_path) {
                 light_paths += u32::from(photons.len() > 1);
                 let light_path = if photons.len() > 1 { NonZeroU32::new(light_paths) } else { None };
-                looks.samples.extend(photons.iter().map(|sample| ReadySample {
+                ready.samples.extend(photons.iter().map(|sample| ReadySample {
                     technique: sample.technique,
                     light_path,
                     albedos: sample.albedos,
@@ -56,14 +58,14 @@ impl Looks {
                     }),
                     value: sample.value,
                     square: pilot.second_moment(sample) as f32,
-                    of_pilot: density_of_pilot(&sample.shares, &mean_photons),
-                    shares: sample.shares,
+                    of_pilot: density_of_pilot(&sample.weights, &mean_photons),
+                    weights: sample.weights,
                 }));
             }
-            looks.samples[start..].sort_by(|a, b| a.albedos.total_cmp(&b.albedos));
-            looks.ends.push((looks.samples.len() as u32, light_paths));
+            ready.samples[start..].sort_by(|a, b| a.albedos.total_cmp(&b.albedos));
+            ready.ends.push((ready.samples.len() as u32, light_paths));
         }
-        looks
+        ready
     }
 
     /// Whether there are no samples at all.
@@ -71,17 +73,17 @@ impl Looks {
         self.samples.is_empty()
     }
 
-    /// The samples of a look, and its number of light sub-paths.
-    fn of(&self, look: usize) -> (&[ReadySample], u32) {
-        let start = if look == 0 { 0 } else { self.ends[look - 1].0 };
-        let (end, light_paths) = self.ends[look];
+    /// The samples of a camera sub-path, and its number of light sub-paths with several photons.
+    fn of(&self, path: usize) -> (&[ReadySample], u32) {
+        let start = if path == 0 { 0 } else { self.ends[path - 1].0 };
+        let (end, light_paths) = self.ends[path];
         (&self.samples[start as usize..end as usize], light_paths)
     }
 }
 
-/// A look under a plan.
+/// Moments of the samples of a camera sub-path under a plan.
 #[derive(Default)]
-pub(super) struct Look {
+pub(super) struct PathMoments {
     /// Second moments of single samples.
     pub(super) single: f64,
     /// The part of `single` that is due to light sub-paths: to splats and merges.
@@ -90,22 +92,22 @@ pub(super) struct Look {
     pub(super) excess: Excess,
     /// Products of all pairs of different samples.
     pub(super) products: f64,
-    /// All samples.
+    /// Sum of all samples.
     pub(super) sum: DVec3,
 }
 
-/// Looks with the eyes of a plan.
-pub(super) struct View<'a> {
-    looks: &'a Looks,
+/// The samples of a pilot render under another plan.
+pub(super) struct Reweighted<'a> {
+    samples: &'a ReadySamples,
     roulette: usize,
     /// Samples of each technique relative to the pilot render's plan.
-    relative: [f32; TECHNIQUES],
+    relative: PerTechnique<f32>,
     /// Samples of each technique, relative, times their factors in the weights.
-    weighted: [f32; TECHNIQUES],
+    weighted: PerTechnique<f32>,
     /// The factor of emission hits, next events and connections.
     camera_factor: f32,
     /// Extra weight of pairs of samples of one camera sub-path, which makes the queries for both or for none.
-    common: [f32; TECHNIQUES],
+    common: PerTechnique<f32>,
     /// Pairs of photons of one light sub-path that the plan has, less those of the pilot render: by points
     /// and by beams.
     more: [f32; 2],
@@ -113,17 +115,17 @@ pub(super) struct View<'a> {
     periodic: bool,
     /// Sums of what was found of a light sub-path: by class and, where queries are periodic, by technique.
     by_class: Vec<[Vec3; 2]>,
-    by_technique: Vec<[Vec3; TECHNIQUES]>,
+    by_technique: Vec<PerTechnique<Vec3>>,
 }
 
-impl<'a> View<'a> {
-    pub(super) fn new(pilot: &PilotRender, looks: &'a Looks, counts: &Counts) -> Self {
+impl<'a> Reweighted<'a> {
+    pub(super) fn new(pilot: &PilotRender, samples: &'a ReadySamples, counts: &Counts) -> Self {
         Self {
-            looks,
+            samples,
             roulette: counts.roulette,
             relative: counts.relative.map(|count| count as f32),
             weighted: Technique::ALL.map(|technique| {
-                let factor = if has_camera_factor(technique) { counts.camera_factor } else { 1.0 };
+                let factor = if technique.is_per_camera_vertex() { counts.camera_factor } else { 1.0 };
                 (factor * counts.relative[technique as usize]) as f32
             }),
             camera_factor: counts.camera_factor as f32,
@@ -135,16 +137,16 @@ impl<'a> View<'a> {
         }
     }
 
-    /// A look at what one camera sub-path found.
-    pub(super) fn look(&mut self, look: usize) -> Look {
-        if self.periodic { self.look_at::<true>(look) } else { self.look_at::<false>(look) }
+    /// The moments of a camera sub-path.
+    pub(super) fn moments(&mut self, path: usize) -> PathMoments {
+        if self.periodic { self.path_moments::<true>(path) } else { self.path_moments::<false>(path) }
     }
 
-    fn look_at<const PERIODIC: bool>(&mut self, look: usize) -> Look {
-        let mut result = Look::default();
+    fn path_moments<const PERIODIC: bool>(&mut self, path: usize) -> PathMoments {
+        let mut result = PathMoments::default();
         let mut all = [Vec3::ZERO; 2];
-        let mut all_by_technique = [Vec3::ZERO; TECHNIQUES];
-        let (samples, light_paths) = self.looks.of(look);
+        let mut all_by_technique = [Vec3::ZERO; Technique::COUNT];
+        let (samples, light_paths) = self.samples.of(path);
         self.by_class.clear();
         self.by_class.resize(light_paths as usize, all);
         if PERIODIC {
@@ -153,14 +155,14 @@ impl<'a> View<'a> {
         }
         for sample in samples {
             let i = sample.technique as usize;
-            let share = self.share(&sample.shares);
+            let densities = self.densities(&sample.weights);
             let per_walk = sample.per_walk[self.roulette];
-            result.single += f64::from(per_walk * share.single(sample.square));
-            result.light += f64::from(per_walk * share.light(sample.square));
-            if let Some(excess) = share.excess(per_walk * sample.square, sample.of_pilot) {
+            result.single += f64::from(per_walk * densities.single(sample.square));
+            result.light += f64::from(per_walk * densities.light(sample.square));
+            if let Some(excess) = densities.excess(per_walk * sample.square, sample.of_pilot) {
                 result.excess.add(&excess);
             }
-            let weight = self.weighted[i] * share.inverse;
+            let weight = self.weighted[i] * densities.inverse;
             // Neither without samples nor without a number.
             if !(weight > 0.0) {
                 continue;
@@ -193,25 +195,45 @@ impl<'a> View<'a> {
     }
 
     /// The factor of a sample under the plan.
-    pub(super) fn weight(&self, technique: Technique, shares: &[f32; TECHNIQUES]) -> f32 {
-        self.weighted[technique as usize] * self.share(shares).inverse
+    fn factor(&self, sample: &Sample) -> f32 {
+        self.weighted[sample.technique as usize] * self.densities(&sample.weights).inverse
     }
 
-    /// Pairs of merges with one light sub-path, by two camera sub-paths, over those of the pilot render: the
-    /// ones with a photon point, then the ones with beams alone.
-    pub(super) fn pairs_relative(&self) -> [f32; 2] {
-        self.more.map(|more| 1.0 + more)
+    /// Product of what one light sub-path brings to two pixels under the plan, times its weight in the errors
+    /// of blocks.
+    ///
+    /// A covariance is less by the product of the means over the number of light sub-paths: little where
+    /// each of them meets a small part of the picture.
+    pub(super) fn pair_product(&self, pair: &PixelPair) -> f64 {
+        let [own, other] = pair.samples.each_ref().map(|samples| self.sums_by_class(samples));
+        let with_points = own[0].dot(other[0] + other[1]) + own[1].dot(other[0]);
+        // Pairs that the plan has, over those of the pilot render.
+        let [points, beams] = self.more.map(|more| 1.0 + more);
+        pair.weight * f64::from(points * with_points + beams * own[1].dot(other[1]))
     }
 
-    /// The densities of the plan at a sample's path.
+    /// Sums of samples by points and by beams.
+    fn sums_by_class(&self, samples: &[Sample]) -> [Vec3; 2] {
+        let mut sums = [Vec3::ZERO; 2];
+        for sample in samples {
+            let factor = self.factor(sample);
+            // Neither without samples nor without a number.
+            if factor > 0.0 {
+                sums[usize::from(sample.technique.uses_beams())] += sample.value * factor;
+            }
+        }
+        sums
+    }
+
+    /// The densities of the plan at the path of a sample with these weights.
     #[inline]
-    pub(super) fn share(&self, shares: &[f32; TECHNIQUES]) -> Share {
-        let [a, b, c, d, e, f, g, h, i]: [f32; TECHNIQUES] =
-            std::array::from_fn(|i| shares[i] * self.relative[i]);
+    pub(super) fn densities(&self, weights: &PerTechnique<f32>) -> PathDensities {
+        let [a, b, c, d, e, f, g, h, i]: PerTechnique<f32> =
+            std::array::from_fn(|i| weights[i] * self.relative[i]);
         // Not one after the other: the search has nothing else to wait for.
         let (camera, light) = ((a + b) + c, (((e + f) + (g + h)) + i) + d);
         let weighted = self.camera_factor * camera;
-        Share {
+        PathDensities {
             light,
             all: self.camera_factor * weighted + light,
             density: camera + light,
@@ -220,8 +242,8 @@ impl<'a> View<'a> {
     }
 }
 
-/// Densities of techniques relative to those of the pilot render.
-pub(super) struct Share {
+/// Densities of a path by the techniques of a plan, relative to that of the pilot render.
+pub(super) struct PathDensities {
     /// Of light tracing and of merges.
     light: f32,
     /// Of all, each with the square of its factor in the weights.
@@ -232,7 +254,7 @@ pub(super) struct Share {
     inverse: f32,
 }
 
-impl Share {
+impl PathDensities {
     /// The part in the second moment of single samples of one whose square is `square`.
     #[inline]
     pub(super) fn single(&self, square: f32) -> f32 {
@@ -276,11 +298,11 @@ impl Excess {
 
 /// Photons of each technique in a query of the pilot render's plan, mean over iterations, relative to the
 /// first iteration.
-pub(super) fn mean_photons(pilot: &PilotRender) -> [f32; TECHNIQUES] {
+pub(super) fn mean_photons(pilot: &PilotRender) -> PerTechnique<f32> {
     Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32)
 }
 
 /// Density of a path with the pilot render's plan, mean over iterations, relative to the first iteration.
-pub(super) fn density_of_pilot(shares: &[f32; TECHNIQUES], mean_photons: &[f32; TECHNIQUES]) -> f32 {
-    shares.iter().zip(mean_photons).map(|(share, photons)| share * photons).sum()
+pub(super) fn density_of_pilot(weights: &PerTechnique<f32>, mean_photons: &PerTechnique<f32>) -> f32 {
+    weights.iter().zip(mean_photons).map(|(weight, photons)| weight * photons).sum()
 }

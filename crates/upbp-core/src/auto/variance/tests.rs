@@ -3,15 +3,15 @@
 use glam::Vec3;
 use proptest::prelude::*;
 use upbp_estimators::scene::PixelRect;
-use upbp_estimators::{MergePeriods, RadiusField, Technique};
+use upbp_estimators::{MergePeriods, Technique};
 
 use super::limits::{DARKNESS, LARGEST_PART, largest, relative_to, surroundings};
 use super::*;
 use crate::auto::pilot_render::grid::Grid;
-use crate::auto::pilot_render::recorder::shares;
+use crate::auto::pilot_render::recorder::mis_weights;
 use crate::auto::pilot_render::{PASSES, Work};
 use crate::auto::roulette::{self, COUNT, OF_PILOT, PILOT, relative_pass_probability};
-use crate::radius_schedule::RadiusSchedule;
+use crate::plan::tests::plan;
 
 const SIDE: u32 = 128;
 
@@ -35,11 +35,11 @@ fn pilot_of(other: Technique) -> PilotRender {
     for i in 0..cells * passes {
         for (technique, x) in [(Technique::Hit, uniform(i, 0)), (other, uniform(i, 1).sqrt())] {
             let sum = 1.0 + 2.0 * x;
-            let mut shares = [0.0; TECHNIQUES];
-            shares[Technique::Hit as usize] = (1.0 / sum) as f32;
-            shares[other as usize] = (2.0 * x / sum) as f32;
+            let mut weights = [0.0; Technique::COUNT];
+            weights[Technique::Hit as usize] = (1.0 / sum) as f32;
+            weights[other as usize] = (2.0 * x / sum) as f32;
             let value = Vec3::splat((3.0 * x * x / sum) as f32);
-            samples.push(Sample { technique, merged: None, albedos: 1.0, value, shares });
+            samples.push(Sample { technique, merged: None, albedos: 1.0, value, weights });
         }
         ends.push(samples.len() as u32);
     }
@@ -51,7 +51,7 @@ fn pilot_of(other: Technique) -> PilotRender {
         passes,
         samples,
         ends,
-        shared: Vec::new(),
+        pairs: Vec::new(),
         splats: Vec::new(),
         thinning: [1.0; 2],
         work: Work::default(),
@@ -63,37 +63,22 @@ fn pilot_of(other: Technique) -> PilotRender {
 
 /// Samples of some techniques, and light sub-paths, relative to those of the plan.
 pub(in crate::auto) fn planned(paths: u32) -> Plan {
-    let radii = RadiusSchedule {
-        surf: 0.0,
-        pp3d: 0.0,
-        pb2d: 0.0,
-        bp2d: 0.0,
-        bb1d: 0.0,
-        field: RadiusField::Uniform,
-        most_mean_free_paths: None,
-        progressive: true,
-        floor: 1e-6,
-    };
     Plan {
         techniques: TechniqueSet::ALL,
         light_paths: paths,
         beam_paths: paths,
-        connections: 1.0,
-        next_events: 1.0,
         camera_factor: 1.0,
         roulette: OF_PILOT,
         periods: MergePeriods::ONE,
-        vertices_per_light_path: 1.0,
-        lanes: None,
-        radii,
+        ..plan()
     }
 }
 
 fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts {
     let mut counts = Counts {
-        relative: [0.0; TECHNIQUES],
+        relative: [0.0; Technique::COUNT],
         paths: [paths; 2],
-        active: [1.0; TECHNIQUES],
+        active: [1.0; Technique::COUNT],
         camera_factor: 1.0,
         roulette: PILOT,
         light_paths: 1.0,
@@ -102,6 +87,13 @@ fn counts<const N: usize>(relative: [(Technique, f64); N], paths: f64) -> Counts
         counts.relative[technique as usize] = number;
     }
     counts
+}
+
+/// Weights on a path that only one technique finds.
+fn only(technique: Technique) -> PerTechnique<f32> {
+    let mut weights = [0.0; Technique::COUNT];
+    weights[technique as usize] = 1.0;
+    weights
 }
 
 pub(in crate::auto) fn pilot() -> PilotRender {
@@ -127,11 +119,11 @@ fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
 fn light_that_is_hardly_there_excludes_no_plan() {
     let (mut faint, mut unique) = (pilot(), pilot());
     let connection = |of_hits| {
-        let mut densities = upbp_estimators::mis::ByTechnique { of: [0.0; TECHNIQUES] };
+        let mut densities = upbp_estimators::mis::ByTechnique { of: [0.0; Technique::COUNT] };
         densities.of[Technique::Connect as usize] = 1.0;
         densities.of[Technique::Hit as usize] = of_hits;
         let (technique, value) = (Technique::Connect, Vec3::splat(1e-41));
-        Sample { technique, merged: None, albedos: 1.0, value, shares: shares(&densities) }
+        Sample { technique, merged: None, albedos: 1.0, value, weights: mis_weights(&densities) }
     };
     for (pilot, of_hits) in [(&mut faint, 1e-41), (&mut unique, 0.0)] {
         pilot.samples.push(connection(of_hits));
@@ -191,8 +183,7 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
     /// Light sub-paths for each one that comes by.
     const RARE: f64 = 400.0;
     let cells = (SIDE * SIDE) as usize;
-    let mut shares = [0.0; TECHNIQUES];
-    shares[Technique::Pb2d as usize] = 1.0;
+    let weights = only(Technique::Pb2d);
     let value = Vec3::splat((RARE / (TRACED * PHOTONS) as f64) as f32);
     let (mut samples, mut ends, mut drawn) = (Vec::new(), Vec::new(), 0);
     for _ in 0..cells * PASSES as usize {
@@ -205,7 +196,7 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
             }
             let merged = Some(path as u32);
             samples.extend(
-                [Sample { technique: Technique::Pb2d, merged, albedos: 1.0, value, shares }; PHOTONS],
+                [Sample { technique: Technique::Pb2d, merged, albedos: 1.0, value, weights }; PHOTONS],
             );
         }
         ends.push(samples.len() as u32);
@@ -258,8 +249,7 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
     const PATHS: u32 = 256;
     const PILOTS: u32 = 200;
     const CELLS: u32 = 50;
-    let mut shares = [0.0; TECHNIQUES];
-    shares[Technique::Bb1d as usize] = 1.0;
+    let weights = only(Technique::Bb1d);
     let (mut sums, mut errors) = (Vec::new(), 0.0);
     for number in 0..PILOTS {
         let mut pilot = PilotRender { plan: planned(1000), ..pilot() };
@@ -267,8 +257,8 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
             // Some are brighter than others.
             let value = Vec3::splat((-uniform(path as usize, number).ln()).sqrt() as f32);
             let sample =
-                Sample { technique: Technique::Bb1d, merged: Some(path), albedos: 1.0, value, shares };
-            pilot.shared.extend((0..CELLS).map(|cell| Shared {
+                Sample { technique: Technique::Bb1d, merged: Some(path), albedos: 1.0, value, weights };
+            pilot.pairs.extend((0..CELLS).map(|cell| PixelPair {
                 cell: 300 * cell + path,
                 path,
                 weight: 1.0,
@@ -278,10 +268,10 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
         let plan = Plan { techniques: TechniqueSet::VOLUME_MERGES, ..planned(1000) };
         let prediction = Variance::of(pilot);
         let [pixels, all] = [prediction.relative(&plan), prediction.over_scales(&plan)];
-        let shared: [f64; GROUPS] = std::array::from_fn(|group| all[group] - pixels[group]);
+        let of_pairs: [f64; GROUPS] = std::array::from_fn(|group| all[group] - pixels[group]);
         let n = GROUPS as f64;
-        let sum: f64 = shared.iter().sum();
-        errors += n / (n - 1.0) * shared.iter().map(|part| (part - sum / n).powi(2)).sum::<f64>();
+        let sum: f64 = of_pairs.iter().sum();
+        errors += n / (n - 1.0) * of_pairs.iter().map(|part| (part - sum / n).powi(2)).sum::<f64>();
         sums.push(sum);
     }
     let n = f64::from(PILOTS);
@@ -298,14 +288,13 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
 fn photons_vary_at_least_as_independent_ones_do() {
     const PLANNED: f64 = 1000.0;
     const TRACED: f64 = 10.0;
-    let mut shares = [0.0; TECHNIQUES];
-    shares[Technique::Bb1d as usize] = 1.0;
+    let weights = only(Technique::Bb1d);
     let photon =
-        Sample { technique: Technique::Bb1d, merged: Some(0), albedos: 1.0, value: Vec3::ONE, shares };
-    let looks = (SIDE * SIDE * PASSES) as usize;
+        Sample { technique: Technique::Bb1d, merged: Some(0), albedos: 1.0, value: Vec3::ONE, weights };
+    let camera_paths = (SIDE * SIDE * PASSES) as usize;
     let pilot = PilotRender {
-        samples: vec![photon; looks],
-        ends: (1..=looks as u32).collect(),
+        samples: vec![photon; camera_paths],
+        ends: (1..=camera_paths as u32).collect(),
         thinning: [TRACED / PLANNED; 2],
         plan: planned(PLANNED as u32),
         ..pilot()
@@ -327,13 +316,12 @@ fn photons_vary_at_least_as_independent_ones_do() {
 fn variances_know_where_walks_end() {
     const ALBEDO: f32 = 0.3;
     let reached = OF_PILOT.survival(ALBEDO);
-    let mut shares = [0.0; TECHNIQUES];
-    shares[Technique::Hit as usize] = 1.0;
+    let weights = only(Technique::Hit);
     let (mut samples, mut ends) = (Vec::new(), Vec::new());
     for i in 0..(SIDE * SIDE * PASSES) as usize {
         let mut find = |albedos, value| {
             let value = Vec3::splat(value);
-            samples.push(Sample { technique: Technique::Hit, merged: None, albedos, value, shares });
+            samples.push(Sample { technique: Technique::Hit, merged: None, albedos, value, weights });
         };
         find(1.0, 1.0);
         if uniform(i, 4) < f64::from(reached) {
@@ -357,8 +345,7 @@ fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
     let mut pilot = pilot();
     for sample in &mut pilot.samples {
         if sample.technique == Technique::Connect {
-            sample.shares = [0.0; TECHNIQUES];
-            sample.shares[Technique::Connect as usize] = 1.0;
+            sample.weights = only(Technique::Connect);
         }
     }
     let prediction = Variance::of(pilot);
@@ -372,10 +359,10 @@ fn by_splats(rare: u32) -> impl Fn(u32) -> f64 {
     let mut pilot = PilotRender { samples: Vec::new(), ends: vec![0; 2 * (SIDE * SIDE) as usize], ..pilot() };
     let splat = |cell| {
         let own = if cell < rare { 0.1 } else { 1.0 };
-        let mut shares = [0.0; TECHNIQUES];
-        shares[Technique::LightTracing as usize] = own;
-        shares[Technique::Bb1d as usize] = 1.0 - own;
-        Sample { technique: Technique::LightTracing, merged: None, albedos: 1.0, value: Vec3::ONE, shares }
+        let mut weights = [0.0; Technique::COUNT];
+        weights[Technique::LightTracing as usize] = own;
+        weights[Technique::Bb1d as usize] = 1.0 - own;
+        Sample { technique: Technique::LightTracing, merged: None, albedos: 1.0, value: Vec3::ONE, weights }
     };
     pilot.splats = (0..SIDE * SIDE).map(|cell| (cell, splat(cell))).collect();
     pilot.plan = planned(16);
@@ -426,9 +413,9 @@ fn weighted(sample: &Sample, counts: &Counts) -> DVec3 {
         let of_camera = [Technique::Hit, Technique::Nee, Technique::Connect].contains(&technique);
         counts.relative[technique as usize] * if of_camera { counts.camera_factor } else { 1.0 }
     };
-    let share: f64 =
-        Technique::ALL.iter().map(|t| f64::from(sample.shares[*t as usize]) * in_weights(*t)).sum();
-    sample.value.as_dvec3() * in_weights(sample.technique) / share
+    let sum: f64 =
+        Technique::ALL.iter().map(|t| f64::from(sample.weights[*t as usize]) * in_weights(*t)).sum();
+    sample.value.as_dvec3() * in_weights(sample.technique) / sum
 }
 
 /// Pairs of merges with one light sub-path under a plan, over those of the pilot render.
@@ -464,14 +451,14 @@ fn sample() -> impl Strategy<Value = Sample> {
     let technique = proptest::sample::select(Technique::ALL.to_vec());
     let albedos = proptest::sample::select(vec![1.0_f32, 0.9, 0.6, 0.4, 0.2, 0.01]);
     (technique, 0..4_u32, albedos, prop::array::uniform3(0.0_f32..2.0), prop::array::uniform(0.01_f32..1.0))
-        .prop_map(|(technique, path, albedos, value, densities): (_, _, _, _, [f32; TECHNIQUES])| {
+        .prop_map(|(technique, path, albedos, value, densities): (_, _, _, _, PerTechnique<f32>)| {
             let sum: f32 = densities.iter().sum();
             Sample {
                 technique,
                 merged: technique.merges().then_some(path),
                 albedos,
                 value: value.into(),
-                shares: densities.map(|density| density / sum),
+                weights: densities.map(|density| density / sum),
             }
         })
 }
@@ -484,31 +471,30 @@ fn variances_of_blocks_contain_what_pixels_share() {
     /// Light sub-paths for each one that comes by.
     const RARE: f64 = 400.0;
     let cells = SIDE * SIDE;
-    let mut shares = [0.0; TECHNIQUES];
-    shares[Technique::Bb1d as usize] = 1.0;
+    let weights = only(Technique::Bb1d);
     let value = Vec3::splat((RARE / TRACED) as f32);
     let mut pilot = PilotRender { thinning: [TRACED / PLANNED; 2], plan: planned(PLANNED as u32), ..pilot() };
     (pilot.samples, pilot.ends) = (Vec::new(), Vec::new());
     let grid = Grid::new(PixelRect { x: 0, y: 0, width: 4 * SIDE, height: 4 * SIDE }, cells);
-    for look in 0..cells * PASSES {
+    for camera_path in 0..cells * PASSES {
         // As many as come by on average.
         let found = (TRACED / RARE) as u32;
         let seen = (0..found).map(|path| {
-            let merged = Some(look * found + path);
-            Sample { technique: Technique::Bb1d, merged, albedos: 1.0, value, shares }
+            let merged = Some(camera_path * found + path);
+            Sample { technique: Technique::Bb1d, merged, albedos: 1.0, value, weights }
         });
         pilot.samples.extend(seen.clone());
         pilot.ends.push(pilot.samples.len() as u32);
-        if look.is_multiple_of(PASSES)
-            && let Some((_, weight)) = grid.partner(look / PASSES)
+        if camera_path.is_multiple_of(PASSES)
+            && let Some((_, weight)) = grid.partner(camera_path / PASSES)
         {
-            let shared = |sample: Sample| Shared {
-                cell: look / PASSES,
+            let pair = |sample: Sample| PixelPair {
+                cell: camera_path / PASSES,
                 path: sample.merged.unwrap_or(0),
                 weight,
                 samples: [vec![sample], vec![sample]],
             };
-            pilot.shared.extend(seen.map(shared));
+            pilot.pairs.extend(seen.map(pair));
         }
     }
     let prediction = Variance::of(pilot);
@@ -534,8 +520,8 @@ proptest! {
         camera_factor in 0.5_f64..16.0,
         weight in 0.1_f64..100.0,
     ) {
-        let periodic: [bool; TECHNIQUES] = periodic;
-        let active: [f64; TECHNIQUES] = std::array::from_fn(|i| if periodic[i] { 0.25 } else { 1.0 });
+        let periodic: PerTechnique<bool> = periodic;
+        let active: PerTechnique<f64> = std::array::from_fn(|i| if periodic[i] { 0.25 } else { 1.0 });
         let counts =
             Counts { relative: active.map(|p| 0.5 + p), paths, active, camera_factor, ..counts([], 1.0) };
         let mut expected = 0.0;
@@ -546,9 +532,9 @@ proptest! {
             }
         }
         let pilot = PilotRender { thinning, samples: Vec::new(), ends: Vec::new(), cells: 0, ..pilot() };
-        let looks = sample_pairs::Looks::new(&pilot);
-        let shared = Shared { cell: 0, path: 0, weight, samples: [own, other] };
-        let found = View::new(&pilot, &looks, &counts).in_common(&shared);
+        let ready = ReadySamples::new(&pilot);
+        let pair = PixelPair { cell: 0, path: 0, weight, samples: [own, other] };
+        let found = Reweighted::new(&pilot, &ready, &counts).pair_product(&pair);
         prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
     }
 
@@ -561,17 +547,17 @@ proptest! {
         thinning in prop::array::uniform2(0.1_f64..1.0),
         camera_factor in 0.5_f64..16.0,
     ) {
-        let periodic: [bool; TECHNIQUES] = periodic;
+        let periodic: PerTechnique<bool> = periodic;
         samples.sort_by_key(|sample| sample.merged);
-        let active: [f64; TECHNIQUES] = std::array::from_fn(|i| {
+        let active: PerTechnique<f64> = std::array::from_fn(|i| {
             if periodic[i] && Technique::ALL[i].merges() { 0.25 } else { 1.0 }
         });
         let relative = active.map(|p| 0.5 + p);
         let counts = Counts { relative, paths, active, camera_factor, roulette, ..counts([], 1.0) };
         let expected = products(&samples, thinning, &counts);
         let pilot = PilotRender { cells: 1, passes: 1, ends: vec![samples.len() as u32], samples, thinning, ..pilot() };
-        let looks = sample_pairs::Looks::new(&pilot);
-        let found = View::new(&pilot, &looks, &counts).look(0).products;
+        let ready = ReadySamples::new(&pilot);
+        let found = Reweighted::new(&pilot, &ready, &counts).moments(0).products;
         prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
     }
 }
