@@ -200,6 +200,8 @@ impl EmitterBounds {
 /// `sphere` holds the scene: light from infinity starts on a disc in front of it. It is
 /// [the bounds of the scene](super::Scene::bounds), or a larger sphere around a point that matters to the
 /// picture. It may change within a render, so an emitter must not keep anything that it worked out from it.
+///
+/// `Box<dyn Emitter>` and `Arc<dyn Emitter>` are emitters, too, for scenes with lights of several types.
 pub trait Emitter: Send + Sync {
     /// The kind of the light.
     fn kind(&self) -> EmitterKind;
