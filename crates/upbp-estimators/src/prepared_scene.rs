@@ -239,8 +239,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// [left out](Self::leave_out_volumes).
     ///
     /// # Errors
-    /// [`PrepareError::EmitterChoice`], if it is of other emitters.
-    pub fn set_emitter_choice(&mut self, choice: &Arc<EmitterChoice>) -> Result<(), PrepareError> {
+    /// If it is of other emitters.
+    pub fn set_emitter_choice(&mut self, choice: &Arc<EmitterChoice>) -> Result<(), EmitterChoiceError> {
         self.leave_out_volumes(|emitter| choice.emission.probability(emitter) == 0.0);
         let is_of_these =
             [&choice.emission, &choice.next_event].iter().all(|selection| selection.fits(&self.power));
@@ -257,7 +257,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             .as_ref()
             .is_none_or(|receivers| clusters.is_some_and(|clusters| receivers.fits(clusters)));
         if !(is_of_these && is_by_these && can_be_followed) {
-            return Err(PrepareError::EmitterChoice { emitters: self.scene.emitters().len() });
+            return Err(EmitterChoiceError { emitters: self.scene.emitters().len() });
         }
         self.set(choice.clone());
         Ok(())
@@ -276,13 +276,14 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     }
 
     /// Starts a light sub-path at an emitter, guided if there is a guide; densities are of the guided start.
+    /// `None` if the start brings no light, or the emitter does not exist.
     #[must_use]
     pub fn sample_emission(
         &self,
         emitter: EmitterId,
         [u_position, u_direction]: [[f32; 2]; 2],
     ) -> Option<Emission> {
-        let light = &self.scene.emitters()[emitter.0 as usize];
+        let light = self.scene.emitters().get(emitter.0 as usize)?;
         let Some(guide) = self.choice.guide(emitter) else {
             return light.sample_emission(&self.emission_bounds, u_position, u_direction);
         };
@@ -540,6 +541,15 @@ fn tree_of<S: Scene>(scene: &S, power: &Selection, bounds: &BoundingSphere) -> O
 /// vertices next to a boundary, one in ten thousand is within rounding of it.
 const DENSE: f32 = 1e-3;
 
+/// The choice of emitters of a plan that was made for another scene.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected a choice among the {emitters} emitters of this scene that leaves out none that shines")]
+#[non_exhaustive]
+pub struct EmitterChoiceError {
+    /// The number of emitters of the scene.
+    pub emitters: usize,
+}
+
 /// A fault of a scene as a whole.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -561,14 +571,6 @@ pub enum PrepareError {
         emitter: usize,
         /// Power that it claims.
         power: f32,
-    },
-    /// The choice of emitters that a plan makes.
-    #[error(
-        "plan: expected a choice among the {emitters} emitters of this scene that leaves out none that shines"
-    )]
-    EmitterChoice {
-        /// Number of emitters.
-        emitters: usize,
     },
     /// A crop that is not a part of the film, or an empty one.
     #[error(

@@ -104,7 +104,7 @@ pub(crate) fn choose<S: Scene>(
         frozen.plan.validate().map_err(RenderError::PlanValue)?;
     }
     match &given {
-        Some(frozen) => scene.set_emitter_choice(&frozen.emitters)?,
+        Some(frozen) => scene.set_emitter_choice(&frozen.emitters).map_err(RenderError::PlanEmitters)?,
         None => volumes::choose(scene, settings, settings.techniques.candidates(), budget)?,
     }
     let support = TechniqueSupport::of(scene, settings, given.as_ref())?;
