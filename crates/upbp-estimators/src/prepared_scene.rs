@@ -19,6 +19,7 @@ use crate::scene::{
 };
 
 /// A [`Scene`] with all that is derived from it once.
+#[derive(Debug)]
 pub struct PreparedScene<'a, S: Scene> {
     /// The scene.
     pub scene: &'a S,
@@ -265,11 +266,11 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 
     /// Chooses the emitter of a light sub-path; returns its probability. `None` without light.
     #[must_use]
-    pub fn choose_emission(&self, u: f32) -> Option<(EmitterId, f32)> {
+    pub(crate) fn choose_emission(&self, u: f32) -> Option<(EmitterId, f32)> {
         self.choice.emission.choose(f64::from(u))
     }
 
-    /// The probability of [`choose_emission`](Self::choose_emission); 0 if the emitter does not exist.
+    /// The probability that a light sub-path starts at an emitter; 0 if the emitter does not exist.
     #[must_use]
     pub fn emission_probability(&self, emitter: EmitterId) -> f32 {
         self.choice.emission.probability(emitter)
@@ -373,7 +374,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 
     /// The emitter that is the volume of a body, if sub-paths begin there.
     #[must_use]
-    pub fn volume_emitter(&self, body: BodyId) -> Option<EmitterId> {
+    pub(crate) fn volume_emitter(&self, body: BodyId) -> Option<EmitterId> {
         let place = self.volumes.binary_search_by_key(&body, |&(body, _)| body).ok()?;
         Some(self.volumes[place].1)
     }
@@ -454,7 +455,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// the probability of the emitter, times the density of the point per area, times the
     /// [area of its image](LensConnection::image_area). `None` if the point is not chosen there.
     #[must_use]
-    pub fn connect_through_lens(
+    pub(crate) fn connect_through_lens(
         &self,
         emitter: EmitterId,
         point: &EmitterPoint,
@@ -472,7 +473,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 
     /// The bodies around a point of the lens.
     #[must_use]
-    pub fn stack_at_camera(&self, lens: glam::Vec3) -> MediumStack {
+    pub(crate) fn stack_at_camera(&self, lens: glam::Vec3) -> MediumStack {
         self.camera_stack.clone().unwrap_or_else(|| self.scene.stack_at(lens))
     }
 }

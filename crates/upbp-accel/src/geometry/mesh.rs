@@ -34,7 +34,7 @@ impl TriangleMesh {
     /// The mesh of triangles that index `positions`; with `normals`, one per position and of any length, it
     /// is shaded smoothly. Normals of zero leave it to those of the other corners, or to the plane.
     ///
-    /// Triangles without area are dropped and counted, see [`TriangleMesh::dropped_triangles`].
+    /// Triangles without area are left out.
     pub fn new(
         positions: Vec<Vec3>,
         indices: Vec<[u32; 3]>,
@@ -68,7 +68,6 @@ impl TriangleMesh {
 
         // Before anything is dropped: a triangle without area may still join its neighbours.
         let border = Border::of(&positions, &indices);
-        let count = indices.len();
         let mut triangles = indices;
         let has_area =
             |triangle: &[u32; 3]| cross(triangle.map(|vertex| positions[vertex as usize])).length() > 0.0;
@@ -76,9 +75,8 @@ impl TriangleMesh {
         if triangles.is_empty() {
             return Err(GeometryError::Degenerate { what: "a mesh" });
         }
-        let dropped = count - triangles.len();
         let normals = normals.map(|normals| normals.into_iter().map(unit).collect());
-        Ok(Self::with_surface(Surface::new(positions, triangles, normals, border, dropped)))
+        Ok(Self::with_surface(Surface::new(positions, triangles, normals, border)))
     }
 
     fn with_surface(surface: Surface) -> Self {
@@ -103,12 +101,12 @@ impl TriangleMesh {
     /// [placed](Self::placed).
     pub fn transformed(&self, to_scene: &Affine3A) -> Result<Self, GeometryError> {
         let placement = self.placement_by(to_scene)?;
-        let Surface { positions, triangles, normals, border, dropped, .. } = &*self.surface;
+        let Surface { positions, triangles, normals, border, .. } = &*self.surface;
         let positions = positions.iter().map(|position| placement.point(*position)).collect();
         let triangles = triangles.iter().map(|triangle| placement.winding(*triangle)).collect();
         let normals = normals.as_ref();
         let normals = normals.map(|normals| normals.iter().map(|normal| placement.normal(*normal)).collect());
-        let surface = Surface::new(positions, triangles, normals, *border, *dropped);
+        let surface = Surface::new(positions, triangles, normals, *border);
         if *border == Border::Nowhere {
             surface.set_signed_volume(self.surface.signed_volume() * placement.volume_ratio());
         }
@@ -174,12 +172,6 @@ impl TriangleMesh {
     fn vertices(&self, triangle: u32) -> [u32; 3] {
         let vertices = self.surface.triangles[triangle as usize];
         self.placement.map_or(vertices, |placement| placement.winding(vertices))
-    }
-
-    /// The number of triangles without area that were left out.
-    #[must_use]
-    pub fn dropped_triangles(&self) -> usize {
-        self.surface.dropped
     }
 
     /// The corners of a triangle, counter-clockwise as seen from the front.

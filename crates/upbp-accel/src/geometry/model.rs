@@ -96,7 +96,7 @@ mod tests {
             }
         }
         let border = Border::of(&positions, &triangles);
-        Surface::new(positions, triangles, None, border, 0)
+        Surface::new(positions, triangles, None, border)
     }
 
     #[test]

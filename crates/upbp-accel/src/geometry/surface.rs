@@ -15,8 +15,6 @@ pub(super) struct Surface {
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) normals: Option<Vec<Vec3>>,
     pub(super) border: Border,
-    /// Triangles without area that were left out.
-    pub(super) dropped: usize,
     bounds: (Vec3, Vec3),
     measures: Measures,
 }
@@ -75,13 +73,12 @@ impl Surface {
         triangles: Vec<[u32; 3]>,
         normals: Option<Vec<Vec3>>,
         border: Border,
-        dropped: usize,
     ) -> Self {
         let mut bounds = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for corner in triangles.iter().flatten().map(|&vertex| positions[vertex as usize]) {
             bounds = (bounds.0.min(corner), bounds.1.max(corner));
         }
-        Self { positions, triangles, normals, border, dropped, bounds, measures: Measures::default() }
+        Self { positions, triangles, normals, border, bounds, measures: Measures::default() }
     }
 
     /// The least and the greatest coordinates.

@@ -16,6 +16,7 @@ use crate::settings::Settings;
 
 /// The techniques that remain, and why others do not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TechniqueSupport {
     /// Techniques that the settings allow and the scene can use; a [plan](crate::Plan) runs some of them.
     pub techniques: TechniqueSet,

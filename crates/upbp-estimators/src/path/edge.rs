@@ -43,6 +43,7 @@ pub struct MediumSpan<L = f64> {
 
 /// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a
 /// medium. Its densities are those of each of the [`Lanes`] `L`.
+#[derive(Debug)]
 pub struct EdgeTrace<B, L: Lanes = f64> {
     /// Start of the ray.
     pub origin: Vec3,
@@ -200,7 +201,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
 
     /// Whether nothing is known of the ray, since the scene's answers cannot be true.
     #[must_use]
-    pub const fn is_lost(&self) -> bool {
+    pub(crate) const fn is_lost(&self) -> bool {
         self.lost
     }
 
@@ -449,7 +450,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     }
 
     /// The spans that a beam along the edge runs through, each with the distance where the beam ends in it.
-    pub fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&MediumSpan<L>, f32)> {
+    pub(crate) fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&MediumSpan<L>, f32)> {
         let stop = match extent {
             BeamExtent::Short => self.stop,
             BeamExtent::Long => None,
