@@ -42,13 +42,13 @@ pub enum EmitterKind {
 }
 
 impl EmitterKind {
-    /// Infinitely far away: the first edge of a path has no distance.
+    /// Whether emitters of this kind are infinitely far away: the first edge of a path has no distance.
     #[must_use]
     pub const fn is_infinite(self) -> bool {
         matches!(self, Self::Directional | Self::Environment)
     }
 
-    /// Whether a camera sub-path can end on it by chance.
+    /// Whether a camera sub-path can end on an emitter of this kind by chance.
     #[must_use]
     pub const fn is_hittable(self) -> bool {
         matches!(self, Self::Area | Self::Environment | Self::Volume(_))
