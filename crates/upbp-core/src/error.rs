@@ -4,8 +4,7 @@ use std::error::Error;
 use std::fmt;
 use std::path::PathBuf;
 
-use upbp_estimators::PrepareError;
-use upbp_estimators::TechniqueSet;
+use upbp_estimators::{EmitterChoiceError, PrepareError, TechniqueSet};
 
 /// Describes an error with all its causes, each on a line of its own: the messages of this library do not
 /// repeat those of their [sources](Error::source).
@@ -72,6 +71,9 @@ pub enum RenderError {
         /// MiB that are allowed.
         limit: MemoryLimit,
     },
+    /// A plan whose choice of emitters is for another scene.
+    #[error("plan: {0}")]
+    PlanEmitters(EmitterChoiceError),
     /// A value of a plan is out of its range.
     #[error("plan: {0}")]
     PlanValue(String),

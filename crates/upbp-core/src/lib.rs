@@ -1,5 +1,4 @@
 #![doc = include_str!("../README.md")]
-#![warn(missing_debug_implementations)]
 
 mod auto;
 mod deadline;
@@ -36,8 +35,8 @@ pub use settings::{CheckedSettings, LightPaths, Settings, Techniques, UnknownTec
 pub use state::{ErrorPoint, ErrorSeries, Identity, PassSeconds, State};
 pub use upbp_estimators::mis::{BeamExtent, Heuristic, MisPlan, VolumeMerge, VolumeMerges};
 pub use upbp_estimators::{
-    BodyId, Counters, EmissionGuide, EmissionSample, EmitterChoice, FootprintField, Interior,
-    IterationChoices, IterationPlan, Kernel, Kernels, Layer, MediumId, MediumStack, MergePeriods,
-    PathLengths, PerMerge, PerTechnique, PrepareError, RAY_OFFSET, RadiusField, Ray, Roulette, Spectrum,
-    Technique, TechniqueSet, UnknownTechnique, check, offset_origin, scene,
+    BodyId, Counters, EmissionGuide, EmissionSample, EmitterChoice, EmitterChoiceError, FootprintField,
+    GrowingRadius, Interior, IterationChoices, IterationPlan, Kernel, Kernels, Layer, MediumId, MediumStack,
+    MergePeriods, PathLengths, PerMerge, PerTechnique, PrepareError, RAY_OFFSET, RadiusField, Ray, Roulette,
+    SearchRadius, Spectrum, Technique, TechniqueSet, UnknownTechnique, check, offset_origin, scene,
 };

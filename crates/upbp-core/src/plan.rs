@@ -250,6 +250,24 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn guides_are_spelled_as_their_nodes_and_read_only_if_these_are_trees() {
+        let text = FrozenPlan { plan: plan(), emitters: Arc::default() }.to_ron();
+        let with = |nodes: &str| {
+            let place = "next_event: [],";
+            assert_eq!(text.matches(place).count(), 1, "{text}");
+            FrozenPlan::from_ron(&text.replace(place, &format!("{place} guides: [Some({nodes})],")))
+        };
+        let guided = with("[(1, 2, 2000), (0, 0, 0), (0, 0, 0)]").expect("a tree");
+        let spelled: String = guided.to_ron().split_whitespace().collect();
+        assert!(spelled.contains("guides:[Some([(1,2,2000),(0,0,0),(0,0,0)"), "{spelled}");
+        assert_eq!(FrozenPlan::from_ron(&guided.to_ron()), Ok(guided));
+        for nodes in ["[]", "[(1, 2, 2000), (0, 0, 0)]", "[(7, 2, 2000), (0, 0, 0), (0, 0, 0)]"] {
+            let error = with(nodes).unwrap_err().to_string();
+            assert!(error.contains("expected the tree of a guide"), "{nodes}: {error}");
+        }
+    }
+
+    #[test]
     fn what_cannot_be_is_refused() {
         let wrong = |change: fn(&mut Plan)| {
             let mut plan = plan();

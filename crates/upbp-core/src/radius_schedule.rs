@@ -78,7 +78,8 @@ impl Radii {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RadiusSchedule {
-    /// Radius of surface merging, scene units, as all in iteration 0 where `φ` is one; 0 if it cannot run.
+    /// Radius of surface merging in iteration 0 where `φ` is one, scene units, as all of them; 0 if it cannot
+    /// run.
     pub surf: f32,
     /// Radius of photon points around points, scene units; 0 if it cannot run.
     pub pp3d: f32,

@@ -7,6 +7,7 @@ use crate::technique::{PerTechnique, Technique};
 
 /// Counters of one pass or of a whole render; they add up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Counters {
     /// Edges of light sub-paths.
     pub light_edges: u64,

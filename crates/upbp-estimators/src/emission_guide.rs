@@ -55,9 +55,9 @@ pub struct EmissionSample {
 
 /// A distribution over the random numbers with which light sub-paths start at an emitter.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
+#[serde(try_from = "Vec<Node>", into = "Vec<Node>")]
 pub struct EmissionGuide {
-    /// A binary tree in preorder: the lower half follows its node.
+    /// A [valid](Self::is_valid) binary tree in preorder: the lower half follows its node.
     nodes: Vec<Node>,
 }
 
@@ -74,6 +74,21 @@ impl Node {
 
     const fn is_leaf(self) -> bool {
         self.1 == 0
+    }
+}
+
+impl TryFrom<Vec<Node>> for EmissionGuide {
+    type Error = &'static str;
+
+    fn try_from(nodes: Vec<Node>) -> Result<Self, Self::Error> {
+        let guide = Self { nodes };
+        guide.is_valid([true; AXES]).then_some(guide).ok_or("expected the tree of a guide")
+    }
+}
+
+impl From<EmissionGuide> for Vec<Node> {
+    fn from(guide: EmissionGuide) -> Self {
+        guide.nodes
     }
 }
 
@@ -135,7 +150,7 @@ impl EmissionGuide {
 
     /// Maps uniform random numbers to guided ones; returns the guided density there, relative to uniform.
     #[must_use]
-    pub fn warp(&self, uniform: [f32; 4]) -> ([f32; 4], f32) {
+    pub(crate) fn warp(&self, uniform: [f32; 4]) -> ([f32; 4], f32) {
         let mut within = uniform.map(f64::from);
         let (mut low, mut width) = ([0.0; AXES], [1.0; AXES]);
         let (mut index, mut density) = (0, 1.0);
@@ -185,8 +200,7 @@ impl EmissionGuide {
         density as f32
     }
 
-    /// Whether this is a tree that splits only the `axes` that matter: what is read from a file may be
-    /// anything.
+    /// Whether this is a tree that splits only the `axes` that matter.
     pub(crate) fn is_valid(&self, axes: [bool; 4]) -> bool {
         // The subtree at an index, whose end it returns, below some splits along each axis.
         fn end(nodes: &[Node], index: usize, axes: [bool; AXES], mut splits: [u8; AXES]) -> Option<usize> {

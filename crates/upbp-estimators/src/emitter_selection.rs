@@ -28,17 +28,19 @@ pub struct EmitterSample {
 }
 
 impl EmitterShares {
-    /// The light that each emitter would bring and nothing else would find, if emitters were chosen in
-    /// proportion to just that: contributions times the square of their weights. The `probabilities` of
-    /// emitters are where the search for these begins.
+    /// Shares in proportion to the light that each emitter would bring and nothing else would find, if
+    /// emitters were chosen by these very shares: contributions times the square of their weights. The
+    /// `probabilities` of emitters are where the search for them begins; samples of other emitters do not
+    /// count.
     #[must_use]
     pub fn of(probabilities: Vec<f64>, samples: &[EmitterSample]) -> Self {
         Self::reproduced(probabilities, samples, |light| light)
     }
 
-    /// Roots of the second moments that are left of each emitter, if emitters were chosen in proportion to
-    /// them: then the sum of the variances is least. Here the light of samples is the square of a
-    /// contribution, divided by the probability that the emitter was chosen with.
+    /// Shares in proportion to the roots of the second moments that are left of each emitter, if emitters
+    /// were chosen by these very shares: then the sum of the variances is least. Here the light of samples is
+    /// the square of a contribution, divided by the probability that the emitter was chosen with. The
+    /// `probabilities`, and samples of other emitters, are as in [`of`](Self::of).
     #[must_use]
     pub fn of_squares(probabilities: Vec<f64>, samples: &[EmitterSample]) -> Self {
         Self::reproduced(probabilities, samples, f64::sqrt)
@@ -52,7 +54,8 @@ impl EmitterShares {
             light.fill(0.0);
             for (sample, each) in samples.iter().zip(&mut each) {
                 let emitter = sample.emitter.0 as usize;
-                let weight = probabilities[emitter] / (probabilities[emitter] + sample.others);
+                let Some(probability) = probabilities.get(emitter) else { continue };
+                let weight = probability / (probability + sample.others);
                 *each = if weight > 0.0 { sample.light * weight * weight } else { 0.0 };
                 light[emitter] += *each;
             }

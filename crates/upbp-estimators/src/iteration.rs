@@ -176,7 +176,7 @@ impl MediumKernels {
     }
 }
 
-/// Kernels in media of any number of mean free paths.
+/// No limit on the radii of kernels in media, in mean free paths.
 pub const NO_LIMIT: VolumeMerges<f32> = {
     let none = f32::INFINITY;
     VolumeMerges { pp3d: none, pb2d: none, bp2d: none, bb1d: none }

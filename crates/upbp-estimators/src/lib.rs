@@ -26,6 +26,11 @@ mod technique;
 mod techniques;
 pub mod trace;
 
+/// The vector math of this crate's interface.
+pub use glam;
+/// Participating media, phase functions, spectra.
+pub use upbp_media as media;
+
 pub use counters::Counters;
 pub use emission_guide::{EmissionGuide, EmissionSample};
 pub use emitter_choice::EmitterChoice;
@@ -36,10 +41,10 @@ pub use iteration::{IterationChoices, IterationPlan, Kernels, LEAST_RADIUS, NO_L
 pub use kernel::Kernel;
 pub use light_map::LightMap;
 pub use merge_periods::MergePeriods;
-pub use prepared_scene::{PrepareError, PreparedScene};
+pub use prepared_scene::{EmitterChoiceError, PrepareError, PreparedScene};
 pub use radius_field::{FootprintField, RadiusField};
 pub use random::{Decision, Stream, StreamKind, half, pixel_index};
 pub use roulette::{Roulette, Surroundings, Survival};
 pub use technique::{Layer, PerMerge, PerTechnique, Technique, TechniqueSet, UnknownTechnique};
-pub use upbp_accel::{RAY_OFFSET, Ray, offset_origin};
+pub use upbp_accel::{GrowingRadius, RAY_OFFSET, Ray, SearchRadius, Segment, offset_origin};
 pub use upbp_media::{BodyId, Interior, MediumId, MediumStack, Spectrum};

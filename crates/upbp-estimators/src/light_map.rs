@@ -11,6 +11,7 @@ use crate::path::{LightVertex, PhotonBeam};
 use crate::technique::Technique;
 
 /// Light vertices and photon beams of an iteration, with the trees that camera sub-paths query.
+#[derive(Debug)]
 pub struct LightMap<B, D: Densities = f64, L: Lanes = f64> {
     /// All vertices that can be connected or merged.
     pub vertices: Vec<LightVertex<B, D, L>>,

@@ -19,6 +19,7 @@ use crate::scene::{
 };
 
 /// A [`Scene`] with all that is derived from it once.
+#[derive(Debug)]
 pub struct PreparedScene<'a, S: Scene> {
     /// The scene.
     pub scene: &'a S,
@@ -239,8 +240,8 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// [left out](Self::leave_out_volumes).
     ///
     /// # Errors
-    /// [`PrepareError::EmitterChoice`], if it is of other emitters.
-    pub fn set_emitter_choice(&mut self, choice: &Arc<EmitterChoice>) -> Result<(), PrepareError> {
+    /// If it is of other emitters.
+    pub fn set_emitter_choice(&mut self, choice: &Arc<EmitterChoice>) -> Result<(), EmitterChoiceError> {
         self.leave_out_volumes(|emitter| choice.emission.probability(emitter) == 0.0);
         let is_of_these =
             [&choice.emission, &choice.next_event].iter().all(|selection| selection.fits(&self.power));
@@ -257,7 +258,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
             .as_ref()
             .is_none_or(|receivers| clusters.is_some_and(|clusters| receivers.fits(clusters)));
         if !(is_of_these && is_by_these && can_be_followed) {
-            return Err(PrepareError::EmitterChoice { emitters: self.scene.emitters().len() });
+            return Err(EmitterChoiceError { emitters: self.scene.emitters().len() });
         }
         self.set(choice.clone());
         Ok(())
@@ -265,24 +266,25 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 
     /// Chooses the emitter of a light sub-path; returns its probability. `None` without light.
     #[must_use]
-    pub fn choose_emission(&self, u: f32) -> Option<(EmitterId, f32)> {
+    pub(crate) fn choose_emission(&self, u: f32) -> Option<(EmitterId, f32)> {
         self.choice.emission.choose(f64::from(u))
     }
 
-    /// The probability of [`choose_emission`](Self::choose_emission); 0 if the emitter does not exist.
+    /// The probability that a light sub-path starts at an emitter; 0 if the emitter does not exist.
     #[must_use]
     pub fn emission_probability(&self, emitter: EmitterId) -> f32 {
         self.choice.emission.probability(emitter)
     }
 
     /// Starts a light sub-path at an emitter, guided if there is a guide; densities are of the guided start.
+    /// `None` if the start brings no light, or the emitter does not exist.
     #[must_use]
     pub fn sample_emission(
         &self,
         emitter: EmitterId,
         [u_position, u_direction]: [[f32; 2]; 2],
     ) -> Option<Emission> {
-        let light = &self.scene.emitters()[emitter.0 as usize];
+        let light = self.scene.emitters().get(emitter.0 as usize)?;
         let Some(guide) = self.choice.guide(emitter) else {
             return light.sample_emission(&self.emission_bounds, u_position, u_direction);
         };
@@ -372,7 +374,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 
     /// The emitter that is the volume of a body, if sub-paths begin there.
     #[must_use]
-    pub fn volume_emitter(&self, body: BodyId) -> Option<EmitterId> {
+    pub(crate) fn volume_emitter(&self, body: BodyId) -> Option<EmitterId> {
         let place = self.volumes.binary_search_by_key(&body, |&(body, _)| body).ok()?;
         Some(self.volumes[place].1)
     }
@@ -453,7 +455,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// the probability of the emitter, times the density of the point per area, times the
     /// [area of its image](LensConnection::image_area). `None` if the point is not chosen there.
     #[must_use]
-    pub fn connect_through_lens(
+    pub(crate) fn connect_through_lens(
         &self,
         emitter: EmitterId,
         point: &EmitterPoint,
@@ -471,7 +473,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
 
     /// The bodies around a point of the lens.
     #[must_use]
-    pub fn stack_at_camera(&self, lens: glam::Vec3) -> MediumStack {
+    pub(crate) fn stack_at_camera(&self, lens: glam::Vec3) -> MediumStack {
         self.camera_stack.clone().unwrap_or_else(|| self.scene.stack_at(lens))
     }
 }
@@ -540,6 +542,15 @@ fn tree_of<S: Scene>(scene: &S, power: &Selection, bounds: &BoundingSphere) -> O
 /// vertices next to a boundary, one in ten thousand is within rounding of it.
 const DENSE: f32 = 1e-3;
 
+/// The choice of emitters of a plan that was made for another scene.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected a choice among the {emitters} emitters of this scene that leaves out none that shines")]
+#[non_exhaustive]
+pub struct EmitterChoiceError {
+    /// The number of emitters of the scene.
+    pub emitters: usize,
+}
+
 /// A fault of a scene as a whole.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -561,14 +572,6 @@ pub enum PrepareError {
         emitter: usize,
         /// Power that it claims.
         power: f32,
-    },
-    /// The choice of emitters that a plan makes.
-    #[error(
-        "plan: expected a choice among the {emitters} emitters of this scene that leaves out none that shines"
-    )]
-    EmitterChoice {
-        /// Number of emitters.
-        emitters: usize,
     },
     /// A crop that is not a part of the film, or an empty one.
     #[error(

@@ -3,8 +3,17 @@
 use std::fmt::Debug;
 use std::ops::{Add, Mul};
 
-/// A density for each lane: `f64` for one lane, `[f64; 3]` for a lane per channel.
-pub trait LaneValues: Copy + Debug + PartialEq + Send + Sync + 'static {
+mod sealed {
+    /// The sets of lanes that there are.
+    #[expect(unnameable_types, reason = "no other crate is to implement it")]
+    pub trait Sealed {}
+
+    impl Sealed for f64 {}
+    impl Sealed for [f64; 3] {}
+}
+
+/// A density for each lane: `f64` for one lane, `[f64; 3]` for a lane per channel, and no other.
+pub trait LaneValues: sealed::Sealed + Copy + Debug + PartialEq + Send + Sync + 'static {
     /// A value for each lane.
     type Each<T: Copy + Debug + Send + Sync>: Copy + Debug + Send + Sync;
     /// The probability of each lane to be the hero of a walk, given what the walk has done; nothing if there

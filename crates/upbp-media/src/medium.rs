@@ -13,6 +13,8 @@ use crate::{PhaseFunction, RaySegment, SegmentDensity, Spectrum};
 /// goes. The estimators rest on this:
 ///
 /// - `∫₀^ℓ p(t) dt + S(ℓ) = 1` on every segment: a walk stops somewhere or passes;
+/// - `p(t) > 0` wherever the medium scatters light that arrives there, in any channel: no walk finds it
+///   otherwise;
 /// - neither depends on the throughput of the path, since the density must be computable from the other
 ///   end as well.
 ///
@@ -145,11 +147,12 @@ pub trait Medium: Send + Sync {
     fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32>;
 
     /// The extinction with which the lane of each channel draws distances, in inverse scene units, 0 for a
-    /// lane that always passes; where it varies in space, its largest value. `None` if the medium has no
-    /// lanes of its own.
+    /// lane that always passes. `None` if the medium has no lanes of its own: then all three are equal.
     ///
-    /// Tells with the [phase function](Self::phase) which lanes are equal, and how much they differ: it
-    /// steers the choice of lanes and nothing else.
+    /// Tells with the [phase function](Self::phase) which lanes are equal, and how much they differ. Equal
+    /// numbers promise lanes that are equal on every segment, of which walks draw only one. Where the
+    /// extinction varies in space, numbers of its size do, its largest values for instance, as long as those
+    /// of lanes that differ anywhere are not equal.
     fn lane_extinctions(&self) -> Option<Spectrum> {
         None
     }

@@ -148,13 +148,6 @@ impl<L: LaneValues> EdgeDensity<L> {
         self
     }
 
-    /// Whether no segment was pushed.
-    #[inline]
-    #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        !self.started
-    }
-
     /// Distance-sampling density of the forward walk: per length if the end is a vertex in a medium (which
     /// then scatters), the probability to pass if it is on a surface.
     #[inline]
@@ -286,7 +279,6 @@ mod tests {
     #[test]
     fn an_edge_without_segments_passes() {
         let edge = EdgeDensity::<f64>::default();
-        assert!(edge.is_empty());
         assert_eq!((edge.pass_probability, edge.transmittance), (1.0, Spectrum::ONE));
         assert_eq!((edge.forward(true), edge.backward(true)), (0.0, 0.0));
     }
@@ -300,7 +292,6 @@ mod tests {
             stop_at_start: 7.0,
         };
         let edge = EdgeDensity::EMPTY.with(&density);
-        assert!(!edge.is_empty());
         assert_eq!((edge.forward(true), edge.backward(true), edge.pass_probability), (3.0, 7.0, 0.25));
     }
 

@@ -256,9 +256,7 @@ impl Scene for ReadyScene {
         let is_near = |crossing: &Crossing| before < crossing.t && crossing.t < behind;
         let may_coincide = crossings.iter().any(is_near)
             || hit.boundary.interior().is_some()
-                && (second < behind
-                    || ray.t_max < behind
-                    || opaque.is_some_and(|opaque| opaque.t < behind));
+                && (second < behind || ray.t_max < behind || opaque.is_some_and(|opaque| opaque.t < behind));
         if may_coincide {
             hit = self.surface_at(ray, &plane, crossings).unwrap_or(hit);
         } else {

@@ -8,7 +8,7 @@ use upbp_scene::ReadyScene;
 use crate::statistics::Estimate;
 
 /// A case of the table.
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 pub struct Case {
     /// Name of the case.
     pub id: String,
@@ -69,7 +69,7 @@ pub fn cases(kind: &str) -> Vec<Case> {
 }
 
 /// Results beside what is expected.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Table {
     failures: Vec<String>,
 }

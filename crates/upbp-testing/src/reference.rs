@@ -14,6 +14,7 @@ use crate::statistics::Estimate;
 const TILE: usize = 8;
 
 /// A converged picture and its standard error per pixel. The channels of a pixel share their noise.
+#[derive(Debug)]
 pub struct Reference {
     width: usize,
     pixels: Vec<[f64; 3]>,
@@ -111,7 +112,7 @@ fn tiles(image: &Image) -> Vec<[f64; 3]> {
 }
 
 /// Gathers the spread of a render's iterations.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Spread {
     iterations: u64,
     before: Vec<[f64; 3]>,

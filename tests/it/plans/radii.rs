@@ -1,9 +1,7 @@
 //! Kernel radii that are a function of place: what the plan gives to a picture of near and far things.
 
 use upbp_core::glam::Vec3;
-use upbp_core::{
-    FrozenPlan, Identity, LightPaths, Plan, Radii, Radius, RadiusField, Settings, State, StateError,
-};
+use upbp_core::{FrozenPlan, LightPaths, Plan, Radii, Radius, RadiusField, Settings, State, StateError};
 use upbp_scene::ReadyScene;
 use upbp_testing::renderer;
 
@@ -169,7 +167,8 @@ fn a_field_is_part_of_plans_and_states() {
     uniform.radii.field = RadiusField::Uniform;
     let in_lanes = Plan { lanes: Some([0.5, 0.25, 0.25]), ..plan };
     for (name, plan) in [("radii.field", uniform), ("lanes", in_lanes)] {
-        let other = Identity { plan, ..state.identity().clone() };
+        let mut other = state.identity().clone();
+        other.plan = plan;
         let different = other.check_same(state.identity());
         assert!(
             matches!(&different, Err(StateError::Different { differences }) if differences[0].contains(name))

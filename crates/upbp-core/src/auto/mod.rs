@@ -116,7 +116,7 @@ fn check<S: Scene>(
 ) -> Result<Choice, RenderError> {
     let plan = frozen.plan;
     plan.validate().map_err(RenderError::PlanValue)?;
-    scene.set_emitter_choice(&frozen.emitters)?;
+    scene.set_emitter_choice(&frozen.emitters).map_err(RenderError::PlanEmitters)?;
     let support = TechniqueSupport::of(scene, settings)?;
     support.check(&plan)?;
     let room = Room::of(scene, settings, support.techniques, plan.lanes.is_some(), true)?;

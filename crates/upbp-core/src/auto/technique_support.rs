@@ -16,6 +16,7 @@ use crate::settings::Settings;
 
 /// The techniques that remain, and why others do not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TechniqueSupport {
     /// Techniques that the settings allow and the scene can use; a [plan](crate::Plan) runs some of them.
     pub techniques: TechniqueSet,
@@ -96,10 +97,8 @@ impl TechniqueSupport {
             || scene.emitters().iter().any(is_area);
         match (is_hit, prepared.has_emitters()) {
             (true, true) => {}
-            (true, false) => support.drop(
-                "nothing that shines can be chosen: only emission hits remain",
-                chosen.without(hit),
-            ),
+            (true, false) => support
+                .drop("nothing that shines can be chosen: only emission hits remain", chosen.without(hit)),
             (false, true) => support.drop("no light can be hit: emission hits are off", hit),
             (false, false) => support.drop("nothing shines that reaches the scene", TechniqueSet::ALL),
         }

@@ -57,11 +57,11 @@ pub(crate) struct HalfImage<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ErrorEstimate {
-    /// The likely value; infinite where there is nothing to tell it from.
+    /// The relMSE that is likely; infinite where there is nothing to tell it from.
     pub relative_mse: f64,
-    /// Lower end of the interval.
+    /// Lower end of the interval that the relMSE is likely in.
     pub low: f64,
-    /// Upper end of the interval; infinite with a doubt.
+    /// Upper end of the interval that the relMSE is likely in; infinite with a doubt.
     pub high: f64,
     /// The doubt for which there is no upper end.
     pub doubt: Option<Doubt>,

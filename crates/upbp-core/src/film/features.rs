@@ -11,6 +11,7 @@ use super::pixel_sets::set_of;
 
 /// Means of what the camera sees first, on surfaces that are not mirrors or glass, and in media.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FeatureImages {
     /// Albedo, in `[0, 1]`, with light that is seen directly.
     pub albedo: Image,

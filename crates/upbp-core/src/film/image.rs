@@ -7,7 +7,7 @@ pub struct Image {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Red, green and blue of each pixel.
+    /// Red, green and blue of each pixel, linear Rec. 709: radiance in W m⁻² sr⁻¹ where nothing else is said.
     pub pixels: Vec<[f32; 3]>,
 }
 

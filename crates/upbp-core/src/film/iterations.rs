@@ -43,7 +43,7 @@ impl IterationSet {
 
     /// The least index of `range` that is not in the set.
     #[must_use]
-    pub fn first_missing(&self, range: &Range<u64>) -> Option<u64> {
+    pub(crate) fn first_missing(&self, range: &Range<u64>) -> Option<u64> {
         let next = match self.ranges.get(self.following(range.start)) {
             Some(own) if own.start <= range.start => own.end,
             _ => range.start,
@@ -59,13 +59,13 @@ impl IterationSet {
 
     /// Number of indices of `range` in the set.
     #[must_use]
-    pub fn count_in(&self, range: &Range<u64>) -> u64 {
+    pub(crate) fn count_in(&self, range: &Range<u64>) -> u64 {
         self.ranges.iter().map(|own| overlap(own, range).map_or(0, |both| both.end - both.start)).sum()
     }
 
     /// The first range that is in both sets.
     #[must_use]
-    pub fn overlap(&self, other: &Self) -> Option<Range<u64>> {
+    pub(crate) fn overlap(&self, other: &Self) -> Option<Range<u64>> {
         let mut others = other.ranges.iter().peekable();
         self.ranges.iter().find_map(|own| {
             while others.next_if(|theirs| theirs.end <= own.start).is_some() {}

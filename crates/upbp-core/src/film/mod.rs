@@ -326,7 +326,7 @@ impl Film {
         }
     }
 
-    /// The mean of all iterations, all layers together.
+    /// The mean of all iterations, all layers together: radiance in W m⁻² sr⁻¹, linear Rec. 709.
     #[must_use]
     pub fn image(&self) -> Image {
         self.collect(|i, [even, odd]| self.total(i).map(|v| v / (even + odd)))
@@ -357,7 +357,7 @@ impl Film {
 
     /// Number of samples of each pixel.
     #[must_use]
-    pub fn sample_counts(&self) -> Vec<f32> {
+    pub(crate) fn sample_counts(&self) -> Vec<f32> {
         let (counts, width) = (self.counts(), self.rect.width as usize);
         let count = |i: usize| counts[set_of(i % width, i / width) as usize];
         (0..self.len()).map(|i| count(i).iter().sum::<f64>() as f32).collect()
@@ -430,7 +430,7 @@ impl Film {
     /// of the two halves: 1 where errors of neighbours are independent, less where they even out. `None`
     /// without two halves that differ.
     #[must_use]
-    pub fn shared_error(&self) -> Option<f64> {
+    pub(crate) fn shared_error(&self) -> Option<f64> {
         let [even, odd] = self.halves()?;
         let image = self.image();
         let of = |sides: &[u32]| even.difference_over(sides, &odd, &image);

@@ -22,6 +22,7 @@ pub(crate) const SAMPLES: u32 = 12;
 /// The plan is part of it: so slices from machines whose mathematical functions differ in the last bit, and
 /// which therefore chose otherwise, are refused and not mixed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Identity {
     /// Version of the renderer.
     pub version: String,

@@ -7,6 +7,7 @@ use upbp_estimators::Counters;
 
 /// Wall seconds of the passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PassSeconds {
     /// The preparation, with its pilot renders.
     pub preparation: f64,
@@ -85,7 +86,7 @@ impl ErrorSeries {
     const SPACING: f64 = 1.01;
 
     /// Adds a point, which replaces those that have as many iterations or more.
-    pub fn push(&mut self, point: ErrorPoint) {
+    pub(crate) fn push(&mut self, point: ErrorPoint) {
         while self.0.last().is_some_and(|last| last.iterations >= point.iterations) {
             self.0.pop();
         }

@@ -5,12 +5,15 @@ use std::f64::consts::{PI, TAU};
 use glam::Vec3;
 
 use super::moments::{Distribution, Mean, Places, Sources};
-use super::{Check, DRAWS, Random, direction, is_density, is_light, is_unit, require, same, same_spectrum};
+use super::{
+    Check, ContractViolation, DRAWS, Random, direction, is_density, is_light, is_unit, require, same,
+    same_spectrum,
+};
 use crate::random::ONE_MINUS_EPSILON;
 use crate::scene::{BoundingSphere, Emission, Emitter, EmitterKind, EmitterPoint};
 
 /// Checks the contract of [`Emitter`] in a scene with these bounds, for receivers at the given points, of
-/// which a light that shines should reach at least one.
+/// which the light of a surface or volume that shines must reach at least one.
 pub fn check_emitter(emitter: &impl Emitter, bounds: &BoundingSphere, receivers: &[Vec3]) -> Check {
     let power = emitter.power(bounds);
     require(power.is_finite() && power >= 0.0, "power is finite and not negative", power)?;
@@ -29,13 +32,18 @@ pub fn check_emitter(emitter: &impl Emitter, bounds: &BoundingSphere, receivers:
 fn check_densities(emitter: &impl Emitter, bounds: &BoundingSphere, receivers: &[Vec3]) -> Check {
     let mut random = Random(7);
     let mut guided = Guided::default();
+    let (mut shines, mut reaches) = (false, false);
     for _ in 0..2000 {
-        check_emission(emitter, bounds, &mut random, &mut guided)?;
+        shines |= check_emission(emitter, bounds, &mut random, &mut guided)?;
         for &receiver in receivers {
-            check_incident(emitter, bounds, receiver, &mut random)?;
+            reaches |= check_incident(emitter, bounds, receiver, &mut random)?;
         }
     }
     guided.check()?;
+    // Without a receiver that it reaches, nothing compares what is chosen with what is emitted.
+    let is_compared =
+        reaches || !shines || !matches!(emitter.kind(), EmitterKind::Area | EmitterKind::Volume(_));
+    require(is_compared, "a light that shines reaches some receiver", receivers)?;
     if emitter.kind().is_infinite() {
         check_disc(emitter, bounds, &mut random)?;
     }
@@ -61,16 +69,18 @@ fn check_densities(emitter: &impl Emitter, bounds: &BoundingSphere, receivers: &
     }
 }
 
+/// Whether a start brings light.
 fn check_emission(
     emitter: &impl Emitter,
     bounds: &BoundingSphere,
     random: &mut Random,
     guided: &mut Guided,
-) -> Check {
+) -> Result<bool, ContractViolation> {
     let (u_position, u_direction) = (random.pair(), random.pair());
     let Some(emission) = emitter.sample_emission(bounds, u_position, u_direction) else {
-        return Ok(());
+        return Ok(false);
     };
+    let is_bright = !emission.radiance.is_black();
     let kind = emitter.kind();
     require(is_unit(emission.direction), "light goes along a unit vector", emission)?;
     require(emission.point.position.is_finite(), "light starts at a finite point", emission)?;
@@ -99,11 +109,12 @@ fn check_emission(
     check_bounds(emitter, bounds, &emission)?;
     let seen = emitter.hit(bounds, &emission.point, emission.direction, receiver);
     require(seen.is_some() == kind.is_hittable(), "hit answers for lights that can be hit", emission)?;
-    let Some(seen) = seen else { return Ok(()) };
+    let Some(seen) = seen else { return Ok(is_bright) };
     let agrees = same_spectrum(seen.radiance, emission.radiance)
         && same(seen.pdf_position, emission.pdf_position)
         && same(seen.pdf_direction, emission.pdf_direction);
-    require(agrees, "hit agrees with sample_emission", (emission, seen))
+    require(agrees, "hit agrees with sample_emission", (emission, seen))?;
+    Ok(is_bright)
 }
 
 /// Light starts within the bounds of its emitter, and goes where these say.
@@ -220,15 +231,17 @@ fn check_single(emitter: &impl Emitter, bounds: &BoundingSphere, random: &mut Ra
     if violations.len() * 100 <= draws.len() { Ok(()) } else { Err(violations.swap_remove(0)) }
 }
 
+/// Whether a draw brings light to the receiver.
 fn check_incident(
     emitter: &impl Emitter,
     bounds: &BoundingSphere,
     receiver: Vec3,
     random: &mut Random,
-) -> Check {
+) -> Result<bool, ContractViolation> {
     let Some(incident) = emitter.sample_incident(bounds, receiver, random.pair()) else {
-        return Ok(());
+        return Ok(false);
     };
+    let is_bright = !incident.radiance.is_black();
     let kind = emitter.kind();
     let case = (receiver, incident);
     require(is_unit(incident.towards_light), "the direction to a light is a unit vector", case)?;
@@ -244,7 +257,8 @@ fn check_incident(
         require(near, "direction and distance lead to the chosen point", case)?;
     }
     let Some(seen) = emitter.hit(bounds, &incident.point, -incident.towards_light, receiver) else {
-        return require(!kind.is_hittable(), "a chosen point of a light can be hit", case);
+        require(!kind.is_hittable(), "a chosen point of a light can be hit", case)?;
+        return Ok(is_bright);
     };
     let agrees = same_spectrum(seen.radiance, incident.radiance)
         && same(seen.pdf_incident, incident.pdf)
@@ -253,7 +267,8 @@ fn check_incident(
     require(agrees, "hit agrees with sample_incident", (case, seen))?;
     let alone =
         emitter.pdf_incident(bounds, &incident.point, -incident.towards_light, receiver, seen.pdf_position);
-    require(same(alone, incident.pdf), "pdf_incident agrees with sample_incident", (case, alone))
+    require(same(alone, incident.pdf), "pdf_incident agrees with sample_incident", (case, alone))?;
+    Ok(is_bright)
 }
 
 /// Directions from a surface or a volume must be drawn by their density. Directions that are drawn evenly and

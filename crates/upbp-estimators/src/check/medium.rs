@@ -2,7 +2,7 @@
 
 use upbp_media::{Medium, RaySegment, SegmentDensity, Spectrum};
 
-use super::{Check, DRAWS, Random, is_light, require};
+use super::{Check, ContractViolation, DRAWS, Random, is_light, require};
 use crate::scene::BoundingSphere;
 
 /// Segments that are looked at.
@@ -12,7 +12,8 @@ const SEGMENTS: usize = 16;
 const CELLS: usize = 8;
 
 /// Checks the contract of [`Medium`] on random segments inside `bounds`: ranges of all values, that walks
-/// pass and stop as often as `segment` says, in each lane as often as `segment_lanes` says, that a walk the
+/// pass and stop as often as `segment` says, in each lane as often as `segment_lanes` says, wherever the end,
+/// and can stop wherever light is scattered; that lanes are equal that have equal extinctions, that a walk the
 /// other way has the densities that the first one is told of it, that transmittance is a product over pieces,
 /// and that points drawn for their light bring what is `emitted`.
 pub fn check_medium(medium: &impl Medium, bounds: &BoundingSphere) -> Check {
@@ -28,9 +29,11 @@ pub fn check_medium(medium: &impl Medium, bounds: &BoundingSphere) -> Check {
         check_coefficients(medium, &segment)?;
         check_product(medium, &segment)?;
         check_emission(medium, &segment, &mut random)?;
+        check_equal_lanes(medium, &segment)?;
         for lane in [None, Some(0), Some(1), Some(2)] {
             let walks = Walks { medium, lane };
             check_distances(&walks, &segment, &mut random)?;
+            check_stops(&walks, &segment)?;
             check_other_way(&walks, &segment)?;
         }
     }
@@ -69,7 +72,7 @@ impl<M: Medium> Walks<'_, M> {
         }
     }
 
-    fn density(&self, segment: &RaySegment) -> Result<SegmentDensity, super::ContractViolation> {
+    fn density(&self, segment: &RaySegment) -> Result<SegmentDensity, ContractViolation> {
         let whole = self.medium.segment(segment);
         let density = match self.lane {
             Some(lane) => {
@@ -111,6 +114,35 @@ fn check_product(medium: &impl Medium, segment: &RaySegment) -> Check {
         * walks.density(&RaySegment { start: middle, ..*segment })?.transmittance;
     let agrees = (0..3).all(|c| (whole[c] - parts[c]).abs() <= 1e-4);
     require(agrees, "transmittance is the product over pieces", (segment, whole, parts))
+}
+
+/// Checks that lanes with equal extinctions are equal: walks draw only one of them.
+fn check_equal_lanes(medium: &impl Medium, segment: &RaySegment) -> Check {
+    let extinctions = medium.lane_extinctions().unwrap_or(Spectrum::ZERO);
+    let density = medium.segment_lanes(segment);
+    let values = [density.pass_probability, density.stop_at_start, density.stop_at_end];
+    for (a, b) in [(0, 1), (0, 2), (1, 2)].into_iter().filter(|&(a, b)| extinctions[a] == extinctions[b]) {
+        let are_equal = values.iter().all(|of| (of[a] - of[b]).abs() <= 1e-3 * of[a].max(of[b]));
+        require(are_equal, "lanes of equal extinctions are equal", (segment, extinctions, density))?;
+    }
+    Ok(())
+}
+
+/// Checks that a walk can stop where light arrives and is scattered; a lane, where its channel is.
+fn check_stops<M: Medium>(walks: &Walks<'_, M>, segment: &RaySegment) -> Check {
+    for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        let end = segment.start + part * segment.length();
+        let density = walks.density(&RaySegment { end, ..*segment })?;
+        let scattered = density.transmittance * walks.medium.sigma_s(segment.at(end));
+        let is_scattered = (0..3).any(|c| walks.lane.is_none_or(|lane| lane == c) && scattered[c] > 0.0);
+        let case = (segment, walks.lane, end, density);
+        require(
+            !is_scattered || density.stop_at_end > 0.0,
+            "a walk can stop where light is scattered",
+            case,
+        )?;
+    }
+    Ok(())
 }
 
 /// Checks that a walk from the end to the start passes as often, and stops with the density that `segment`
@@ -181,7 +213,10 @@ fn check_distances<M: Medium>(walks: &Walks<'_, M>, segment: &RaySegment, random
     }
     let mut observed = [0_u32; CELLS];
     for _ in 0..DRAWS {
-        let Some(t) = walks.sample_distance(segment, [random.next(), random.next()]) else { continue };
+        let u = [random.next(), random.next()];
+        let stop = walks.sample_distance(segment, u);
+        check_without_end(walks, segment, u, stop)?;
+        let Some(t) = stop else { continue };
         let case = (segment, walks.lane, t);
         let is_inside = t >= segment.start && t < segment.end;
         require(walks.medium.scatters() && is_inside, "a walk stops inside of the segment", case)?;
@@ -199,9 +234,28 @@ fn check_distances<M: Medium>(walks: &Walks<'_, M>, segment: &RaySegment, random
     Ok(())
 }
 
+/// Checks that a walk that stops in the segment does so in one without an end, too, and that one that passes
+/// does not stop before the end.
+fn check_without_end<M: Medium>(
+    walks: &Walks<'_, M>,
+    segment: &RaySegment,
+    u: [f32; 2],
+    stop: Option<f32>,
+) -> Check {
+    let without_end = walks.sample_distance(&RaySegment { end: f32::INFINITY, ..*segment }, u);
+    let nearest = stop.unwrap_or(segment.end);
+    let rounding = 1e-3 * (nearest - segment.start) + 8.0 * f32::EPSILON * nearest.abs();
+    let agrees = match without_end {
+        Some(t) => t >= nearest - rounding && (stop.is_none() || t <= nearest + rounding),
+        None => stop.is_none(),
+    };
+    let case = (segment, walks.lane, u, stop, without_end);
+    require(agrees, "where a walk stops does not depend on the end", case)
+}
+
 /// Checks that the density to stop at the `end` of a part of the segment is the rate at which fewer pass.
 fn check_density(
-    upto: &impl Fn(f32) -> Result<SegmentDensity, super::ContractViolation>,
+    upto: &impl Fn(f32) -> Result<SegmentDensity, ContractViolation>,
     segment: &RaySegment,
     sigma_t: Spectrum,
     end: f32,

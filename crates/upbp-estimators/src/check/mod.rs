@@ -29,6 +29,7 @@ use std::fmt::Debug;
 use glam::Vec3;
 
 use crate::Spectrum;
+use crate::random::mix;
 
 /// An implementation does not keep a contract.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -61,9 +62,7 @@ impl Random {
     /// Uniform in `[0, 1)`.
     fn next(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1_u32 << 24) as f32
+        (mix(self.0) >> 40) as f32 / (1_u32 << 24) as f32
     }
 
     fn pair(&mut self) -> [f32; 2] {

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use glam::{DVec3, Vec3};
 
 use super::{Check, Random, require};
+use crate::effective_samples;
 use crate::scene::{BoundingSphere, Emitter};
 
 /// Mean of random terms, and its standard error.
@@ -65,9 +66,7 @@ impl Distribution {
 
     /// As many samples of the same light would tell as much.
     fn effective_samples(&self) -> f64 {
-        let light: f64 = self.0.iter().map(|(light, _)| light).sum();
-        let squares: f64 = self.0.iter().map(|(light, _)| light * light).sum();
-        if squares > 0.0 { light * light / squares } else { 0.0 }
+        effective_samples(self.0.iter().map(|(light, _)| *light))
     }
 
     /// Whether both are draws of one distribution, as far as there are enough of them to tell.

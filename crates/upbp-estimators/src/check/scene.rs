@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use upbp_media::{Medium as _, MediumId, RaySegment, Spectrum};
 
 use super::normals::Normals;
-use super::{Check, ContractViolation, Random, is_unit, require, same_spectrum};
+use super::{Check, Random, is_unit, require, same_spectrum};
 use crate::Ray;
 use crate::path::{cross_all, has_surface};
 use crate::scene::{
@@ -61,11 +61,7 @@ pub fn check_scene(scene: &impl Scene) -> Check {
         }
     }
     normals.check()?;
-    if !agree {
-        let first = violations.swap_remove(0);
-        return Err(ContractViolation { details: format!("{first:?}"), ..first });
-    }
-    Ok(())
+    if agree { Ok(()) } else { Err(violations.swap_remove(0)) }
 }
 
 /// Checks that lights are where the scene is, and that rays meet those with an area: weights count on it.

@@ -206,7 +206,7 @@ impl MisPlan {
     /// `pass_probability` and at whose end it stops with density `t` (section 1.3).
     #[inline]
     #[must_use]
-    pub fn distance_density(
+    pub(crate) fn distance_density(
         &self,
         walk: Walk,
         in_medium: bool,
@@ -273,7 +273,7 @@ impl MisPlan {
     /// sub-paths' distances.
     #[inline]
     #[must_use]
-    pub fn merge_sum<D: Densities>(
+    pub(crate) fn merge_sum<D: Densities>(
         &self,
         kind: MergeKind,
         light: DistanceDensity,

@@ -5,11 +5,23 @@ use std::ops::{Add, Mul};
 
 use crate::technique::{PerTechnique, Technique};
 
+mod sealed {
+    /// The sums of densities that there are.
+    #[expect(unnameable_types, reason = "no other crate is to implement it")]
+    pub trait Sealed {}
+
+    impl Sealed for f64 {}
+    impl Sealed for super::ByTechnique {}
+}
+
 /// A sum of densities of techniques, with their counts, as the heuristic takes them.
 ///
 /// The recursion is linear in the counts, so it can carry the sum of all techniques (`f64`, what a render
 /// needs) or every technique for itself ([`ByTechnique`], from which the weights of any other counts follow).
-pub trait Densities: Copy + fmt::Debug + Send + Sync + Add<Output = Self> + Mul<f64, Output = Self> {
+/// Nothing else implements it.
+pub trait Densities:
+    sealed::Sealed + Copy + fmt::Debug + Send + Sync + Add<Output = Self> + Mul<f64, Output = Self>
+{
     /// Densities of no technique.
     const ZERO: Self;
 

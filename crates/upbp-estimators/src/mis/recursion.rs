@@ -274,7 +274,7 @@ impl BeamExtent {
     /// that the beam gets there at all, if it is short.
     #[inline]
     #[must_use]
-    pub const fn normalisation(self, pass_probability: f64) -> f64 {
+    pub(crate) const fn normalisation(self, pass_probability: f64) -> f64 {
         match self {
             Self::Short => pass_probability,
             Self::Long => 1.0,

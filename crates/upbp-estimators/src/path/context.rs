@@ -10,6 +10,7 @@ use crate::prepared_scene::PreparedScene;
 use crate::scene::{Crossing, PathEnd, Scene};
 
 /// The scene and the plan of an iteration.
+#[derive(Debug)]
 pub struct Context<'a, S: Scene> {
     /// The scene, made ready.
     pub prepared: &'a PreparedScene<'a, S>,
@@ -55,6 +56,7 @@ impl<S: Scene> Context<'_, S> {
 }
 
 /// Buffers of one thread, kept from path to path.
+#[derive(Debug)]
 pub struct Scratch<B, L: Lanes = f64> {
     pub(crate) edge_trace: EdgeTrace<B, L>,
     pub(crate) crossings: Vec<Crossing>,

@@ -52,6 +52,7 @@ impl<L> MediumSpan<L> {
 
 /// A ray from a vertex to the next surface that scatters, to infinity, or to where the walk stops in a
 /// medium. Its densities are those of each of the [`Lanes`] `L`.
+#[derive(Debug)]
 pub struct EdgeTrace<B, L: Lanes = f64> {
     /// The ray; the edge begins at its lower end.
     pub ray: Ray,
@@ -201,7 +202,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
 
     /// Whether nothing is known of the ray, since the scene's answers cannot be true.
     #[must_use]
-    pub const fn is_lost(&self) -> bool {
+    pub(crate) const fn is_lost(&self) -> bool {
         self.lost
     }
 
@@ -443,7 +444,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
     }
 
     /// The spans that a beam along the edge runs through, each with the distance where the beam ends in it.
-    pub fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&MediumSpan<L>, f32)> {
+    pub(crate) fn beam_spans(&self, extent: BeamExtent) -> impl Iterator<Item = (&MediumSpan<L>, f32)> {
         let stop = match extent {
             BeamExtent::Short => self.stop,
             BeamExtent::Long => None,

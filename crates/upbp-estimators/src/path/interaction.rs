@@ -107,7 +107,12 @@ impl<B> Interaction<B> {
 impl<B: Bsdf> Interaction<B> {
     /// The surface of a hit, between the bodies of `sides`. `None` if the surface is grazed.
     #[inline]
-    pub fn at_hit(hit: &Hit<B>, bsdf: B, direction: Vec3, sides: &MediumInterface<'_>) -> Option<Self> {
+    pub(crate) fn at_hit(
+        hit: &Hit<B>,
+        bsdf: B,
+        direction: Vec3,
+        sides: &MediumInterface<'_>,
+    ) -> Option<Self> {
         let cos = direction.dot(hit.geometric_normal);
         if cos.abs() < MIN_COSINE {
             return None;

@@ -39,7 +39,7 @@ impl Interface {
     /// A surface with the same index on both sides.
     pub const MATCHED: Self = Self { above: 1.0, below: 1.0 };
 
-    /// That of a surface whose normal points to the other side.
+    /// The interface as seen with the normal on the other side: the indices change places.
     #[must_use]
     pub const fn turned(self) -> Self {
         Self { above: self.below, below: self.above }

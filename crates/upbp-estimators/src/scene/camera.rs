@@ -77,6 +77,8 @@ impl PixelRect {
 }
 
 /// A camera with an ideal lens: the value of a pixel is the mean radiance over its square and the lens.
+///
+/// `Box<dyn Camera>` and `Arc<dyn Camera>` are cameras, too, for hosts with cameras of several types.
 pub trait Camera: Send + Sync {
     /// Width and height of the film in pixels.
     fn resolution(&self) -> (u32, u32);

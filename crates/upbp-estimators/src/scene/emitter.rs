@@ -42,13 +42,13 @@ pub enum EmitterKind {
 }
 
 impl EmitterKind {
-    /// Infinitely far away: the first edge of a path has no distance.
+    /// Whether emitters of this kind are infinitely far away: the first edge of a path has no distance.
     #[must_use]
     pub const fn is_infinite(self) -> bool {
         matches!(self, Self::Directional | Self::Environment)
     }
 
-    /// Whether a camera sub-path can end on it by chance.
+    /// Whether a camera sub-path can end on an emitter of this kind by chance.
     #[must_use]
     pub const fn is_hittable(self) -> bool {
         matches!(self, Self::Area | Self::Environment | Self::Volume(_))
@@ -200,6 +200,8 @@ impl EmitterBounds {
 /// `sphere` holds the scene: light from infinity starts on a disc in front of it. It is
 /// [the bounds of the scene](super::Scene::bounds), or a larger sphere around a point that matters to the
 /// picture. It may change within a render, so an emitter must not keep anything that it worked out from it.
+///
+/// `Box<dyn Emitter>` and `Arc<dyn Emitter>` are emitters, too, for scenes with lights of several types.
 pub trait Emitter: Send + Sync {
     /// The kind of the light.
     fn kind(&self) -> EmitterKind;

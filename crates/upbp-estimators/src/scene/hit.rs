@@ -80,8 +80,8 @@ impl<B> Hit<B> {
         })
     }
 
-    /// Whether a ray from `t_min` on can have met it: it lies ahead, and all its numbers are finite. A walk
-    /// that meets another is lost.
+    /// Whether a ray from `t_min` on can have met this surface: the hit lies ahead, and all its numbers are
+    /// finite. A walk that meets another is lost.
     #[inline]
     #[must_use]
     pub fn is_sound(&self, t_min: f32) -> bool {

@@ -17,6 +17,7 @@ mod bsdf;
 mod camera;
 mod emitter;
 mod hit;
+mod pointers;
 
 pub use bsdf::{Bsdf, BsdfEvaluation, BsdfSample, Interface, Walk};
 pub use camera::{Camera, CameraConnection, CameraRay, LensConnection, PixelRect};

@@ -28,13 +28,6 @@ impl Deflection<f32> {
         }
     }
 
-    /// From the cosine, which is clamped to `[-1, 1]`.
-    #[inline]
-    pub(super) fn from_cosine(cos_theta: f32) -> Self {
-        let cos_theta = cos_theta.clamp(-1.0, 1.0);
-        Self { one_minus_cos: 1.0 - cos_theta, one_plus_cos: 1.0 + cos_theta }
-    }
-
     #[inline]
     pub(super) fn cosine(self) -> f32 {
         0.5 * (self.one_plus_cos - self.one_minus_cos)

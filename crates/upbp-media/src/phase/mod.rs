@@ -31,6 +31,7 @@ const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// A phase function, symmetric about the direction of propagation.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum PhaseFunction {
     /// Equal in all directions: `1 / 4π` per steradian.
     Isotropic,
@@ -165,15 +166,6 @@ impl PhaseFunction {
     #[must_use]
     pub fn eval(&self, before: Vec3, after: Vec3) -> PhaseValue {
         self.value(Deflection::between(before, after))
-    }
-
-    /// The value per steradian at the cosine of the angle between the directions of propagation.
-    ///
-    /// Only as exact as the cosine: prefer [`eval`](Self::eval) for narrow peaks.
-    #[inline]
-    #[must_use]
-    pub fn eval_cosine(&self, cos_theta: f32) -> PhaseValue {
-        self.value(Deflection::from_cosine(cos_theta))
     }
 
     /// Draws the direction after a collision, for a unit direction `before` and two uniform numbers in `[0,

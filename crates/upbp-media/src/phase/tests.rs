@@ -46,6 +46,11 @@ fn all() -> Vec<PhaseFunction> {
     all
 }
 
+/// The value per steradian of a phase function whose channels are equal, at an angle in radians.
+fn at_angle(phase: &PhaseFunction, angle: f32) -> f32 {
+    phase.eval(Vec3::Z, Vec3::new(angle.sin(), 0.0, angle.cos())).pdf
+}
+
 /// `1 − cos θ` and `1 + cos θ` of two directions, in double precision.
 fn deflection(before: Vec3, after: Vec3) -> (f64, f64) {
     let (before, after): (DVec3, DVec3) = (before.as_dvec3().normalize(), after.as_dvec3().normalize());
@@ -182,15 +187,6 @@ fn eval_is_symmetric_and_agrees_with_the_cosine() {
             let value = phase.eval(before, after);
             assert_eq!(value, phase.eval(after, before));
             assert_eq!(value, phase.eval(-before, -after));
-            let one_minus = f64::from(1.0 - before.dot(after).abs());
-            if one_minus > 1e-2 {
-                let (from_cosine, value) = (phase.eval_cosine(before.dot(after)).pdf, value.pdf);
-                assert!((from_cosine / value - 1.0).abs() < 1e-3, "{phase:?}: {from_cosine}, {value}");
-            }
-        }
-        for cos_theta in [1.0 + 1e-6, -1.0 - 1e-6] {
-            assert!(phase.eval_cosine(cos_theta).pdf >= 0.0);
-            assert_eq!(phase.eval_cosine(cos_theta), phase.eval_cosine(cos_theta.round()));
         }
     }
 }

@@ -190,8 +190,7 @@ impl ReadyScene {
             let Some(own) = plane_of(&crossings[anchor]) else { continue };
             let width = own.width(ray);
             let coincides = |other: &Crossing| {
-                (other.t - t).abs() < width
-                    && plane_of(other).is_some_and(|plane| own.coincides(&plane, ray))
+                (other.t - t).abs() < width && plane_of(other).is_some_and(|plane| own.coincides(&plane, ray))
             };
             next += crossings[next..].iter().take_while(|other| coincides(other)).count();
             let end = crossings[next - 1].t;

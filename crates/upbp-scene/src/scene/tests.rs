@@ -343,7 +343,10 @@ fn what_is_above_a_wide_mesh_is_not_in_its_plane() {
     // ground may have been turned there.
     let ground = [
         ("[(-1e5, 0, -1e5), (-1e5, 0, 1e5), (1e5, 0, 1e5), (1e5, 0, -1e5)]", ""),
-        ("[(-1e5, 1e5, 0), (-1e5, -1e5, 0), (1e5, -1e5, 0), (1e5, 1e5, 0)]", "rotate: [(axis: (1, 0, 0), degrees: -90)]"),
+        (
+            "[(-1e5, 1e5, 0), (-1e5, -1e5, 0), (1e5, -1e5, 0), (1e5, 1e5, 0)]",
+            "rotate: [(axis: (1, 0, 0), degrees: -90)]",
+        ),
     ];
     for (positions, rotate) in ground {
         let scene = scene(

@@ -1,17 +1,18 @@
-//! The contract checkers find what they are there to find: each fault below would bias an image.
+//! The contract checkers find what they are there to find: each fault would bias an image.
+
+mod media;
 
 use glam::{Vec2, Vec3};
-use upbp_estimators::check::{check_bsdf, check_camera, check_emitter, check_medium, check_scene};
+use upbp_accel::Quad;
+use upbp_estimators::check::{check_bsdf, check_camera, check_emitter, check_scene};
 use upbp_estimators::scene::{
     Boundary, BoundingSphere, Bsdf, BsdfEvaluation, BsdfSample, Camera, CameraConnection, CameraRay,
     Emission, EmissionCoordinates, Emitter, EmitterId, EmitterKind, EmitterPoint, Hit, HitDensities,
     Incident, Interface, LensConnection, PathEnd, PixelRect, Scene, Walk,
 };
 use upbp_estimators::{PreparedScene, Ray};
-use upbp_media::{
-    BodyId, Homogeneous, Interior, Medium, MediumId, PhaseFunction, RaySegment, SegmentDensity, Spectrum,
-};
-use upbp_scene::light::{ConstantEnvironment, Light};
+use upbp_media::{BodyId, Homogeneous, Interior, MediumId, Spectrum};
+use upbp_scene::light::{AreaLight, ConstantEnvironment, Light};
 use upbp_scene::material::{Dielectric, Lambert, Material, Phong};
 use upbp_scene::{PerspectiveCamera, PerspectiveView, ReadyScene};
 
@@ -274,6 +275,22 @@ fn draws_that_do_not_follow_their_densities_are_found() {
     assert_eq!(guided, 1, "the sky");
 }
 
+/// What is chosen for a receiver on the dark side is never compared with what is emitted.
+#[test]
+fn a_light_that_reaches_no_receiver_is_not_checked() {
+    let bounds = BoundingSphere { centre: Vec3::ZERO, radius: 2.0 };
+    let quad = Quad::new(Vec3::ZERO, Vec3::X, Vec3::Z).unwrap();
+    let lamp = |radiance| WrongLight(Light::Area(AreaLight::new(quad.into(), radiance).unwrap()), "nothing");
+    let check = |radiance, receivers: &[Vec3]| check_emitter(&lamp(radiance), &bounds, receivers);
+    let [above, below] = [Vec3::new(0.3, 1.0, 0.4), Vec3::new(0.3, -1.0, 0.4)];
+    check(Spectrum::ONE, &[above, below]).unwrap();
+    check(Spectrum::ZERO, &[]).unwrap();
+    let one_side = [above, below].map(|receiver| check(Spectrum::ONE, &[receiver]));
+    let violation = one_side.into_iter().find_map(Result::err).unwrap();
+    assert_eq!(violation.what, "a light that shines reaches some receiver");
+    assert_eq!(check(Spectrum::ONE, &[]).unwrap_err().what, violation.what);
+}
+
 /// Mirrors and glass that err in what `.1` says.
 #[derive(Clone, Copy)]
 struct WrongGlass(Material, &'static str);
@@ -380,108 +397,6 @@ fn faults_of_a_camera_are_found() {
     assert_eq!(fault(1.0, 1.0, Vec2::splat(0.5)), "connect inverts ray");
     assert_eq!(fault(1.0, 1.1, Vec2::ZERO), "images of a point have the density of connect_at");
     assert_eq!(fault(f32::INFINITY, 1.0, Vec2::ZERO), "some place of the film has a ray");
-}
-
-/// A medium that errs in what `.1` says.
-struct WrongMedium(Homogeneous, &'static str);
-
-impl WrongMedium {
-    fn errs(&self, what: &str) -> f64 {
-        if self.1 == what { 0.8 } else { 1.0 }
-    }
-}
-
-impl Medium for WrongMedium {
-    fn scatters(&self) -> bool {
-        self.0.scatters()
-    }
-    fn segment(&self, segment: &RaySegment) -> SegmentDensity {
-        let density = self.0.segment(segment);
-        SegmentDensity {
-            stop_at_end: self.errs("density") * density.stop_at_end,
-            stop_at_start: self.errs("density the other way") * density.stop_at_start,
-            ..density
-        }
-    }
-    fn sample_distance(&self, segment: &RaySegment, u_channel: f32, u_distance: f32) -> Option<f32> {
-        let stop = self.0.sample_distance(segment, u_channel, u_distance)?;
-        Some(segment.start + self.errs("distances") as f32 * (stop - segment.start))
-    }
-    fn lane_extinctions(&self) -> Option<Spectrum> {
-        self.0.lane_extinctions()
-    }
-    fn segment_lanes(&self, segment: &RaySegment) -> SegmentDensity<[f64; 3]> {
-        let mut lanes = self.0.segment_lanes(segment);
-        lanes.stop_at_end[2] *= self.errs("density of a lane");
-        lanes
-    }
-    fn sample_lane(&self, segment: &RaySegment, lane: usize, u: [f32; 2]) -> Option<f32> {
-        let lane = if self.errs("lane") < 1.0 { 0 } else { lane };
-        self.0.sample_lane(segment, lane, u)
-    }
-    fn sigma_s(&self, position: Vec3) -> Spectrum {
-        self.0.sigma_s(position)
-    }
-    fn sigma_t(&self, position: Vec3) -> Spectrum {
-        self.0.sigma_t(position)
-    }
-    fn emits(&self) -> bool {
-        self.0.emits()
-    }
-    fn emitted(&self, segment: &RaySegment) -> Spectrum {
-        self.0.emitted(segment)
-    }
-    fn source(&self, position: Vec3) -> Spectrum {
-        self.errs("source") as f32 * self.0.source(position)
-    }
-    fn sample_emitted(&self, segment: &RaySegment, u: f32) -> Option<f32> {
-        self.0.sample_emitted(segment, u)
-    }
-    fn pdf_emitted(&self, segment: &RaySegment, distance: f32) -> f64 {
-        self.0.pdf_emitted(segment, distance)
-    }
-    fn phase(&self) -> &PhaseFunction {
-        self.0.phase()
-    }
-    fn continuation(&self, position: Vec3) -> f32 {
-        self.0.continuation(position)
-    }
-    fn mean_free_path(&self) -> f32 {
-        self.0.mean_free_path()
-    }
-}
-
-#[test]
-fn faults_of_a_medium_are_found() {
-    let bounds = BoundingSphere { centre: Vec3::ONE, radius: 2.0 };
-    let medium = |sigma_a, sigma_s| {
-        let [sigma_a, sigma_s] = [sigma_a, sigma_s].map(|sigma: [f32; 3]| Spectrum::from_array(sigma));
-        Homogeneous::new(sigma_a, sigma_s, PhaseFunction::Isotropic).unwrap()
-    };
-    // Clear, absorbing, thin, dense, and of channels that differ.
-    for (sigma_a, sigma_s) in [
-        ([0.0; 3], [0.0; 3]),
-        ([1.0, 3.0, 0.0], [0.0; 3]),
-        ([0.0; 3], [1e-3; 3]),
-        ([0.1; 3], [300.0; 3]),
-        ([0.0; 3], [0.1, 1.0, 10.0]),
-        ([5.0, 0.0, 1.0], [0.0, 0.5, 200.0]),
-    ] {
-        check_medium(&medium(sigma_a, sigma_s), &bounds).unwrap();
-    }
-    let chromatic =
-        medium([0.1, 0.2, 0.3], [0.5, 1.0, 4.0]).with_emission(Spectrum::new(1.0, 2.0, 3.0)).unwrap();
-    check_medium(&WrongMedium(chromatic.clone(), "nothing"), &bounds).unwrap();
-    for (fault, expected) in [
-        ("density", "walks stop at the rate at which fewer pass"),
-        ("distances", "walks stop where fewer pass"),
-        ("density of a lane", "walks stop at the rate at which fewer pass"),
-        ("lane", "walks stop where fewer pass"),
-        ("density the other way", "a walk the other way stops with the density that is told of it"),
-        ("source", "points of light bring what is emitted"),
-    ] {
-        assert_eq!(check_medium(&WrongMedium(chromatic.clone(), fault), &bounds).unwrap_err().what, expected);
-    }
 }
 
 /// A scene with a fault.

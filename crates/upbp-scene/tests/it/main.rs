@@ -6,6 +6,7 @@ mod errors;
 mod mesh_files;
 mod no_effect;
 mod placement;
+mod pointers;
 mod rooms;
 mod shipped_scenes;
 mod skies;

@@ -44,6 +44,7 @@ impl Object {
 }
 
 /// The scene in closed form.
+#[derive(Debug)]
 pub struct ClosedForm {
     /// Surfaces and boundaries.
     pub objects: Vec<Object>,

@@ -160,7 +160,7 @@ fn a_table_of_a_known_function_is_that_function() {
     let lobe = henyey_greenstein(0.8);
     let rows: Vec<_> = (0..=1800)
         .map(|i| 0.1 * i as f32)
-        .map(|degrees| (degrees, Spectrum::splat(7.0 * lobe.eval_cosine(degrees.to_radians().cos()).pdf)))
+        .map(|degrees| (degrees, Spectrum::splat(7.0 * at_angle(&lobe, degrees.to_radians()))))
         .collect();
     let mut rows = rows;
     rows.last_mut().unwrap().0 = 180.0;
