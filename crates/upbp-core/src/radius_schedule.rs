@@ -143,10 +143,20 @@ impl RadiusSchedule {
     /// Photons within a kernel over those of the first iteration, mean over a number of iterations, which is
     /// about that of the one at a third of them; 1 for techniques that do not merge.
     pub(crate) fn mean_photons(&self, technique: Technique, iterations: f64) -> f64 {
+        self.photons(technique, (iterations - 1.0) / 3.0)
+    }
+
+    /// Photons within a kernel over those of the first iteration, harmonic mean over a number of iterations:
+    /// variances, whose sum the iterations have, are inverse to photons. About that of the one at two fifths.
+    pub(crate) fn harmonic_mean_photons(&self, technique: Technique, iterations: f64) -> f64 {
+        self.photons(technique, 0.42 * (iterations - 1.0))
+    }
+
+    /// Photons within a kernel in some iteration, or between two, over those of the first one.
+    fn photons(&self, technique: Technique, iteration: f64) -> f64 {
         let first = self.first(technique);
         if first > 0.0 {
-            let ratio = f64::from(self.at(technique, (iterations - 1.0) / 3.0)) / f64::from(first);
-            ratio.powi(dimension(technique))
+            (f64::from(self.at(technique, iteration)) / f64::from(first)).powi(dimension(technique))
         } else {
             1.0
         }
@@ -193,10 +203,13 @@ mod tests {
         assert_eq!(schedule.mean_photons(Technique::Connect, 999.0), 1.0);
         for technique in [Technique::Surf, Technique::Pp3d, Technique::Pb2d, Technique::Bb1d] {
             for iterations in [1, 2, 5, 10, 100, 3000] {
-                let photons = |i| f64::from(schedule.at(technique, f64::from(i))).powi(dimension(technique));
-                let mean = (0..iterations).map(photons).sum::<f64>() / f64::from(iterations);
+                let photons = || (0..iterations).map(|i| schedule.photons(technique, f64::from(i)));
+                let mean = photons().sum::<f64>() / f64::from(iterations);
                 let found = schedule.mean_photons(technique, f64::from(iterations));
                 assert!((found / mean - 1.0).abs() < 0.1, "{technique:?}, {iterations}: {found}, {mean}");
+                let mean = f64::from(iterations) / photons().map(f64::recip).sum::<f64>();
+                let found = schedule.harmonic_mean_photons(technique, f64::from(iterations));
+                assert!((found / mean - 1.0).abs() < 0.03, "{technique:?}, {iterations}: {found}, {mean}");
             }
         }
     }

@@ -11,7 +11,7 @@ use super::roulette;
 use super::statistics::Statistics;
 use super::technique_support::TechniqueSupport;
 use crate::plan::Plan;
-use crate::radius_schedule::Radius;
+use crate::radius_schedule::{LARGEST_RADIUS, Radius};
 use crate::settings::LightPaths;
 
 /// Numbers of light sub-paths, relative to the full plan's: more than one per pixel where what matters is
@@ -213,7 +213,7 @@ fn widest(usual: f32, statistics: &Statistics) -> f32 {
     /// Least ratio to the usual radius that is worth a candidate.
     const LEAST: f32 = 1.25;
     const MOST: f32 = 4.0;
-    let footprint = statistics.footprint.min(statistics.radius_field.largest_radius());
+    let footprint = statistics.footprint.min(statistics.radius_field.largest_radius()).min(LARGEST_RADIUS);
     if footprint >= LEAST * usual { footprint.min(MOST * usual) } else { usual }
 }
 

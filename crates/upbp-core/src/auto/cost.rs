@@ -87,7 +87,7 @@ impl<'a> Cost<'a> {
         let mut camera = NS_PER_CAMERA_PATH + work.camera_edges[roulette] * NS_PER_EDGE * beyond;
         for technique in plan.techniques.without(light_tracing).iter() {
             let i = technique as usize;
-            let samples = self.0.relative_photons(technique, plan) * work.samples[i][roulette];
+            let samples = self.0.found_photons(technique, plan) * work.samples[i][roulette];
             camera += plan.active_part(technique)
                 * (work.calls[i][roulette] * NS_PER_CALL[i]
                     + self.tests(technique, plan) * self.ns_per_test(technique, plan)

@@ -163,7 +163,7 @@ impl<S: Scene> Planner<'_, '_, S> {
                     .neighbours_of(technique)
                     .map_or(most * size, |found| found.radius(photons(technique), f64::from(paths)))
                     .clamp(SMALLEST * most * size, most * size)
-                    .min(statistics.radius_field.largest_radius()),
+                    .min(statistics.radius_field.largest_radius().min(LARGEST_RADIUS)),
             }
         };
         let PerMerge { surf, pp3d, pb2d, bp2d, bb1d } = PerMerge::from_fn(radius);

@@ -237,19 +237,32 @@ impl PilotRender {
     }
 
     /// Photons or beams within a query's kernel under another plan, mean over its iterations, relative to the
-    /// first one of the plan of this render.
-    pub(super) fn relative_photons(&self, technique: Technique, plan: &Plan) -> f64 {
+    /// first one of the plan of this render: what queries find.
+    pub(super) fn found_photons(&self, technique: Technique, plan: &Plan) -> f64 {
+        self.photons(technique, plan) * self.plan.radii.mean_photons(technique, self.iterations)
+    }
+
+    /// As many photons or beams within a query's kernel, relative to the first iteration of the plan of this
+    /// render, as make the variance of another plan's iterations together.
+    pub(super) fn telling_photons(&self, technique: Technique, plan: &Plan) -> f64 {
+        self.photons(technique, plan) * self.mean_photons(technique)
+    }
+
+    /// Photons or beams within a query's kernel in the first iteration of another plan, relative to that of the
+    /// plan of this render.
+    fn photons(&self, technique: Technique, plan: &Plan) -> f64 {
         let kernel = if technique == Technique::Surf && self.plan.radii.surf > 0.0 {
             f64::from(plan.radii.surf / self.plan.radii.surf).powi(2)
         } else {
             1.0
         };
-        kernel * self.relative_paths(technique, plan) * self.mean_photons(technique)
+        kernel * self.relative_paths(technique, plan)
     }
 
-    /// Photons or beams within a query's kernel, mean over iterations, relative to the first one.
+    /// As many photons or beams within a query's kernel, relative to the first iteration, as make the variance
+    /// of all iterations together.
     pub(super) fn mean_photons(&self, technique: Technique) -> f64 {
-        self.plan.radii.mean_photons(technique, self.iterations)
+        self.plan.radii.harmonic_mean_photons(technique, self.iterations)
     }
 
     /// The work of all passes per sub-path.
@@ -308,7 +321,7 @@ impl PilotRender {
                 for recorder in &recorders {
                     let start = self.samples.len();
                     self.samples.extend_from_slice(recorder.of_path(path));
-                    self.samples[start..].sort_by_key(|sample| sample.merged);
+                    self.samples[start..].sort_by_key(|sample| sample.light_path);
                     self.ends.push(self.samples.len() as u32);
                 }
             }
@@ -321,13 +334,13 @@ impl PilotRender {
             let Some((_, weight)) = grid.partner(cell as u32) else { continue };
             let Some(recorder) = partners.get(cell / PIECE) else { continue };
             let mut near = recorder.of_path(cell % PIECE).to_vec();
-            near.sort_by_key(|sample| sample.merged);
-            let by_path = |a: &Sample, b: &Sample| a.merged == b.merged;
+            near.sort_by_key(|sample| sample.light_path);
+            let by_path = |a: &Sample, b: &Sample| a.light_path == b.light_path;
             let own = &self.samples[self.range(cell, 0)];
             for group in near.chunk_by(by_path) {
-                let Some(path) = group[0].merged else { continue };
-                let start = own.partition_point(|sample| sample.merged < group[0].merged);
-                let length = own[start..].partition_point(|sample| sample.merged == group[0].merged);
+                let Some(path) = group[0].light_path else { continue };
+                let start = own.partition_point(|sample| sample.light_path < group[0].light_path);
+                let length = own[start..].partition_point(|sample| sample.light_path == group[0].light_path);
                 if length > 0 {
                     let samples = [own[start..start + length].to_vec(), group.to_vec()];
                     self.pairs.push(PixelPair { cell: cell as u32, path, weight, samples });
@@ -403,8 +416,11 @@ impl Pass {
                 pass.splat_pairs.extend(splat_pairs(&recorder, &out.splats, firsts, step, grid));
             }
             // A splat goes with each sample.
-            let cells = out.splats.iter().map(|splat| grid.cell(splat.pixel));
-            pass.splats.extend(cells.zip(recorder.samples.iter().copied()));
+            let paths = recorder.ranges().enumerate().flat_map(|(path, range)| range.map(move |_| path));
+            for ((splat, sample), path) in out.splats.iter().zip(&recorder.samples).zip(paths) {
+                let light_path = Some((piece * PIECE + path) as u32);
+                pass.splats.push((grid.cell(splat.pixel), Sample { light_path, ..*sample }));
+            }
             pass.light.push(recorder);
         }
         let map = LightMap::build(plan, vertices, beams);
@@ -489,7 +505,7 @@ mod tests {
                     let technique = Technique::LightTracing;
                     recorder.samples.push(Sample {
                         technique,
-                        merged: None,
+                        light_path: None,
                         albedos: 1.0,
                         value,
                         weights: [0.0; Technique::COUNT],

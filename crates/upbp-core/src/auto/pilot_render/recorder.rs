@@ -21,8 +21,8 @@ const LEAST_WEIGHT: f64 = 1e-30;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
     pub(crate) technique: Technique,
-    /// The light sub-path whose photon or beam was merged.
-    pub(crate) merged: Option<u32>,
+    /// The light sub-path that was merged, or whose splat it is.
+    pub(crate) light_path: Option<u32>,
     pub(crate) value: Vec3,
     /// Product of the albedos of the camera vertices that scattered before.
     pub(crate) albedos: f32,
@@ -84,10 +84,10 @@ impl<B> Observer<B> for Recorder {
         if self.seen > self.most {
             return;
         }
-        let merged = if let Completion::Merge { path, .. } = completion { Some(*path) } else { None };
+        let light_path = if let Completion::Merge { path, .. } = completion { Some(*path) } else { None };
         self.samples.push(Sample {
             technique,
-            merged,
+            light_path,
             albedos: self.albedos,
             value: Vec3::from((value * weight.value() as f32).to_array()),
             weights: mis_weights(&weight.all),

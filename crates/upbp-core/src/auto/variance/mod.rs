@@ -72,7 +72,7 @@ impl Counts {
             counts.relative[technique as usize] = if technique.is_per_camera_vertex() {
                 1.0
             } else {
-                active * pilot.relative_photons(technique, plan)
+                active * pilot.telling_photons(technique, plan)
             };
         }
         counts
@@ -175,14 +175,17 @@ impl Variance {
         }
         let mut variance = variances(&groups, counts.light_paths).map(|sum| sum / pilot.cells as f64);
         let mean_photons = mean_photons(pilot);
-        for (cell, splat) in &pilot.splats {
-            let group = group(*cell as usize);
-            let densities = reweighted.densities(&splat.weights);
-            let square = pilot.second_moment(splat) as f32;
-            variance[group] += pilot.per_splat() * f64::from(densities.single(square));
-            if let Some(excess) = densities.excess(square, density_of_pilot(&splat.weights, &mean_photons)) {
-                charges.add(group, pilot.per_splat(), &excess);
+        for of_path in pilot.splats.chunk_by(|(_, a), (_, b)| a.light_path == b.light_path) {
+            let mut excess = Excess::default();
+            for (cell, splat) in of_path {
+                let densities = reweighted.densities(&splat.weights);
+                let square = pilot.second_moment(splat) as f32;
+                let of_pilot = density_of_pilot(&splat.weights, &mean_photons);
+                variance[group(*cell as usize)] += pilot.per_splat() * f64::from(densities.single(square));
+                densities.excess(square, of_pilot).inspect(|more| excess.add(more));
             }
+            let path = of_path[0].1.light_path.unwrap_or(0);
+            charges.add(group(path as usize), pilot.per_splat(), &excess);
         }
         [variance, charges.charges()]
     }

@@ -42,7 +42,7 @@ impl ReadySamples {
     pub(super) fn new(pilot: &PilotRender) -> Self {
         let mut ready = Self { samples: Vec::with_capacity(pilot.samples.len()), ends: Vec::new() };
         let mean_photons = mean_photons(pilot);
-        let of_one_path = |a: &Sample, b: &Sample| a.merged.is_some() && a.merged == b.merged;
+        let of_one_path = |a: &Sample, b: &Sample| a.light_path.is_some() && a.light_path == b.light_path;
         for path in 0..pilot.cells * pilot.passes {
             let start = ready.samples.len();
             let mut light_paths = 0;

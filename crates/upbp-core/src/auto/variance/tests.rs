@@ -39,7 +39,7 @@ fn pilot_of(other: Technique) -> PilotRender {
             weights[Technique::Hit as usize] = (1.0 / sum) as f32;
             weights[other as usize] = (2.0 * x / sum) as f32;
             let value = Vec3::splat((3.0 * x * x / sum) as f32);
-            samples.push(Sample { technique, merged: None, albedos: 1.0, value, weights });
+            samples.push(Sample { technique, light_path: None, albedos: 1.0, value, weights });
         }
         ends.push(samples.len() as u32);
     }
@@ -123,7 +123,7 @@ fn light_that_is_hardly_there_excludes_no_plan() {
         densities.of[Technique::Connect as usize] = 1.0;
         densities.of[Technique::Hit as usize] = of_hits;
         let (technique, value) = (Technique::Connect, Vec3::splat(1e-41));
-        Sample { technique, merged: None, albedos: 1.0, value, weights: mis_weights(&densities) }
+        Sample { technique, light_path: None, albedos: 1.0, value, weights: mis_weights(&densities) }
     };
     for (pilot, of_hits) in [(&mut faint, 1e-41), (&mut unique, 0.0)] {
         pilot.samples.push(connection(of_hits));
@@ -194,9 +194,9 @@ fn variances_know_which_photons_are_of_one_light_sub_path() {
             if path > TRACED as f64 {
                 break;
             }
-            let merged = Some(path as u32);
+            let light_path = Some(path as u32);
             samples.extend(
-                [Sample { technique: Technique::Pb2d, merged, albedos: 1.0, value, weights }; PHOTONS],
+                [Sample { technique: Technique::Pb2d, light_path, albedos: 1.0, value, weights }; PHOTONS],
             );
         }
         ends.push(samples.len() as u32);
@@ -257,7 +257,7 @@ fn the_spread_of_groups_knows_that_cells_share_light_sub_paths() {
             // Some are brighter than others.
             let value = Vec3::splat((-uniform(path as usize, number).ln()).sqrt() as f32);
             let sample =
-                Sample { technique: Technique::Bb1d, merged: Some(path), albedos: 1.0, value, weights };
+                Sample { technique: Technique::Bb1d, light_path: Some(path), albedos: 1.0, value, weights };
             pilot.pairs.extend((0..CELLS).map(|cell| PixelPair {
                 cell: 300 * cell + path,
                 path,
@@ -290,7 +290,7 @@ fn photons_vary_at_least_as_independent_ones_do() {
     const TRACED: f64 = 10.0;
     let weights = only(Technique::Bb1d);
     let photon =
-        Sample { technique: Technique::Bb1d, merged: Some(0), albedos: 1.0, value: Vec3::ONE, weights };
+        Sample { technique: Technique::Bb1d, light_path: Some(0), albedos: 1.0, value: Vec3::ONE, weights };
     let camera_paths = (SIDE * SIDE * PASSES) as usize;
     let pilot = PilotRender {
         samples: vec![photon; camera_paths],
@@ -321,7 +321,7 @@ fn variances_know_where_walks_end() {
     for i in 0..(SIDE * SIDE * PASSES) as usize {
         let mut find = |albedos, value| {
             let value = Vec3::splat(value);
-            samples.push(Sample { technique: Technique::Hit, merged: None, albedos, value, weights });
+            samples.push(Sample { technique: Technique::Hit, light_path: None, albedos, value, weights });
         };
         find(1.0, 1.0);
         if uniform(i, 4) < f64::from(reached) {
@@ -362,7 +362,13 @@ fn by_splats(rare: u32) -> impl Fn(u32) -> f64 {
         let mut weights = [0.0; Technique::COUNT];
         weights[Technique::LightTracing as usize] = own;
         weights[Technique::Bb1d as usize] = 1.0 - own;
-        Sample { technique: Technique::LightTracing, merged: None, albedos: 1.0, value: Vec3::ONE, weights }
+        Sample {
+            technique: Technique::LightTracing,
+            light_path: None,
+            albedos: 1.0,
+            value: Vec3::ONE,
+            weights,
+        }
     };
     pilot.splats = (0..SIDE * SIDE).map(|cell| (cell, splat(cell))).collect();
     pilot.plan = planned(16);
@@ -438,7 +444,7 @@ fn products(samples: &[Sample], thinning: [f64; 2], counts: &Counts) -> f64 {
             if a.technique == b.technique {
                 factor /= counts.active[a.technique as usize];
             }
-            if a.merged.is_some() && a.merged == b.merged {
+            if a.light_path.is_some() && a.light_path == b.light_path {
                 factor *= of_one_light_path(a, b, thinning, counts);
             }
             sum += factor * weighted(a, counts).dot(weighted(b, counts));
@@ -455,7 +461,7 @@ fn sample() -> impl Strategy<Value = Sample> {
             let sum: f32 = densities.iter().sum();
             Sample {
                 technique,
-                merged: technique.merges().then_some(path),
+                light_path: technique.merges().then_some(path),
                 albedos,
                 value: value.into(),
                 weights: densities.map(|density| density / sum),
@@ -480,8 +486,8 @@ fn variances_of_blocks_contain_what_pixels_share() {
         // As many as come by on average.
         let found = (TRACED / RARE) as u32;
         let seen = (0..found).map(|path| {
-            let merged = Some(camera_path * found + path);
-            Sample { technique: Technique::Bb1d, merged, albedos: 1.0, value, weights }
+            let light_path = Some(camera_path * found + path);
+            Sample { technique: Technique::Bb1d, light_path, albedos: 1.0, value, weights }
         });
         pilot.samples.extend(seen.clone());
         pilot.ends.push(pilot.samples.len() as u32);
@@ -490,7 +496,7 @@ fn variances_of_blocks_contain_what_pixels_share() {
         {
             let pair = |sample: Sample| PixelPair {
                 cell: camera_path / PASSES,
-                path: sample.merged.unwrap_or(0),
+                path: sample.light_path.unwrap_or(0),
                 weight,
                 samples: [vec![sample], vec![sample]],
             };
@@ -548,7 +554,7 @@ proptest! {
         camera_factor in 0.5_f64..16.0,
     ) {
         let periodic: PerTechnique<bool> = periodic;
-        samples.sort_by_key(|sample| sample.merged);
+        samples.sort_by_key(|sample| sample.light_path);
         let active: PerTechnique<f64> = std::array::from_fn(|i| {
             if periodic[i] && Technique::ALL[i].merges() { 0.25 } else { 1.0 }
         });
