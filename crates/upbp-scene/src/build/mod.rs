@@ -15,7 +15,7 @@ mod notes;
 mod rooms;
 mod surfaces;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -83,7 +83,8 @@ impl ReadyScene {
             description,
             base_dir: base_dir.as_ref(),
             problems: Problems::default(),
-            notes: Vec::new(),
+            notes: Problems::default(),
+            noted: BTreeSet::new(),
             hash: Fnv1a(description.hash()),
             files: Vec::new(),
             meshes: MeshFiles::of(description),
@@ -93,7 +94,7 @@ impl ReadyScene {
         let scene = builder.build();
         match scene {
             Some(scene) if builder.problems.is_empty() => Ok(scene),
-            _ => Err(SceneError::Invalid { path: None, problems: builder.problems.list() }),
+            _ => Err(SceneError::Invalid { path: None, problems: builder.problems.list("problems") }),
         }
     }
 }
@@ -153,7 +154,7 @@ impl Builder<'_> {
         let body_boxes = BoxTree::new(bodies.iter().map(|body| geometry.shape(body.shape).aabb()));
         let body_boxes = body_boxes.map_err(|error| self.problem("shapes", error)).ok()?;
         let (hash, files) = (self.hash.0, std::mem::take(&mut self.files));
-        let notes = std::mem::take(&mut self.notes);
+        let notes = std::mem::take(&mut self.notes).list("notes");
         Some(ReadyScene {
             geometry,
             surfaces,

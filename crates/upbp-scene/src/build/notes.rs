@@ -8,22 +8,22 @@ use upbp_accel::{Shape, ShapeId, offset_origin};
 use super::builder::Builder;
 use super::rooms::Places;
 use super::surfaces::{BoundaryDraft, SurfaceDraft};
-use crate::description::{Camera, Geometry, Medium, Positive};
-use crate::error::Problem;
+use crate::description::{Camera, Geometry, Light, Medium, Positive};
+use crate::error::Shortened;
 use crate::light::EnvironmentImage;
 use crate::scene::COINCIDENT;
 
 impl Builder<'_> {
     /// Notes something about a part of the scene.
     pub(super) fn note(&mut self, item: impl Into<String>, message: impl Into<String>) {
-        self.notes.push(Problem { item: item.into(), message: message.into() });
+        self.notes.add(item.into(), message.into());
     }
 
     /// Notes something that may have been noted before.
     pub(super) fn note_once(&mut self, item: impl Into<String>, message: impl Into<String>) {
-        let note = Problem { item: item.into(), message: message.into() };
-        if !self.notes.contains(&note) {
-            self.notes.push(note);
+        let (item, message) = (item.into(), message.into());
+        if self.noted.insert((item.clone(), message.clone())) {
+            self.note(item, message);
         }
     }
 
@@ -36,7 +36,7 @@ impl Builder<'_> {
         }
         let used: BTreeSet<&str> = description.shapes.iter().map(|shape| shape.material.as_str()).collect();
         for name in description.materials.names().filter(|name| !used.contains(name)) {
-            self.note(format!("material `{name}`"), "is nowhere: no shape has it");
+            self.note(format!("material `{}`", Shortened(name)), "is nowhere: no shape has it");
         }
         let is_opaque = |index: usize| matches!(drafts[index].boundary, BoundaryDraft::Opaque(_));
         let shapes = description.shapes.iter().enumerate();
@@ -46,7 +46,7 @@ impl Builder<'_> {
                 self.shape_item(index),
                 format!(
                     "has a `priority`, which has no effect: its material `{}` is opaque{}",
-                    shape.material,
+                    Shortened(&shape.material),
                     and_others(ranked.count(), ["has", "have"])
                 ),
             );
@@ -94,7 +94,7 @@ impl Builder<'_> {
         let (media, used) = (&self.description.media, self.description.used_media());
         for name in media.names().filter(|name| !used.contains(name)) {
             self.note(
-                format!("medium `{name}`"),
+                format!("medium `{}`", Shortened(name)),
                 "is nowhere: no shape has it as `interior`, nor is it `outside`",
             );
         }
@@ -104,7 +104,7 @@ impl Builder<'_> {
             && (0..3).any(|channel| sigma_s.get()[channel] > 0.0 && sigma_a.get()[channel] == 0.0)
         {
             self.note(
-                format!("medium `{name}`"),
+                format!("medium `{}`", Shortened(name)),
                 "scatters around everything without absorbing: iterations are long, and with a little `sigma_a` \
                  in each channel much shorter",
             );
@@ -116,7 +116,7 @@ impl Builder<'_> {
         let (width, height) = image.size();
         if width != 2 * height {
             self.note(
-                format!("image `{file}`"),
+                format!("image `{}`", Shortened(file)),
                 format!(
                     "has {width} x {height} pixels and is stretched over all directions: latitude-longitude images \
                      are twice as wide as high"
@@ -127,7 +127,7 @@ impl Builder<'_> {
             let count = image.infinite_pixels();
             let (pixels, are) = if count == 1 { ("pixel", "is") } else { ("pixels", "are") };
             self.note(
-                format!("image `{file}`"),
+                format!("image `{}`", Shortened(file)),
                 format!(
                     "{count} {pixels} {are} infinite, as bright ones are in half precision, and count as the largest \
                      finite value of each channel"
