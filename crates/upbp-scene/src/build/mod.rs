@@ -140,6 +140,7 @@ impl Builder<'_> {
         self.note_media();
         self.note_without_effect(&drafts);
         self.note_parts(places, origin);
+        self.note_light_from_below();
         self.note_thin_bodies(places, origin);
         let bodies = bodies::rank(&drafts, &geometry).map_err(|error| self.problem("shapes", error)).ok()?;
         let largest_corner = extent::largest_corner(geometry.shapes(), &drafts);

@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
-use upbp_accel::{Shape, ShapeId, offset_origin};
+use upbp_accel::{Shape, ShapeId, TriangleMesh, offset_origin};
 
 use super::builder::Builder;
+use super::lights;
 use super::rooms::Places;
 use super::surfaces::{BoundaryDraft, SurfaceDraft};
 use crate::description::{Camera, Geometry, Light, Medium, Positive};
@@ -77,16 +78,49 @@ impl Builder<'_> {
         };
         let thin: Vec<_> = (0..places.drafts.len()).filter_map(is_thin).collect();
         if let [(index, thickness, largest), others @ ..] = &thin[..] {
-            let from = if origin == Vec3::ZERO { String::new() } else { format!(" from {origin}") };
-            self.note(
-                self.shape_item(*index),
-                format!(
-                    "is {thickness} thick, and is not seen at coordinates up to {largest}{from}: surfaces that are nearer \
-                     to each other than 5e-6 of their coordinates are met as one{}",
-                    and_others(others.len(), ["is", "are"])
-                ),
-            );
+            let message = too_thin(*thickness, *largest, origin) + &and_others(others.len(), ["is", "are"]);
+            self.note(self.shape_item(*index), message);
         }
+    }
+
+    /// Notes light from infinitely far away that comes from below. What is upright in the image tells where
+    /// that is, as long as it is about +y or -y: in a view from above it may be any direction.
+    pub(super) fn note_light_from_below(&mut self) {
+        let description = self.description;
+        let Camera::Perspective { up, .. } = &description.camera;
+        let up = up.get();
+        if description.shapes.is_empty() || up.y.abs() < up.abs().max_element() {
+            return;
+        }
+        for (index, light) in description.lights.iter().enumerate() {
+            if let Light::Sun { direction, .. } | Light::Directional { direction, .. } = light
+                && direction.get().dot(up) > 0.0
+            {
+                self.note(
+                    lights::item(index, light),
+                    "comes from below: `direction` is that in which its light travels, not that towards it",
+                );
+            }
+        }
+    }
+
+    /// Notes a mesh file many of whose triangles have no area, which may be lost in rounding.
+    pub(super) fn note_dropped_triangles(&mut self, item: &str, mesh: &TriangleMesh) {
+        /// Largest coordinate over the extent of a mesh from which rounding may be to blame.
+        const FAR: f32 = 10.0;
+        let (dropped, count) = (mesh.dropped_triangles(), mesh.triangle_count() as usize);
+        if 100 * dropped <= dropped + count {
+            return;
+        }
+        let (min, max) = mesh.aabb();
+        let largest = min.abs().max(max.abs()).max_element();
+        let advice = if largest < FAR * (max - min).max_element() {
+            String::new()
+        } else {
+            format!(" at coordinates up to {largest}: move the mesh near its origin before it is written")
+        };
+        let message = format!("{dropped} of {} triangles have no area{advice}", dropped + count);
+        self.note_once(item, message);
     }
 
     /// Notes media that nothing is filled with, and one around everything in which light never ends.
@@ -178,8 +212,17 @@ fn is_known_mesh<'a>(geometry: &'a Geometry, known: &mut BTreeSet<(&'a str, Opti
     }
 }
 
+/// The note about what is too thin for its coordinates, from the point that has become the origin.
+pub(super) fn too_thin(thickness: f32, largest: f32, origin: Vec3) -> String {
+    let from = if origin == Vec3::ZERO { String::new() } else { format!(" from {origin}") };
+    format!(
+        "is {thickness} thick, and is not seen at coordinates up to {largest}{from}: surfaces that are nearer \
+         to each other than 5e-6 of their coordinates are met as one"
+    )
+}
+
 /// The end of a note that holds for more shapes than it names, with its verb for one and for several.
-fn and_others(count: usize, [one, several]: [&str; 2]) -> String {
+pub(super) fn and_others(count: usize, [one, several]: [&str; 2]) -> String {
     match count {
         0 => String::new(),
         1 => format!(" (and so {one} 1 other)"),

@@ -290,6 +290,9 @@ impl Builder<'_> {
             let describe = |error: &dyn std::fmt::Display| format!("{item}: {error}");
             mesh.and_then(|mesh| triangles(mesh, smooth)).map_err(|error| describe(&error))
         });
+        if let Ok(mesh) = &mesh {
+            self.note_dropped_triangles(&item, mesh);
+        }
         self.meshes.known.insert(key, mesh.clone());
         mesh
     }
