@@ -9,4 +9,5 @@ mod placement;
 mod rooms;
 mod shipped_scenes;
 mod skies;
+mod unseen;
 mod vessels;
