@@ -140,8 +140,9 @@ fn stops_to(shown: f32, value: f32) -> f32 {
 
 /// Said of a picture without any light.
 const BLACK: &str = "warning: the picture is black. Does a lamp face away (a quad shines on the side of its \
-                     normal), a spot, or the camera? Is there an opaque shape around or before the lights or \
-                     the camera? Is the medium too thick?";
+                     normal), a spot, a sun (`direction` is that in which its light travels), or the camera? \
+                     Is there an opaque shape around or before the lights or the camera? Is the medium too \
+                     thick?";
 
 /// Prints what a report warns of, for those who do not see the rest of it.
 pub(crate) fn warn(report: &Report) {

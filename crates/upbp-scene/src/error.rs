@@ -1,6 +1,6 @@
 //! Errors of scenes.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The reason for which a scene cannot be rendered.
@@ -62,6 +62,25 @@ pub struct Problem {
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.item, self.message)
+    }
+}
+
+/// A name of a scene in a message: cut if it is long, with its control characters escaped, which a terminal
+/// would obey.
+pub(crate) struct Shortened<'n>(pub(crate) &'n str);
+
+impl fmt::Display for Shortened<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const MOST: usize = 200;
+        let mut letters = self.0.chars();
+        for letter in letters.by_ref().take(MOST) {
+            if letter.is_control() {
+                write!(f, "{}", letter.escape_debug())?;
+            } else {
+                f.write_char(letter)?;
+            }
+        }
+        if letters.next().is_some() { f.write_char('…') } else { Ok(()) }
     }
 }
 

@@ -11,6 +11,8 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use crate::error::Shortened;
+
 mod polygon;
 mod smooth;
 #[cfg(test)]
@@ -39,6 +41,7 @@ pub struct ObjFile {
     names: BTreeMap<String, u32>,
     /// Whether some faces are in a smoothing group (`s`).
     has_smoothing_groups: bool,
+    budget: polygon::Budget,
 }
 
 /// Triangles one after the other that have the same names.
@@ -225,11 +228,12 @@ impl ObjFile {
         if let [(_, _, first), others @ ..] = &found[..]
             && others.iter().any(|(_, _, ranges)| ranges != first)
         {
+            let shown = Shortened(name);
             let whats: Vec<&str> = found.iter().map(|(_, what, _)| *what).collect();
             let lines: Vec<String> =
-                found.iter().map(|(statement, ..)| format!("`part: \"{statement} {name}\"`")).collect();
+                found.iter().map(|(statement, ..)| format!("`part: \"{statement} {shown}\"`")).collect();
             return Err(PartError::SeveralKinds(format!(
-                "`{name}` is the name of {} with different triangles: {}, the line as in the file, tells which",
+                "`{shown}` is the name of {} with different triangles: {}, the line as in the file, tells which",
                 whats.join(" and "),
                 lines.join(" or ")
             )));
@@ -272,7 +276,7 @@ impl ObjFile {
                 }
                 let places: Vec<Vec3> =
                     corners.iter().map(|corner| self.positions[corner.0 as usize]).collect();
-                let triangles = polygon::triangles(&places)?;
+                let triangles = polygon::triangles(&places, &mut self.budget)?;
                 self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|place| corners[place])));
             }
             Some(kind @ ("o" | "g" | "usemtl")) => self.begin(kind, &line[kind.len()..])?,

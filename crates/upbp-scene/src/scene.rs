@@ -93,6 +93,7 @@ impl ReadyScene {
 
     /// Notes about parts of the scene that can be rendered, but may not be meant: a medium that is nowhere, a
     /// priority of an opaque shape, a mesh whose parts overlap, an image that is not twice as wide as high.
+    /// Beyond a thousand the last one says how many more there are.
     #[must_use]
     pub fn notes(&self) -> &[Problem] {
         &self.notes

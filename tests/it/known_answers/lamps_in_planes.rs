@@ -44,12 +44,17 @@ fn what_a_lamp_or_a_camera_lies_in_does_not_hide_it() {
          indices: [(0, 1, 2), (0, 2, 3)])",
     );
     let sloped = black("Quad(origin: (0.5, 2.9, -2), edge_u: (3, 0.7, 0), edge_v: (0, 0, 4))");
+    let closed_mesh =
+        housing.replace("(0.8, 3, 0.1)", "(0.8, 3, 0.1), rotate: [(axis: (0, 1, 0), degrees: 90)]");
+    let room = black("Box(min: (-4, -1, -4), max: (4, 3.5, 4))");
     let [before, behind] = ["2.9466665", "2.946667"].map(|height| point.replace("2.9", height));
     let on_the_floor = format!("{floor}, {ceiling}");
     let mut table = Table::default();
     for (name, view, shapes, light, height) in [
         ("a lamp in a quad", above, &quad, &point, 2.9),
         ("a spot under its housing", above, &housing, &spot, 2.9),
+        ("a spot under a housing that is a closed mesh", above, &closed_mesh, &spot, 2.9),
+        ("a lamp in the ceiling of a box", above, &room, &point.replace("2.9", "3.5"), 3.5),
         ("a lamp in a mesh", above, &mesh, &point, 2.9),
         ("a lamp in a sloped quad, a rounding before it", above, &sloped, &before, 2.946_666_7),
         ("a lamp in a sloped quad, a rounding behind it", above, &sloped, &behind, 2.946_666_7),

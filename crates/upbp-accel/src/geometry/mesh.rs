@@ -328,8 +328,9 @@ impl TriangleMesh {
     /// only where it matters.
     ///
     /// The intersection test decides edges and corners consistently, so that any direction gives the right
-    /// parity.
-    pub(super) fn contains_by(&self, point: Vec3, crossings: impl FnOnce(Ray) -> usize) -> Option<bool> {
+    /// parity; but for a point of the surface, which a ray does not cross where it starts: there two opposite
+    /// directions differ.
+    pub(super) fn contains_by(&self, point: Vec3, crossings: impl Fn(Ray) -> usize) -> Option<bool> {
         if !self.is_closed() {
             return None;
         }
@@ -337,10 +338,11 @@ impl TriangleMesh {
         if !(min.cmple(point).all() && point.cmple(max).all()) {
             return Some(false);
         }
-        let ray = Ray::new(point, Vec3::new(0.267_261_24, 0.534_522_5, 0.801_783_7));
+        let direction = Vec3::new(0.267_261_24, 0.534_522_5, 0.801_783_7);
         // No triangle is farther away than half of this.
-        let ray = ray.with_range(0.0, 2.0 * (max - min).element_sum());
-        Some(crossings(ray) % 2 == 1)
+        let farthest = 2.0 * (max - min).element_sum();
+        let is_odd = |direction| crossings(Ray::new(point, direction).with_range(0.0, farthest)) % 2 == 1;
+        Some(is_odd(direction) && is_odd(-direction))
     }
 
     /// The least and the greatest coordinates.

@@ -179,9 +179,10 @@ impl Cells {
             for y in low.y..=high.y {
                 for x in low.x..=high.x {
                     let at = UVec3::new(x, y, z);
+                    let state = &mut state[self.index(at) as usize];
                     let centre = (at.as_dvec3() + 0.5) * self.size;
-                    if touches(corners.map(|corner| corner - centre), half) {
-                        state[self.index(at) as usize] = State::Covered;
+                    if *state != State::Covered && touches(corners.map(|corner| corner - centre), half) {
+                        *state = State::Covered;
                     }
                 }
             }

@@ -90,7 +90,7 @@ pub(super) fn shapes_around(boxes: &BoxTree, point: Vec3, is_one: impl Fn(usize)
 }
 
 /// The centre of a shape's box.
-fn centre(shape: &Shape) -> Vec3 {
+pub(super) fn centre(shape: &Shape) -> Vec3 {
     let (min, max) = shape.aabb();
     0.5 * min + 0.5 * max
 }
@@ -167,7 +167,7 @@ fn is_inside(shape: &Shape, other: &Shape) -> bool {
 }
 
 /// Points all over a shape, with their outward normals.
-fn points_on(shape: &Shape) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
+pub(super) fn points_on(shape: &Shape) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
     (0..16_u8).map(|i| shape.sample_area([(f32::from(i % 4) + 0.5) / 4.0, (f32::from(i / 4) + 0.5) / 4.0]))
 }
 
@@ -181,7 +181,7 @@ fn is_buried(shape: &Shape, other: ShapeId, geometry: &SceneGeometry) -> bool {
 }
 
 /// Whether something is true of all corners of a shape.
-fn are_corners(shape: &Shape, is_so: impl Fn(Vec3) -> bool) -> bool {
+pub(super) fn are_corners(shape: &Shape, is_so: impl Fn(Vec3) -> bool) -> bool {
     let corners = |origin: Vec3, edges: [Vec3; 3]| {
         (0..8_u8).map(move |corner| {
             let along = |axis: u8| if corner >> axis & 1 == 1 { edges[axis as usize] } else { Vec3::ZERO };
@@ -204,7 +204,7 @@ fn are_corners(shape: &Shape, is_so: impl Fn(Vec3) -> bool) -> bool {
 /// Whether a body contains points all over the surface of an index-matched one, which has the index of
 /// refraction of the highest that does: a cloud in a glass block has that of the glass, or a bubble in the
 /// cloud would refract wrongly.
-fn surrounds(outer: ShapeId, shape: &Shape, geometry: &SceneGeometry) -> bool {
+pub(super) fn surrounds(outer: ShapeId, shape: &Shape, geometry: &SceneGeometry) -> bool {
     let [(min, max), (outer_min, outer_max)] = [shape, geometry.shape(outer)].map(Shape::aabb);
     let boxed = outer_min.cmple(min).all() && max.cmple(outer_max).all();
     // By points just inside of it, so that a body that fills another is surrounded by it.

@@ -1,7 +1,7 @@
 //! The state that all steps of a build share.
 
-use std::collections::BTreeMap;
-use std::fmt::{self, Display};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use upbp_media::{MediumId, PhaseFunction};
 
 use super::surfaces::MeshFiles;
 use crate::description::{Fnv1a, SceneDescription};
-use crate::error::Problem;
+use crate::error::{Problem, Shortened};
 use crate::light::EnvironmentImage;
 
 /// A description on its way to a scene, with the problems that were found.
@@ -19,7 +19,9 @@ pub(super) struct Builder<'a> {
     pub(super) description: &'a SceneDescription,
     pub(super) base_dir: &'a Path,
     pub(super) problems: Problems,
-    pub(super) notes: Vec<Problem>,
+    pub(super) notes: Problems,
+    /// What was noted and is not to be noted again.
+    pub(super) noted: BTreeSet<(String, String)>,
     /// Fingerprint of the description and of the files that were read.
     pub(super) hash: Fnv1a,
     /// The files that were read.
@@ -52,6 +54,11 @@ impl Builder<'_> {
         path
     }
 
+    /// The path of a file in messages.
+    pub(super) fn shown_path(&self, file: &str) -> String {
+        self.base_dir.join(Shortened(file).to_string()).display().to_string()
+    }
+
     /// A file of at most so many bytes, which go into the fingerprint as they are read.
     pub(super) fn open(&mut self, path: &Path, max_bytes: u64) -> io::Result<impl io::BufRead> {
         let bytes = open_file(path, max_bytes)?.take(max_bytes);
@@ -67,14 +74,14 @@ impl Builder<'_> {
     ) -> Option<MediumId> {
         let id = ids.get(name).copied();
         if id.is_none() {
-            let known: Vec<_> = self.description.media.names().collect();
-            self.problem(item, unknown("medium", name, &known));
+            let media = &self.description.media;
+            self.problem(item, unknown("medium", name, media.len(), media.names()));
         }
         id
     }
 }
 
-/// Problems, of which there may be as many as shapes: the first ones, and how many others there are.
+/// Problems or notes, of which there may be as many as shapes: the first ones, and how many others there are.
 #[derive(Default)]
 pub(super) struct Problems {
     first: Vec<Problem>,
@@ -85,7 +92,7 @@ impl Problems {
     /// Problems that are told.
     const MOST: usize = 1000;
 
-    fn add(&mut self, item: String, message: impl Display) {
+    pub(super) fn add(&mut self, item: String, message: impl Display) {
         if self.first.len() < Self::MOST {
             self.first.push(Problem { item, message: message.to_string() });
         } else {
@@ -97,24 +104,11 @@ impl Problems {
         self.first.is_empty()
     }
 
-    /// All of them as a list.
-    pub(super) fn list(self) -> Vec<Problem> {
+    /// All of them as a list, whose last item tells how many more there are of `what`.
+    pub(super) fn list(self, what: &str) -> Vec<Problem> {
         let others =
-            Problem { item: "scene".to_owned(), message: format!("has {} more problems", self.others) };
+            Problem { item: "scene".to_owned(), message: format!("has {} more {what}", self.others) };
         self.first.into_iter().chain((self.others > 0).then_some(others)).collect()
-    }
-}
-
-/// A name in a message, which is cut if it is long.
-struct Shortened<'n>(&'n str);
-
-impl Display for Shortened<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const MOST: usize = 200;
-        match self.0.char_indices().nth(MOST) {
-            Some((end, _)) => write!(f, "{}…", &self.0[..end]),
-            None => f.write_str(self.0),
-        }
     }
 }
 
@@ -132,13 +126,19 @@ impl<R: Read> Read for Hashed<'_, R> {
     }
 }
 
-/// The message about a name that is not defined, with those that are, or some of them.
-pub(super) fn unknown(what: &str, name: &str, known: &[&str]) -> String {
+/// The message about a name that is not defined, with the first of the `count` names that are. It looks at no
+/// more than it names: there may be as many unknown names as known ones.
+pub(super) fn unknown<'n>(
+    what: &str,
+    name: &str,
+    count: usize,
+    known: impl Iterator<Item = &'n str>,
+) -> String {
     /// Names in a message.
     const MOST: usize = 20;
     let name = Shortened(name);
-    let some: Vec<_> = known.iter().take(MOST).map(|name| format!("`{}`", Shortened(name))).collect();
-    let others = match known.len() - some.len() {
+    let some: Vec<_> = known.take(MOST).map(|name| format!("`{}`", Shortened(name))).collect();
+    let others = match count - some.len() {
         0 => String::new(),
         count => format!(" and {count} others"),
     };
@@ -157,7 +157,7 @@ mod tests {
     fn messages_name_no_more_than_some() {
         let names: Vec<String> = (0..500).map(|i| format!("n{i}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let message = |count| unknown("material", "x", &names[..count]);
+        let message = |count| unknown("material", "x", count, names.iter().copied().take(count));
         assert_eq!(message(0), "unknown material `x`; there are none");
         assert_eq!(message(2), "unknown material `x`, known: `n0`, `n1`");
         assert!(message(20).ends_with("`n19`") && message(500).ends_with("`n19` and 480 others"));
@@ -166,12 +166,18 @@ mod tests {
     #[test]
     fn neither_long_names_nor_many_problems_make_long_messages() {
         let long = "ß".repeat(100_000);
-        let message = unknown("material", &long, &[long.as_str(); 30]);
+        let message = unknown("material", &long, 30, [long.as_str(); 30].into_iter());
         assert!(message.len() < 10_000 && message.contains("ß…`, known: `ß"), "{}", message.len());
         let mut problems = Problems::default();
         (0..1002).for_each(|i| problems.add(format!("shape {i}"), "is wrong"));
-        let list = problems.list();
+        let list = problems.list("problems");
         assert_eq!(list.len(), 1001);
         assert_eq!(list[1000].to_string(), "scene: has 2 more problems");
+    }
+
+    #[test]
+    fn names_in_messages_do_not_move_the_cursor() {
+        let message = unknown("material", "red\u{1b}[2J", 1, ["white\nlights"].into_iter());
+        assert_eq!(message, "unknown material `red\\u{1b}[2J`, known: `white\\nlights`");
     }
 }

@@ -152,7 +152,7 @@ fn is_all_inside((min, max): Aabb, shape: &Shape) -> bool {
 
 /// Whether the surface of a shape meets a diagonal of a box, or almost: that of a plane does if it meets the
 /// box at all, unless it ends within.
-fn meets(geometry: &SceneGeometry, shape: ShapeId, (min, max): Aabb) -> bool {
+pub(super) fn meets(geometry: &SceneGeometry, shape: ShapeId, (min, max): Aabb) -> bool {
     let (low, high) = geometry.shape(shape).aabb();
     let off = Vec3::splat(OFF * low.abs().max(high.abs()).max_element());
     let (middle, half) = (0.5 * (min + max), 0.5 * (max - min) + off);

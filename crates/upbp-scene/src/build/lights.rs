@@ -10,6 +10,7 @@ use upbp_media::{Homogeneous, Medium as _, MediumId};
 use super::builder::Builder;
 use super::surfaces::rotation;
 use crate::description::Light as Description;
+use crate::error::Shortened;
 use crate::light::{
     ConstantEnvironment, DirectionalLight, EnvironmentImage, ImageEnvironment, Light, PointLight, SpotCone,
     SpotLight, SunLight,
@@ -127,11 +128,12 @@ impl Builder<'_> {
 
     fn read_image(&mut self, file: &str) -> Result<EnvironmentImage, String> {
         let path = self.path(file);
+        let shown = self.shown_path(file);
         let describe = |error: crate::light::EnvironmentImageError| {
             // The reason is part of the message: a list of problems has no sources.
             let reason =
                 std::error::Error::source(&error).map_or_else(String::new, |reason| format!(": {reason}"));
-            format!("image `{}` {error}{reason}", path.display())
+            format!("image `{shown}` {error}{reason}")
         };
         let image = EnvironmentImage::load(&path).map_err(describe)?;
         self.hash.write(&image.fingerprint().to_le_bytes());
@@ -144,10 +146,11 @@ impl Builder<'_> {
         let medium_of = |name: &String| ids.get(name.as_str()).and_then(|id| media.get(id.0 as usize));
         let outside = description.outside.as_ref().and_then(|name| Some((name, medium_of(name)?)));
         if let Some((outside, medium)) = outside {
+            let outside = Shortened(outside);
             let lights = description.lights.iter().enumerate();
             for (index, light) in lights.filter(|(_, light)| is_closed(medium) && is_infinite(light)) {
                 let message = format!(
-                    "comes from infinitely far away and does not reach into the medium `{outside}` around everything; instead of `outside`, let it be the interior of a body with a `Null` material"
+                    "comes from infinitely far away and does not reach into the medium `{outside}` around everything; instead of `outside`, let it be the interior of a body with a `Null` material, with `priority: -1` if that reaches into others"
                 );
                 self.problem(item(index, light), message);
             }

@@ -6,6 +6,7 @@ use upbp_media::{Homogeneous, MediumId, PhaseFunction};
 
 use super::builder::Builder;
 use crate::description::{Medium, Phase, SceneDescription, tabulated};
+use crate::error::Shortened;
 use crate::phase_table;
 
 /// Numbers of the media that something is filled with: a scene need not be ready for others.
@@ -21,7 +22,8 @@ impl Builder<'_> {
         let mut media = Vec::new();
         for (name, medium) in self.description.media.iter() {
             let made = self.homogeneous(medium);
-            let made = made.map_err(|error| self.problem(format!("medium `{name}`"), error)).ok();
+            let made =
+                made.map_err(|error| self.problem(format!("medium `{}`", Shortened(name)), error)).ok();
             if made.is_none() || ids.contains_key(name) {
                 media.push(made);
             }
@@ -75,7 +77,7 @@ impl Builder<'_> {
         let path = self.path(file);
         let bytes = self.open(&path, phase_table::MAX_FILE).map_err(|error| error.to_string());
         let table = bytes.and_then(phase_table::read);
-        let table = table.map_err(|error| format!("table `{}`: {error}", path.display()));
+        let table = table.map_err(|error| format!("table `{}`: {error}", self.shown_path(file)));
         self.tables.insert(file.to_owned(), table.clone());
         table
     }

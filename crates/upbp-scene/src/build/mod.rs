@@ -14,8 +14,9 @@ mod media;
 mod notes;
 mod rooms;
 mod surfaces;
+mod unseen;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -83,7 +84,8 @@ impl ReadyScene {
             description,
             base_dir: base_dir.as_ref(),
             problems: Problems::default(),
-            notes: Vec::new(),
+            notes: Problems::default(),
+            noted: BTreeSet::new(),
             hash: Fnv1a(description.hash()),
             files: Vec::new(),
             meshes: MeshFiles::of(description),
@@ -93,7 +95,7 @@ impl ReadyScene {
         let scene = builder.build();
         match scene {
             Some(scene) if builder.problems.is_empty() => Ok(scene),
-            _ => Err(SceneError::Invalid { path: None, problems: builder.problems.list() }),
+            _ => Err(SceneError::Invalid { path: None, problems: builder.problems.list("problems") }),
         }
     }
 }
@@ -138,9 +140,15 @@ impl Builder<'_> {
         self.check_lamps_are_free(&rooms, places);
         self.note_media();
         self.note_without_effect(&drafts);
+        self.note_light_from_below();
         self.note_parts(places, origin);
         self.note_thin_bodies(places, origin);
+        self.note_quads_in_planes(places);
         let bodies = bodies::rank(&drafts, &geometry).map_err(|error| self.problem("shapes", error)).ok()?;
+        let body_boxes = BoxTree::new(bodies.iter().map(|body| geometry.shape(body.shape).aabb()));
+        let body_boxes = body_boxes.map_err(|error| self.problem("shapes", error)).ok()?;
+        self.note_nested_bodies(places, &bodies, &body_boxes, origin);
+        self.note_fog_in_water(places, &bodies);
         let most_rounded = extent::most_rounded(geometry.shapes(), &drafts);
         let surfaces = self.records(places, &bodies, &mut lights);
         lights.extend(volume_lights(&geometry, &bodies, &media, bounds.radius));
@@ -150,10 +158,8 @@ impl Builder<'_> {
         let enclosures = enclosures::find(&bodies, &surfaces, &geometry, &lights, &camera);
         let extents =
             enclosures::extents(&bodies, &enclosures, &geometry, media.len(), outside, bounds.radius);
-        let body_boxes = BoxTree::new(bodies.iter().map(|body| geometry.shape(body.shape).aabb()));
-        let body_boxes = body_boxes.map_err(|error| self.problem("shapes", error)).ok()?;
         let (hash, files) = (self.hash.0, std::mem::take(&mut self.files));
-        let notes = std::mem::take(&mut self.notes);
+        let notes = std::mem::take(&mut self.notes).list("notes");
         Some(ReadyScene {
             geometry,
             surfaces,

@@ -3,27 +3,28 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
-use upbp_accel::{Shape, ShapeId, offset_origin};
+use upbp_accel::{Shape, ShapeId, TriangleMesh, offset_origin};
 
 use super::builder::Builder;
+use super::lights;
 use super::rooms::Places;
 use super::surfaces::{BoundaryDraft, SurfaceDraft};
-use crate::description::{Camera, Geometry, Medium, Positive};
-use crate::error::Problem;
+use crate::description::{Camera, Geometry, Light, Medium, Positive};
+use crate::error::Shortened;
 use crate::light::EnvironmentImage;
 use crate::scene::COINCIDENT;
 
 impl Builder<'_> {
     /// Notes something about a part of the scene.
     pub(super) fn note(&mut self, item: impl Into<String>, message: impl Into<String>) {
-        self.notes.push(Problem { item: item.into(), message: message.into() });
+        self.notes.add(item.into(), message.into());
     }
 
     /// Notes something that may have been noted before.
     pub(super) fn note_once(&mut self, item: impl Into<String>, message: impl Into<String>) {
-        let note = Problem { item: item.into(), message: message.into() };
-        if !self.notes.contains(&note) {
-            self.notes.push(note);
+        let (item, message) = (item.into(), message.into());
+        if self.noted.insert((item.clone(), message.clone())) {
+            self.note(item, message);
         }
     }
 
@@ -36,7 +37,7 @@ impl Builder<'_> {
         }
         let used: BTreeSet<&str> = description.shapes.iter().map(|shape| shape.material.as_str()).collect();
         for name in description.materials.names().filter(|name| !used.contains(name)) {
-            self.note(format!("material `{name}`"), "is nowhere: no shape has it");
+            self.note(format!("material `{}`", Shortened(name)), "is nowhere: no shape has it");
         }
         let is_opaque = |index: usize| matches!(drafts[index].boundary, BoundaryDraft::Opaque(_));
         let shapes = description.shapes.iter().enumerate();
@@ -46,7 +47,7 @@ impl Builder<'_> {
                 self.shape_item(index),
                 format!(
                     "has a `priority`, which has no effect: its material `{}` is opaque{}",
-                    shape.material,
+                    Shortened(&shape.material),
                     and_others(ranked.count(), ["has", "have"])
                 ),
             );
@@ -77,16 +78,49 @@ impl Builder<'_> {
         };
         let thin: Vec<_> = (0..places.drafts.len()).filter_map(is_thin).collect();
         if let [(index, thickness, largest), others @ ..] = &thin[..] {
-            let from = if origin == Vec3::ZERO { String::new() } else { format!(" from {origin}") };
-            self.note(
-                self.shape_item(*index),
-                format!(
-                    "is {thickness} thick, and is not seen at coordinates up to {largest}{from}: surfaces that are nearer \
-                     to each other than 5e-6 of their coordinates are met as one{}",
-                    and_others(others.len(), ["is", "are"])
-                ),
-            );
+            let message = too_thin(*thickness, *largest, origin) + &and_others(others.len(), ["is", "are"]);
+            self.note(self.shape_item(*index), message);
         }
+    }
+
+    /// Notes light from infinitely far away that comes from below. What is upright in the image tells where
+    /// that is, as long as it is about +y or -y: in a view from above it may be any direction.
+    pub(super) fn note_light_from_below(&mut self) {
+        let description = self.description;
+        let Camera::Perspective { up, .. } = &description.camera;
+        let up = up.get();
+        if description.shapes.is_empty() || up.y.abs() < up.abs().max_element() {
+            return;
+        }
+        for (index, light) in description.lights.iter().enumerate() {
+            if let Light::Sun { direction, .. } | Light::Directional { direction, .. } = light
+                && direction.get().dot(up) > 0.0
+            {
+                self.note(
+                    lights::item(index, light),
+                    "comes from below: `direction` is that in which its light travels, not that towards it",
+                );
+            }
+        }
+    }
+
+    /// Notes a mesh file many of whose triangles have no area, which may be lost in rounding.
+    pub(super) fn note_dropped_triangles(&mut self, item: &str, mesh: &TriangleMesh) {
+        /// Largest coordinate over the extent of a mesh from which rounding may be to blame.
+        const FAR: f32 = 10.0;
+        let (dropped, count) = (mesh.dropped_triangles(), mesh.triangle_count() as usize);
+        if 100 * dropped <= dropped + count {
+            return;
+        }
+        let (min, max) = mesh.aabb();
+        let largest = min.abs().max(max.abs()).max_element();
+        let advice = if largest < FAR * (max - min).max_element() {
+            String::new()
+        } else {
+            format!(" at coordinates up to {largest}: move the mesh near its origin before it is written")
+        };
+        let message = format!("{dropped} of {} triangles have no area{advice}", dropped + count);
+        self.note_once(item, message);
     }
 
     /// Notes media that nothing is filled with, and one around everything in which light never ends.
@@ -94,7 +128,7 @@ impl Builder<'_> {
         let (media, used) = (&self.description.media, self.description.used_media());
         for name in media.names().filter(|name| !used.contains(name)) {
             self.note(
-                format!("medium `{name}`"),
+                format!("medium `{}`", Shortened(name)),
                 "is nowhere: no shape has it as `interior`, nor is it `outside`",
             );
         }
@@ -104,7 +138,7 @@ impl Builder<'_> {
             && (0..3).any(|channel| sigma_s.get()[channel] > 0.0 && sigma_a.get()[channel] == 0.0)
         {
             self.note(
-                format!("medium `{name}`"),
+                format!("medium `{}`", Shortened(name)),
                 "scatters around everything without absorbing: iterations are long, and with a little `sigma_a` \
                  in each channel much shorter",
             );
@@ -116,7 +150,7 @@ impl Builder<'_> {
         let (width, height) = image.size();
         if width != 2 * height {
             self.note(
-                format!("image `{file}`"),
+                format!("image `{}`", Shortened(file)),
                 format!(
                     "has {width} x {height} pixels and is stretched over all directions: latitude-longitude images \
                      are twice as wide as high"
@@ -127,7 +161,7 @@ impl Builder<'_> {
             let count = image.infinite_pixels();
             let (pixels, are) = if count == 1 { ("pixel", "is") } else { ("pixels", "are") };
             self.note(
-                format!("image `{file}`"),
+                format!("image `{}`", Shortened(file)),
                 format!(
                     "{count} {pixels} {are} infinite, as bright ones are in half precision, and count as the largest \
                      finite value of each channel"
@@ -178,8 +212,17 @@ fn is_known_mesh<'a>(geometry: &'a Geometry, known: &mut BTreeSet<(&'a str, Opti
     }
 }
 
+/// The note about what is too thin for its coordinates, from the point that has become the origin.
+pub(super) fn too_thin(thickness: f32, largest: f32, origin: Vec3) -> String {
+    let from = if origin == Vec3::ZERO { String::new() } else { format!(" from {origin}") };
+    format!(
+        "is {thickness} thick, and is not seen at coordinates up to {largest}{from}: surfaces that are nearer \
+         to each other than 5e-6 of their coordinates are met as one"
+    )
+}
+
 /// The end of a note that holds for more shapes than it names, with its verb for one and for several.
-fn and_others(count: usize, [one, several]: [&str; 2]) -> String {
+pub(super) fn and_others(count: usize, [one, several]: [&str; 2]) -> String {
     match count {
         0 => String::new(),
         1 => format!(" (and so {one} 1 other)"),

@@ -6,6 +6,7 @@ use upbp_media::{Homogeneous, Medium};
 
 use super::bodies::{shapes_around, touch};
 use super::builder::Builder;
+use super::enclosures::meets;
 use super::lights;
 use super::surfaces::SurfaceDraft;
 use crate::light::Light;
@@ -29,6 +30,16 @@ impl Places<'_> {
         self.geometry.contains(ShapeId(index as u32), point) == Some(true)
     }
 
+    /// Whether a point lies in the surface of a shape, as a lamp in a ceiling, but for rounding.
+    fn is_on(&self, point: Vec3, index: usize) -> bool {
+        meets(self.geometry, ShapeId(index as u32), (point, point))
+    }
+
+    /// Whether the front of a closed shape is that towards its inside, where its emission is then.
+    fn shines_inwards(&self, index: usize) -> bool {
+        matches!(self.shape(index), Shape::Mesh(mesh) if mesh.signed_volume() < 0.0)
+    }
+
     /// The opaque shapes that a point is inside of, in their order.
     pub(super) fn rooms_around(&self, point: Vec3) -> Vec<usize> {
         let is_room =
@@ -36,6 +47,10 @@ impl Places<'_> {
         shapes_around(self.boxes, point, is_room)
     }
 }
+
+/// What a lamp around the camera does, and what may have been meant.
+const OUTWARDS: &str =
+    "shines outwards only: light from all around is a `Constant`, or a mesh whose normals point inwards";
 
 /// Something that shines.
 enum Source {
@@ -72,19 +87,26 @@ impl Builder<'_> {
         // A shape is taken to be in a room if it may be.
         let is_in = |source: &Source, room: usize| match source {
             Source::Outside => true,
-            Source::Point(position) => places.is_in(*position, room),
-            // A room may shine into itself.
-            Source::Shape(index) if *index == room => {
-                matches!(places.shape(room), Shape::Mesh(mesh) if mesh.signed_volume() < 0.0)
-            }
+            Source::Point(position) => places.is_in(*position, room) || places.is_on(*position, room),
+            Source::Shape(index) if *index == room => places.shines_inwards(room),
             Source::Shape(index) => touch(places.shape(*index).aabb(), places.shape(room).aabb()),
         };
+        let shines_outwards =
+            |room: usize| !places.drafts[room].emission.is_black() && !places.shines_inwards(room);
         if sources.iter().any(|source| rooms.iter().all(|room| is_in(source, *room))) {
+            for &room in rooms.iter().filter(|room| shines_outwards(**room)) {
+                self.note(self.shape_item(room), format!("is around the camera, and {OUTWARDS}"));
+            }
             return;
         }
         let is_dark = |room: &&usize| !sources.iter().any(|source| is_in(source, **room));
-        let room = self.shape_item(*rooms.iter().find(is_dark).unwrap_or(first));
-        self.problem("camera", format!("lies inside of the opaque {room}, and nothing that shines does"));
+        let room = *rooms.iter().find(is_dark).unwrap_or(first);
+        let outwards = if shines_outwards(room) { format!(": that {OUTWARDS}") } else { String::new() };
+        let room = self.shape_item(room);
+        self.problem(
+            "camera",
+            format!("lies inside of the opaque {room}, and nothing that shines does{outwards}"),
+        );
     }
 
     /// Reports lights in rooms that the camera is not in.
@@ -92,7 +114,7 @@ impl Builder<'_> {
         for (index, (description, light)) in self.description.lights.iter().zip(lights).enumerate() {
             let Some(position) = light.position() else { continue };
             for room in places.rooms_around(position) {
-                if !rooms.contains(&room) {
+                if !(rooms.contains(&room) || places.is_on(position, room)) {
                     let message = self.message_of_room(room);
                     self.problem(lights::item(index, description), message);
                 }

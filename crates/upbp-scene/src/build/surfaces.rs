@@ -10,6 +10,7 @@ use upbp_media::{MediumId, Spectrum};
 
 use super::builder::{Builder, unknown};
 use crate::description::{self, Geometry, SmoothingAngle, Vector};
+use crate::error::Shortened;
 use crate::material::{
     Conductor, Dielectric, Lambert, Material, MetalFresnel, Mirror, Phong, RoughDielectric, TrowbridgeReitz,
 };
@@ -80,7 +81,7 @@ impl Builder<'_> {
                     materials.insert(name, Some(kind));
                 }
                 Err(message) => {
-                    self.problem(format!("material `{name}`"), message);
+                    self.problem(format!("material `{}`", Shortened(name)), message);
                     materials.insert(name, None);
                 }
             }
@@ -107,15 +108,15 @@ impl Builder<'_> {
         let medium = shape.interior.as_deref().map(|name| self.medium(&item, name, media));
         let name = shape.material.as_str();
         let Some(kind) = materials.get(name) else {
-            let known: Vec<_> = self.description.materials.names().collect();
-            let message = unknown("material", name, &known);
-            self.problem(&item, message);
+            let materials = &self.description.materials;
+            self.problem(&item, unknown("material", name, materials.len(), materials.names()));
             return None;
         };
         let kind = (*kind)?;
+        let name = Shortened(name);
         let emission = shape.emission.get();
         if let Kind::Opaque(material) = kind {
-            if let Some(interior) = &shape.interior {
+            if let Some(interior) = shape.interior.as_deref().map(Shortened) {
                 let message =
                     format!("the material `{name}` is opaque, so that there is no interior for `{interior}`");
                 self.problem(&item, message);
@@ -135,7 +136,7 @@ impl Builder<'_> {
         if !geometry.is_closed() {
             let wrong = match &geometry {
                 Shape::Mesh(mesh) => mesh.border().to_string(),
-                _ => "the shape is not closed".into(),
+                _ => "a quad is not closed: a pane is a `Box` as thick as it is".into(),
             };
             self.problem(&item, format!("the material `{name}` bounds a body, but {wrong}"));
             return None;
@@ -264,30 +265,34 @@ impl Builder<'_> {
         if let Some(known) = self.meshes.known.get(&key) {
             return known.clone();
         }
+        let item = format!("mesh `{}`", Shortened(file));
         let mesh = self.obj_file(file).and_then(|read| {
             let materials = read.material_count();
             if part.is_none() && materials > 1 {
                 let message = format!("has {materials} materials, and all of it is one shape: with `part` a shape takes the triangles of one of them");
-                self.note_once(format!("mesh `{file}`"), message);
+                self.note_once(&item, message);
             }
             if read.lacks_normals() && smooth == SmoothingAngle::ZERO {
                 self.note_once(
-                    format!("mesh `{file}`"),
+                    &item,
                     "has smoothing groups but no normals: it is rendered with flat facets, unless \
                      `smooth_degrees` is given",
                 );
             }
             let mesh = match part {
                 Some(part) => read.part(part).map_err(|error| match error {
-                    PartError::Unknown => unknown("part", part, &read.parts().collect::<Vec<_>>()),
+                    PartError::Unknown => unknown("part", part, read.parts().count(), read.parts()),
                     error @ PartError::SeveralKinds(_) => error.to_string(),
                 }),
                 None => Ok(read.mesh()),
             };
             drop(read);
-            let describe = |error: &dyn std::fmt::Display| format!("mesh `{file}`: {error}");
+            let describe = |error: &dyn std::fmt::Display| format!("{item}: {error}");
             mesh.and_then(|mesh| triangles(mesh, smooth)).map_err(|error| describe(&error))
         });
+        if let Ok(mesh) = &mesh {
+            self.note_dropped_triangles(&item, mesh);
+        }
         self.meshes.known.insert(key, mesh.clone());
         mesh
     }
@@ -298,14 +303,12 @@ impl Builder<'_> {
             return read.clone();
         }
         let path = self.path(file);
-        let describe = |error: &dyn std::fmt::Display| {
-            let path = path.display();
-            match other_format(file) {
-                Some(format) => format!(
-                    "mesh `{path}`: meshes are Wavefront OBJ files, not {format}: export it as OBJ, with normals"
-                ),
-                None => format!("mesh `{path}`: {error}"),
-            }
+        let shown = self.shown_path(file);
+        let describe = |error: &dyn std::fmt::Display| match other_format(file) {
+            Some(format) => format!(
+                "mesh `{shown}`: meshes are Wavefront OBJ files, not {format}: export it as OBJ, with normals"
+            ),
+            None => format!("mesh `{shown}`: {error}"),
         };
         let read = match self.open(&path, MAX_FILE) {
             Ok(bytes) => ObjFile::read(bytes).map(Rc::new).map_err(|error| describe(&error)),

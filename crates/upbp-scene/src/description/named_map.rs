@@ -7,6 +7,8 @@ use std::marker::PhantomData;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::error::Shortened;
+
 /// A map from names to things. A file that gives one name twice is refused, where a plain map would silently
 /// keep the second.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -85,7 +87,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for NamedVisitor<T> {
         let mut named = Named::new();
         while let Some(name) = entries.next_key::<String>()? {
             if named.0.contains_key(&name) {
-                return Err(A::Error::custom(format_args!("the name `{name}` is given twice")));
+                return Err(A::Error::custom(format_args!("the name `{}` is given twice", Shortened(&name))));
             }
             named.0.insert(name, entries.next_value()?);
         }

@@ -8,12 +8,35 @@ use glam::{DVec2, DVec3, Vec3};
 /// The most corners of a polygon that is no fan: each ear takes a look at all of them.
 pub(super) const MAX_CORNERS: usize = 1 << 12;
 
+/// The work of dividing all such polygons of a file, which is the square of the number of corners for each.
+const MAX_WORK: u64 = 1 << 32;
+
+/// What is left of the work that polygons of a file may take.
+#[derive(Clone, Debug)]
+pub(super) struct Budget(u64);
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self(MAX_WORK)
+    }
+}
+
+impl Budget {
+    fn spend(&mut self, corners: usize) -> Result<(), String> {
+        let work = (corners as u64).saturating_mul(corners as u64);
+        self.0 = self.0.checked_sub(work).ok_or(
+            "the polygons of the file that are not convex have too many corners together: triangulate them",
+        )?;
+        Ok(())
+    }
+}
+
 /// Distance between a corner and a line that it is meant to lie on, relative to the largest coordinate.
 const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
 /// Triangles that make up a polygon of at least three corners, wound like it, by the places of their corners
 /// in the list.
-pub(super) fn triangles(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, String> {
+pub(super) fn triangles(corners: &[Vec3], budget: &mut Budget) -> Result<Vec<[usize; 3]>, String> {
     let (points, rounding) = in_plane(corners);
     let is_forward = |[a, b, c]: [usize; 3]| {
         let sides = [points[b] - points[a], points[c] - points[b], points[a] - points[c]];
@@ -30,6 +53,7 @@ pub(super) fn triangles(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, String> {
             corners.len()
         ));
     }
+    budget.spend(corners.len())?;
     let ears = clip_ears(&points).filter(|ears| ears.iter().copied().all(is_forward));
     ears.ok_or_else(|| "the polygon crosses itself: triangulate it".into())
 }
@@ -110,7 +134,7 @@ mod tests {
     fn areas(corners: &[[f32; 2]]) -> Result<Vec<f32>, String> {
         let corners: Vec<Vec3> = corners.iter().map(|[x, z]| Vec3::new(*x, 0.0, *z)).collect();
         let area = |[a, b, c]: [usize; 3]| 0.5 * (corners[b] - corners[a]).cross(corners[c] - corners[a]).y;
-        Ok(triangles(&corners)?.into_iter().map(area).collect())
+        Ok(triangles(&corners, &mut Budget::default())?.into_iter().map(area).collect())
     }
 
     /// From each corner, and both ways round.
@@ -137,7 +161,7 @@ mod tests {
             let angle = |i: usize| (i as f32 / count as f32 * std::f32::consts::TAU).sin_cos();
             let corners = (0..count).map(|i| Vec3::new(angle(i).0, 2.0 * angle(i).1, 3.0 * angle(i).0));
             let fan: Vec<_> = (2..count).map(|next| [0, next - 1, next]).collect();
-            assert_eq!(triangles(&corners.collect::<Vec<_>>()).unwrap(), fan);
+            assert_eq!(triangles(&corners.collect::<Vec<_>>(), &mut Budget::default()).unwrap(), fan);
         }
     }
 
@@ -158,8 +182,8 @@ mod tests {
     #[test]
     fn polygons_without_area_are_fans() {
         let slanted: Vec<Vec3> = (0..9).map(|i| Vec3::new(0.1, 0.3, 0.7) * (i * i % 7) as f32).collect();
-        assert_eq!(triangles(&slanted).unwrap().len(), 7);
-        assert_eq!(triangles(&[Vec3::ONE; 4]).unwrap(), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(triangles(&slanted, &mut Budget::default()).unwrap().len(), 7);
+        assert_eq!(triangles(&[Vec3::ONE; 4], &mut Budget::default()).unwrap(), [[0, 1, 2], [0, 2, 3]]);
     }
 
     #[test]
@@ -168,6 +192,19 @@ mod tests {
         for corner in [[0., 1.], [0., 1.5], [0., 0.25]] {
             assert_eq!(areas(&[[0., 0.], [1., 1.], [1., 0.], corner]).unwrap_err(), message);
         }
+    }
+
+    #[test]
+    fn many_polygons_of_a_file_do_not_take_for_ever() {
+        let l = [[2., 0.], [2., -1.], [1., -1.], [1., -2.], [0., -2.], [0., 0.]];
+        let corners = l.map(|[x, z]| Vec3::new(x, 0.0, z));
+        let mut budget = Budget(2 * 36);
+        // Fans cost nothing.
+        triangles(&corners[..3], &mut budget).unwrap();
+        triangles(&corners, &mut budget).unwrap();
+        triangles(&corners, &mut budget).unwrap();
+        let error = triangles(&corners, &mut budget).unwrap_err();
+        assert!(error.ends_with("too many corners together: triangulate them"), "{error}");
     }
 
     /// As long as a line may have, and the most that are clipped.

@@ -7,6 +7,9 @@ use super::ObjMesh;
 /// The most triangles around a vertex: each is compared with each.
 const MAX_AROUND: usize = if cfg!(test) { 1 << 8 } else { 1 << 12 };
 
+/// The most of these comparisons in a mesh.
+const MAX_COMPARISONS: u64 = if cfg!(test) { 1 << 18 } else { 1 << 32 };
+
 impl ObjMesh {
     /// The mesh with normals: at each corner of a triangle the mean, by angle, of those of the triangles
     /// around the vertex whose planes differ from the triangle's own by at most so many degrees. A vertex
@@ -14,7 +17,8 @@ impl ObjMesh {
     ///
     /// # Errors
     ///
-    /// If the mesh has normals, or more than 4096 triangles around a vertex.
+    /// If the mesh has normals, more than 4096 triangles around a vertex, or many vertices with nearly as
+    /// many.
     ///
     /// # Panics
     ///
@@ -43,12 +47,20 @@ impl ObjMesh {
         order.sort_by_key(|&corner| vertices[corner]);
         let (mut positions, mut normals) = (Vec::new(), Vec::new());
         let mut indices = vec![[0; 3]; self.indices.len()];
+        let mut comparisons = 0;
         for around in order.chunk_by(|&a, &b| vertices[a] == vertices[b]) {
             let position = self.positions[vertices[around[0]] as usize];
             if around.len() > MAX_AROUND {
                 let count = around.len();
                 return Err(format!(
                     "{count} triangles meet at {position}, and `smooth_degrees` compares at most {MAX_AROUND}"
+                ));
+            }
+            comparisons += (around.len() * around.len()) as u64;
+            if comparisons > MAX_COMPARISONS {
+                return Err(format!(
+                    "too many triangles meet at its vertices, {} at {position}, for `smooth_degrees`",
+                    around.len()
                 ));
             }
             let weighted: Vec<_> = around.iter().map(|&corner| (planes[corner / 3], angle(corner))).collect();
@@ -157,5 +169,14 @@ mod tests {
             MAX_AROUND + 1
         );
         assert_eq!(fan(MAX_AROUND + 1).unwrap_err(), expected);
+        // Fans beside each other.
+        let fans = |count: u32| {
+            let indices = (0..count).flat_map(|fan| vec![[3 * fan, 3 * fan + 1, 3 * fan + 2]; MAX_AROUND]);
+            let positions = vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; count as usize].concat();
+            ObjMesh { positions, indices: indices.collect(), normals: None }.smoothed(1.0)
+        };
+        assert!(fans(1).is_ok());
+        let expected = "too many triangles meet at its vertices, 256 at [1, 0, 0], for `smooth_degrees`";
+        assert_eq!(fans(2).unwrap_err(), expected);
     }
 }

@@ -147,7 +147,7 @@ fn scenes_without_light_are_refused() {
     assert_eq!(problem(unused), nothing);
     assert_eq!(
         problem("media: { \"fog\": Homogeneous(sigma_s: 1) }, outside: \"fog\", lights: [Constant(1)]"),
-        "light 1 (Constant): comes from infinitely far away and does not reach into the medium `fog` around everything; instead of `outside`, let it be the interior of a body with a `Null` material"
+        "light 1 (Constant): comes from infinitely far away and does not reach into the medium `fog` around everything; instead of `outside`, let it be the interior of a body with a `Null` material, with `priority: -1` if that reaches into others"
     );
     assert_eq!(
         problem("media: { \"fog\": Homogeneous(sigma_a: (1, 0, 1), glow: 1) }, outside: \"fog\""),
@@ -176,11 +176,11 @@ fn problems_of_shapes_name_the_shape() {
         ),
         (
             r#"name: "a", geometry: QUAD, material: "glass""#,
-            "shape `a`: the material `glass` bounds a body, but the shape is not closed",
+            "shape `a`: the material `glass` bounds a body, but a quad is not closed: a pane is a `Box` as thick as it is",
         ),
         (
             r#"name: "a", geometry: QUAD, material: "null", interior: "fog""#,
-            "shape `a`: the material `null` bounds a body, but the shape is not closed",
+            "shape `a`: the material `null` bounds a body, but a quad is not closed: a pane is a `Box` as thick as it is",
         ),
         (
             r#"name: "a", geometry: BALL, material: "null", emission: 1"#,

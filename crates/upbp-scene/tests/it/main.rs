@@ -10,4 +10,5 @@ mod pointers;
 mod rooms;
 mod shipped_scenes;
 mod skies;
+mod unseen;
 mod vessels;

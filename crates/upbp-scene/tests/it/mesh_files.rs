@@ -67,12 +67,13 @@ fn a_part_of_a_file_is_a_shape() {
     let folder = Folder::with("parts", &mesh);
     let shape = |part: &str| format!("(geometry: Mesh(file: \"m.obj\"{part}), material: \"glass\")");
     let parts =
-        [shape(", part: \"b\""), shape(", part: \"a\""), shape(", part: \"x\", translate: (5, 0, 0)")];
+        [", part: \"b\", translate: (-5, 0, 0)", ", part: \"a\"", ", part: \"x\", translate: (5, 0, 0)"];
+    let parts = parts.map(shape);
     let scene = folder.scene(&parts.join(", ")).unwrap();
     let boxes: Vec<_> = scene.geometry().shapes().iter().map(upbp_accel::Shape::aabb).collect();
     let half = Vec3::splat(0.5);
     let by = Vec3::new(5.0, 0.0, 0.0);
-    assert_eq!(boxes, [(-half, half), (-Vec3::ONE, Vec3::ONE), (by - half, by + half)]);
+    assert_eq!(boxes, [(-by - half, half - by), (-Vec3::ONE, Vec3::ONE), (by - half, by + half)]);
     assert_eq!((scene.files().len(), scene.notes()), (1, &[][..]));
 
     let error = |part: &str| folder.scene(&shape(part)).unwrap_err().to_string();
@@ -101,12 +102,29 @@ fn smoothing_groups_without_normals_are_noted_once() {
     let mesh = format!("s 1\n{}{}", cube("a", 1.0, false, 0), cube("b", 0.5, false, 1));
     let folder = Folder::with("smoothing", &mesh);
     let shape =
-        |part: &str| format!("(geometry: Mesh(file: \"m.obj\", part: \"{part}\"), material: \"glass\")");
+        |part: &str| format!("(geometry: Mesh(file: \"m.obj\", part: \"{part}\"), material: \"white\")");
     let note = "mesh `m.obj`: has smoothing groups but no normals: it is rendered with flat facets, \
                 unless `smooth_degrees` is given";
     assert_eq!(folder.notes(&[shape("a"), shape("b"), shape("a")].join(", ")), [note]);
     let smooth = |part: &str| shape(part).replace("part", "smooth_degrees: 30, part");
     assert!(folder.notes(&[smooth("a"), smooth("b")].join(", ")).is_empty());
+}
+
+/// At 500 km from the origin, coordinates are no finer than 1/32.
+#[test]
+fn triangles_that_coordinates_have_flattened_are_noted() {
+    let strip = |offset: f64, step: f64| {
+        let corners = (0..100).flat_map(|i| [0.0, 1.0].map(|z| (offset + step * f64::from(i), z)));
+        let corners: String = corners.map(|(x, z)| format!("v {x} 0 {z}\n")).collect();
+        corners + &(1..199).map(|i| format!("f {i} {} {}\n", i + 1, i + 2)).collect::<String>()
+    };
+    let shape = "(geometry: Mesh(file: \"m.obj\"), material: \"white\")";
+    let notes = |offset: f64, step: f64| Folder::with("flattened", &strip(offset, step)).notes(shape);
+    assert!(notes(0.0, 0.01).is_empty());
+    assert!(notes(5e5, 0.0625).is_empty());
+    let [note] = &notes(5e5, 0.02)[..] else { panic!("one note") };
+    assert!(note.starts_with("mesh `m.obj`: ") && note.contains(" of 198 triangles have no area"), "{note}");
+    assert!(note.ends_with("up to 500001.97: move the mesh near its origin before it is written"), "{note}");
 }
 
 /// A cylinder without normals in a file and in the scene.

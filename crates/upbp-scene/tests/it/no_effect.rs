@@ -39,6 +39,32 @@ fn what_has_no_effect_is_noted() {
 }
 
 #[test]
+fn light_from_below_is_noted() {
+    let notes = |up: &str, lights: &str, shapes: &str| {
+        let text = format!(
+            "(version: 1, camera: Perspective(origin: (1, 2, 9), target: (0, 0, 0), fov_degrees: 30, up: {up}),
+              materials: {{ \"white\": Lambert(0.5) }}, shapes: [{shapes}], lights: [{lights}])"
+        );
+        let scene = ReadyScene::from_ron_str(&text, "").unwrap_or_else(|error| panic!("{error}"));
+        scene.notes().iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let (down, ball) = ("Sun(direction: (1, -3, 1), irradiance: 3)", ball(0, "white", ""));
+    let up = down.replace("-3", "0.1");
+    assert!(notes("(0, 1, 0)", down, &ball).is_empty());
+    assert_eq!(
+        notes("(0.1, 1, 0)", &format!("Constant(1), {up}"), &ball),
+        [
+            "light 2 (Sun): comes from below: `direction` is that in which its light travels, not that towards it"
+        ]
+    );
+    let directional = up.replace("Sun", "Directional");
+    assert_eq!(notes("(0, 1, 0)", &directional, &ball).len(), 1);
+    // There +z may be up, or the view from above.
+    assert!(notes("(0, 0.5, 1)", &up, &ball).is_empty());
+    assert_eq!(notes("(0, -1, 0)", down, &ball).len(), 1);
+}
+
+#[test]
 fn bodies_too_thin_to_be_seen_are_noted() {
     let pane = |x: f32, thickness: f32| {
         let end = x + 1.0;

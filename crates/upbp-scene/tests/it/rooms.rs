@@ -1,5 +1,6 @@
 //! Rooms that are closed shapes.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use glam::Vec3;
@@ -32,6 +33,72 @@ fn light_in_an_integrating_sphere_is_even() {
     }
 }
 
+/// The problem of a room around the camera with this light, or the notes about it.
+fn verdict(room: &str, light: &str) -> Result<Vec<String>, String> {
+    let text = format!(
+        "(version: 1, camera: Perspective(origin: (0, 0, 1), target: (0, 0, 0), fov_degrees: 40),
+          materials: {{ \"white\": Lambert(0.5) }},
+          shapes: [(name: \"room\", material: \"white\", {room})], lights: [{light}])"
+    );
+    match ReadyScene::from_ron_str(&text, "") {
+        Ok(scene) => Ok(scene.notes().iter().map(ToString::to_string).collect()),
+        Err(SceneError::Invalid { problems, .. }) => Err(problems[0].to_string()),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn a_lamp_in_the_ceiling_of_a_room_lights_it() {
+    let point = |y: f32| format!("Point(position: (0.5, {y:?}, 0.25), intensity: 1)");
+    let dark = "camera: lies inside of the opaque shape `room`, and nothing that shines does";
+    let cuboid = "geometry: Box(min: (-2, -2, -2), max: (2, 2, 2))";
+    let rotated =
+        "geometry: Box(min: (-2, -2, -2), max: (2, 2, 2), rotate: [(axis: (0, 1, 0), degrees: 30)])";
+    for room in [cuboid, rotated] {
+        assert_eq!(verdict(room, &point(2.0)), Ok(Vec::new()));
+        assert_eq!(verdict(room, &point(2.01)), Err(dark.to_owned()));
+    }
+}
+
+/// The lamp in the lower face of a closed housing is not inside of it, on whichever side the camera is.
+#[test]
+fn a_lamp_in_a_face_of_a_closed_mesh_is_not_inside_of_it() {
+    let housing = |degrees: u32| {
+        format!(
+            "geometry: Box(min: (-0.3, 1.4, -0.3), max: (0.3, 1.7, 0.3), rotate: [(axis: (0, 1, 0), degrees: {degrees})])"
+        )
+    };
+    let light = |y: f32| {
+        format!("Spot(position: (0.1, {y:?}, 0.05), direction: (0, -1, 0), intensity: 1, cutoff_degrees: 60)")
+    };
+    let inside = "light 1 (Spot): lies inside of the opaque shape `room`, and the camera does not";
+    for degrees in [30, 90, 200] {
+        for (y, is_inside) in [(1.4, false), (1.7, false), (1.41, true), (1.55, true)] {
+            let expected = if is_inside { Err(inside.to_owned()) } else { Ok(Vec::new()) };
+            assert_eq!(verdict(&housing(degrees), &light(y)), expected, "{degrees} {y}");
+        }
+    }
+}
+
+#[test]
+fn a_dome_that_shines_outwards_is_told() {
+    let dome = "geometry: Sphere(centre: (0, 0, 0), radius: 100), emission: 1";
+    let outwards =
+        "shines outwards only: light from all around is a `Constant`, or a mesh whose normals point inwards";
+    assert_eq!(
+        verdict(dome, ""),
+        Err(format!(
+            "camera: lies inside of the opaque shape `room`, and nothing that shines does: that {outwards}"
+        ))
+    );
+    let light = "Point(position: (0, 2, 0), intensity: 1)";
+    assert_eq!(verdict(dome, light), Ok(vec![format!("shape `room`: is around the camera, and {outwards}")]));
+    let inwards = "geometry: Mesh(positions: [(-9, -9, -9), (30, -9, -9), (-9, 30, -9), (-9, -9, 30)],
+        indices: [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]), emission: 1";
+    assert_eq!(verdict(inwards, ""), Ok(Vec::new()));
+    assert_eq!(verdict(inwards, light), Ok(Vec::new()));
+}
+
 /// A closed surface with deep dents, of `8 n` triangles.
 fn star(dents: &[f32]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let n = 4 * dents.len() as u32;
@@ -62,7 +129,17 @@ proptest! {
         let vector = |Vec3 { x, y, z }: Vec3| format!("({x:?}, {y:?}, {z:?}),");
         let mesh = TriangleMesh::new(positions.clone(), triangles.clone(), None).unwrap();
         let (mut lights, mut expected) = (String::new(), Vec::new());
-        for (number, place) in (1..).zip(places.into_iter().map(|place| Vec3::from(place) * size + offset)) {
+        // A lamp in the surface is on either side of it. Near the origin there are digits to tell.
+        let near = positions.iter().map(|position| *position - offset).collect();
+        let near = TriangleMesh::new(near, triangles.clone(), None).unwrap();
+        let is_off = |place: &Vec3| {
+            let corners = [Vec3::ONE, Vec3::new(-1.0, 1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(1.0, 1.0, -1.0)];
+            let around = corners.into_iter().flat_map(|corner| [corner, -corner]);
+            let around = around.map(|corner| near.contains(*place - offset + corner * (2e-5 * size)));
+            around.collect::<BTreeSet<_>>().len() == 1
+        };
+        let places = places.into_iter().map(|place| Vec3::from(place) * size + offset).filter(is_off);
+        for (number, place) in (1..).zip(places) {
             write!(lights, "Point(position: {} intensity: 1),", vector(place)).unwrap();
             if mesh.contains(place) == Some(true) {
                 let item = format!("light {number} (Point)");

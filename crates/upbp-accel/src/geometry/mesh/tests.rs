@@ -226,3 +226,19 @@ fn copies_can_be_made_in_parallel() {
     });
     assert!(copies.iter().all(|copy| Arc::ptr_eq(copy.model(), copies[0].model())));
 }
+
+/// On faces, edges and corners of a cube: of two opposite rays one enters it at most.
+#[test]
+fn points_of_the_surface_are_not_inside() {
+    let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+    let faces: [[u32; 4]; 6] =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let cube = TriangleMesh::new((0..8).map(corner).collect(), triangles, None).unwrap();
+    for i in 0..125 {
+        let place = [i % 5, i / 5 % 5, i / 25];
+        let is_inside = place.iter().all(|step| (1..4).contains(step));
+        let point = Vec3::from(place.map(|step| step as f32 / 4.0));
+        assert_eq!(cube.contains(point), Some(is_inside), "{point}");
+    }
+}
