@@ -10,7 +10,8 @@ use upbp_scene::ReadyScene;
 fn scene() -> ReadyScene {
     ReadyScene::from_ron_str(
         "(version: 1, film: (width: 8, height: 6, crop: (x: 1, y: 2, width: 3, height: 4)),
-        camera: Perspective(origin: (0, 1, 4), target: (0, 0, 0), fov_degrees: 40, lens_radius: 0.1, focus_distance: 3),
+        camera: Perspective(origin: (0, 1, 4), target: (0, 0, 0), fov_degrees: 40,
+            lens_radius: 0.1, focus_distance: 3),
         media: { \"flame\": Homogeneous(glow: 1) }, materials: { \"black\": Lambert(0), \"null\": Null },
         shapes: [
             (geometry: Sphere(centre: (0, 1, 0), radius: 0.5), material: \"black\", emission: 1),
