@@ -130,8 +130,8 @@ impl Placement {
         (self.rounded(largest) + self.moved.abs()).max_element()
     }
 
-    /// Along each axis of the scene the sizes of what adds up to a coordinate, and is rounded, of a point with
-    /// coordinates up to `largest`. What is moved is moved exactly.
+    /// Along each axis of the scene the size of what adds up to a coordinate, and is rounded, of a point
+    /// with coordinates up to `largest`. What is moved is moved exactly.
     pub(super) fn rounded(&self, largest: Vec3) -> Vec3 {
         let Mat3 { x_axis, y_axis, z_axis } = self.to_scene;
         let sum = x_axis.abs() * largest.x + y_axis.abs() * largest.y + z_axis.abs() * largest.z;

@@ -245,8 +245,8 @@ fn measure<S: Scene, L: Lanes>(
     let [light_paths, camera_paths] = paths.map(|count| (part * f64::from(count)).ceil() as u32);
     let beam_paths = light_paths.div_ceil(PATHS_PER_BEAM_PATH).min(plan.beam_paths);
     let (full, plan) = (plan, &plan.blurred(light_paths, beam_paths));
-    // In an iteration kernels are narrower, and contributions rarer and brighter by that; there are more light
-    // sub-paths, of which connections alone do not make more. So squares count for these many times as much.
+    // In an iteration kernels are narrower, and contributions rarer and brighter by that; there are more
+    // light sub-paths, of which connections alone do not make more. So squares count this many times.
     let growth_of_squares = |technique| {
         let blur = match [plan, full].map(|plan| plan.kernels.get(technique)) {
             [Some(wide), Some(narrow)] if narrow.effective_volume() > 0.0 => {

@@ -13,9 +13,9 @@ const CELLS: usize = 8;
 
 /// Checks the contract of [`Medium`] on random segments inside `bounds`: ranges of all values, that walks
 /// pass and stop as often as `segment` says, in each lane as often as `segment_lanes` says, wherever the
-/// segment ends, and can stop wherever light is scattered; that lanes with equal extinctions are equal, that a
-/// walk the other way has the densities that the first one is told of it, that transmittance is a product over
-/// pieces, and that points drawn for their light bring what is `emitted`.
+/// segment ends, and can stop wherever light is scattered; that lanes with equal extinctions are equal, that
+/// a walk the other way has the densities that the first one is told of it, that transmittance is a product
+/// over pieces, and that points drawn for their light bring what is `emitted`.
 pub fn check_medium(medium: &impl Medium, bounds: &BoundingSphere) -> Check {
     let mut random = Random(13);
     let path = medium.mean_free_path();

@@ -47,9 +47,9 @@ impl Plane {
         self.across / self.normal.dot(ray.direction).max(GRAZING) + DISTANCE * self.t
     }
 
-    /// Whether another plane coincides: a ray that goes on from the nearer one starts `across` off it, and has
-    /// passed the other. So faces that are turned away from each other, as those at the rim of a ball are, or
-    /// stand upright on each other, never do.
+    /// Whether another plane coincides: a ray that goes on from the nearer one starts `across` off it, and
+    /// has passed the other. So faces that are turned away from each other, as those at the rim of a ball
+    /// are, or stand upright on each other, never do.
     fn coincides(&self, other: &Self, ray: &Ray) -> bool {
         let between = (self.t - other.t).abs() - DISTANCE * self.t.max(other.t);
         let cosine = self.normal.dot(ray.direction).min(other.normal.dot(ray.direction));

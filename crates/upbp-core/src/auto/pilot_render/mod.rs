@@ -248,8 +248,8 @@ impl PilotRender {
         self.photons(technique, plan) * self.mean_photons(technique)
     }
 
-    /// Photons or beams within a query's kernel in the first iteration of another plan, relative to that of the
-    /// plan of this render.
+    /// Photons or beams within a query's kernel in the first iteration of another plan, relative to that of
+    /// the plan of this render.
     fn photons(&self, technique: Technique, plan: &Plan) -> f64 {
         let kernel = if technique == Technique::Surf && self.plan.radii.surf > 0.0 {
             f64::from(plan.radii.surf / self.plan.radii.surf).powi(2)
@@ -259,8 +259,8 @@ impl PilotRender {
         kernel * self.relative_paths(technique, plan)
     }
 
-    /// As many photons or beams within a query's kernel, relative to the first iteration, as make the variance
-    /// of all iterations together.
+    /// As many photons or beams within a query's kernel, relative to the first iteration, as make the
+    /// variance of all iterations together.
     pub(super) fn mean_photons(&self, technique: Technique) -> f64 {
         self.plan.radii.harmonic_mean_photons(technique, self.iterations)
     }
