@@ -22,7 +22,8 @@ fn every_scene_loads() {
     let loaded = beds.map(|bed| ReadyScene::load(folder.join(format!("{}.ron", bed.name))));
     std::fs::remove_dir_all(&folder).unwrap();
     for scene in loaded {
-        scene.unwrap_or_else(|error| panic!("{error}"));
+        let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+        assert!(scene.notes().is_empty(), "{:?}", scene.notes());
     }
 }
 

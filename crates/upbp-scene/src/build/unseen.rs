@@ -171,7 +171,7 @@ fn is_on_quad(point: Vec3, quad: &Quad, rounding: f32) -> bool {
 /// Whether a point is on one of the sides of a box: the lower one of each axis is followed by the upper one.
 fn is_on_side(point: Vec3, axis_box: &AxisBox, side: usize, rounding: f32) -> bool {
     let (min, max) = axis_box.aabb();
-    let height = point[side / 2] - if side % 2 == 0 { min } else { max }[side / 2];
+    let height = point[side / 2] - if side.is_multiple_of(2) { min } else { max }[side / 2];
     height.abs() <= rounding && (min - rounding).cmple(point).all() && point.cmple(max + rounding).all()
 }
 
