@@ -75,10 +75,7 @@ impl Builder<'_> {
                 continue;
             };
             let outer = &bodies[*outer];
-            let [medium, medium_around] = [inner, outer].map(|body| body.interior.medium);
-            if is_matched([outer.interior.ior, inner.interior.ior])
-                && (medium.is_none() || medium == medium_around)
-            {
+            if is_matched([outer.interior.ior, inner.interior.ior]) {
                 matched.push((inner.shape, outer.shape));
             }
             let around = places.geometry.shape(outer.shape);
@@ -92,8 +89,8 @@ impl Builder<'_> {
         let item = |id: ShapeId| self.shape_item(id.0 as usize);
         let matched = matched.split_first().map(|((inner, outer), others)| {
             let message = format!(
-                "has the index of refraction of {} around it, so that nothing is seen of its surface: a hollow \
-                 of air is `Dielectric(1)`{}",
+                "has the index of refraction of {} around it, so that nothing is seen of its surface: air or \
+                 gas inside of glass is `Dielectric(1)`, and what bounds a medium alone is `Null`{}",
                 item(*outer),
                 and_others(others.len(), ["has", "have"])
             );
