@@ -104,23 +104,22 @@ impl Builder<'_> {
         }
     }
 
-    /// Notes a mesh file many of whose triangles have no area, which may be lost in rounding.
+    /// Notes a mesh file far from its origin many of whose triangles have no area: rounding may have taken it.
+    /// Nearer to it triangles without area are those at poles.
     pub(super) fn note_dropped_triangles(&mut self, item: &str, mesh: &TriangleMesh) {
-        /// Largest coordinate over the extent of a mesh from which rounding may be to blame.
+        /// Largest coordinate over the extent of a mesh that is far away.
         const FAR: f32 = 10.0;
-        let (dropped, count) = (mesh.dropped_triangles(), mesh.triangle_count() as usize);
-        if 100 * dropped <= dropped + count {
-            return;
-        }
+        let dropped = mesh.dropped_triangles();
+        let count = dropped + mesh.triangle_count() as usize;
         let (min, max) = mesh.aabb();
         let largest = min.abs().max(max.abs()).max_element();
-        let advice = if largest < FAR * (max - min).max_element() {
-            String::new()
-        } else {
-            format!(" at coordinates up to {largest}: move the mesh near its origin before it is written")
-        };
-        let message = format!("{dropped} of {} triangles have no area{advice}", dropped + count);
-        self.note_once(item, message);
+        if 100 * dropped > count && largest > FAR * (max - min).max_element() {
+            let message = format!(
+                "{dropped} of {count} triangles have no area at coordinates up to {largest}: move the mesh near \
+                 its origin before it is written"
+            );
+            self.note_once(item, message);
+        }
     }
 
     /// Notes media that nothing is filled with, and one around everything in which light never ends.

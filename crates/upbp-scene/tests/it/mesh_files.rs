@@ -114,9 +114,13 @@ fn smoothing_groups_without_normals_are_noted_once() {
 #[test]
 fn triangles_that_coordinates_have_flattened_are_noted() {
     let strip = |offset: f64, step: f64| {
-        let corners = (0..100).flat_map(|i| [0.0, 1.0].map(|z| (offset + step * f64::from(i), z)));
-        let corners: String = corners.map(|(x, z)| format!("v {x} 0 {z}\n")).collect();
-        corners + &(1..199).map(|i| format!("f {i} {} {}\n", i + 1, i + 2)).collect::<String>()
+        let mut text = String::new();
+        for i in 0..100 {
+            let x = offset + step * f64::from(i);
+            writeln!(text, "v {x} 0 0\nv {x} 0 1").unwrap();
+        }
+        (1..199).for_each(|i| writeln!(text, "f {i} {} {}", i + 1, i + 2).unwrap());
+        text
     };
     let shape = "(geometry: Mesh(file: \"m.obj\"), material: \"white\")";
     let notes = |offset: f64, step: f64| Folder::with("flattened", &strip(offset, step)).notes(shape);
