@@ -1,5 +1,7 @@
 //! Oracles of the meshes, and the scenes as a reader finds them.
 
+use std::sync::OnceLock;
+
 use glam::{DVec3, dvec3};
 use upbp_accel::TriangleMesh;
 use upbp_scene::description::{Geometry, Material};
@@ -7,7 +9,13 @@ use upbp_scene::obj::{ObjFile, ObjMesh};
 use upbp_scene::{ReadyScene, SceneDescription};
 
 use crate::mesh::Mesh;
-use crate::{beds, write};
+use crate::{Bed, write};
+
+/// Made once for all tests: most of their time goes into it.
+fn beds() -> &'static [Bed] {
+    static BEDS: OnceLock<Vec<Bed>> = OnceLock::new();
+    BEDS.get_or_init(|| crate::beds().into())
+}
 
 fn read(text: &str) -> TriangleMesh {
     let ObjMesh { positions, indices, normals } = ObjFile::parse(text).unwrap().mesh();
@@ -17,9 +25,9 @@ fn read(text: &str) -> TriangleMesh {
 #[test]
 fn every_scene_loads() {
     let folder = std::env::temp_dir().join(format!("upbp-beds-{}", std::process::id()));
-    let beds = beds();
-    write(&beds, &folder).unwrap();
-    let loaded = beds.map(|bed| ReadyScene::load(folder.join(format!("{}.ron", bed.name))));
+    write(beds(), &folder).unwrap();
+    let load = |bed: &Bed| ReadyScene::load(folder.join(format!("{}.ron", bed.name)));
+    let loaded: Vec<_> = beds().iter().map(load).collect();
     std::fs::remove_dir_all(&folder).unwrap();
     for scene in loaded {
         let scene = scene.unwrap_or_else(|error| panic!("{error}"));
@@ -52,7 +60,7 @@ fn every_mesh_is_named_by_its_scene_and_every_body_is_closed_with_normals_outwar
 
 #[test]
 fn a_bathroom_has_a_hundred_thousand_triangles() {
-    let bathroom = beds().into_iter().find(|bed| bed.name == "bathroom").unwrap();
+    let bathroom = beds().iter().find(|bed| bed.name == "bathroom").unwrap();
     assert!(bathroom.meshes.iter().map(|(_, mesh, _)| mesh.triangles.len()).sum::<usize>() > 100_000);
 }
 

@@ -133,24 +133,42 @@ pub(crate) fn run_or<T: Task>(task: T, otherwise: impl FnOnce(T)) {
     }
 }
 
-/// A choice of instructions.
+/// Instructions that tasks run with.
 #[cfg(feature = "geometry")]
-#[derive(Clone, Copy)]
-pub(crate) enum Instructions {
-    /// The best that this processor has.
-    Best,
-    /// Those that every processor has.
-    Plain,
+pub(crate) trait Instructions: Copy {
+    fn run(self, task: impl Task);
 }
 
 #[cfg(feature = "geometry")]
-impl Instructions {
-    pub(crate) fn run(self, task: impl Task) {
-        match (self, Arch::new()) {
-            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            (Self::Best, Arch::V3(simd)) => simd.vectorize(avx2::Vectorised { task, simd }),
-            _ => task.run(Plain),
-        }
+impl Instructions for Plain {
+    fn run(self, task: impl Task) {
+        task.run(self);
+    }
+}
+
+#[cfg(all(feature = "geometry", any(target_arch = "x86", target_arch = "x86_64")))]
+impl Instructions for pulp::x86::V3 {
+    fn run(self, task: impl Task) {
+        self.vectorize(avx2::Vectorised { task, simd: self });
+    }
+}
+
+/// The best instructions for which code is compiled.
+#[cfg(all(feature = "geometry", any(target_arch = "x86", target_arch = "x86_64")))]
+pub(crate) type Best = pulp::x86::V3;
+#[cfg(all(feature = "geometry", not(any(target_arch = "x86", target_arch = "x86_64"))))]
+pub(crate) type Best = Plain;
+
+/// Those instructions, if this processor has them.
+#[cfg(feature = "geometry")]
+pub(crate) fn best() -> Option<Best> {
+    match Arch::new() {
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        Arch::V3(simd) => Some(simd),
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        _ => None,
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        _ => Some(Plain),
     }
 }
 

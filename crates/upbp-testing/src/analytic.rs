@@ -69,12 +69,19 @@ pub fn cases(kind: &str) -> Vec<Case> {
 }
 
 /// Results beside what is expected.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Table {
+    noise: f64,
     failures: Vec<String>,
 }
 
 impl Table {
+    /// A table of results whose standard errors are at most a part `noise` of what is expected: from larger
+    /// ones nothing could be told.
+    pub const fn new(noise: f64) -> Self {
+        Self { noise, failures: Vec::new() }
+    }
+
     /// A result with its standard error. `slack` is what it may differ without being wrong: accuracy of the
     /// expected value, finite geometry, kernel bias.
     pub fn check(&mut self, name: &str, result: Estimate, expected: f64, slack: f64) {
@@ -96,6 +103,8 @@ impl Table {
         let bar = 4.0 * result.error + slack + 1e-5 * expected.abs();
         if !(difference.abs() <= bar) {
             self.failures.push(row);
+        } else if !(result.error <= self.noise * expected.abs()) {
+            self.failures.push(format!("{row}: too noisy to tell"));
         }
     }
 

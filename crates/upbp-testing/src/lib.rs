@@ -29,7 +29,9 @@ pub mod shipped;
 mod statistics;
 pub mod stress;
 
-pub use rendering::{comparing_renderer, iterate, render, render_by, render_channels, renderer, room};
+pub use rendering::{
+    comparing_renderer, iterate, render, render_by, render_channels, renderer, room, short_renderer,
+};
 pub use statistics::{Estimate, assert_same, channels};
 
 /// The folder of the workspace, where examples and test data are.

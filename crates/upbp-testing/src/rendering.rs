@@ -1,7 +1,7 @@
 //! Short renders that become estimates of the image mean.
 
 use upbp_core::scene::{Camera as _, PixelRect, Scene as _};
-use upbp_core::{Image, Renderer, Settings, Start};
+use upbp_core::{Image, Renderer, Settings, Start, Stop};
 use upbp_scene::ReadyScene;
 use upbp_scene::description::{Count, Film};
 
@@ -21,6 +21,15 @@ pub fn room(side: u32) -> ReadyScene {
 /// A renderer of a scene and settings that cannot be refused.
 pub fn renderer(scene: &ReadyScene, settings: Settings) -> Renderer<'_> {
     scene.renderer(settings.validate().expect("valid settings")).expect("a scene that can be rendered")
+}
+
+/// As [`renderer`], of a render that ends after some iterations: where it chooses its techniques, the choice
+/// takes a small part of their work.
+pub fn short_renderer(scene: &ReadyScene, settings: Settings, iterations: u64) -> Renderer<'_> {
+    let stop = Stop { iterations: Some(iterations), ..Stop::default() };
+    scene
+        .start_renderer(settings.validate().expect("valid settings"), Start { stop, ..Start::default() })
+        .expect("a scene that can be rendered")
 }
 
 /// As [`renderer`], with a series of errors: those against a grey picture.

@@ -55,11 +55,17 @@ pub fn channels(values: &[[f64; 3]]) -> [Estimate; 3] {
     std::array::from_fn(|c| Estimate::of(&values.iter().map(|v| v[c]).collect::<Vec<_>>()))
 }
 
-/// Asserts that independent estimates agree within 4 standard errors, per channel.
-pub fn assert_same(found: [Estimate; 3], expected: [Estimate; 3], what: &str) {
+/// Asserts that independent estimates agree within 4 standard errors of the difference, per channel, and that
+/// such an error is at most a part `noise` of what is expected: with a larger one the test could not tell.
+pub fn assert_same(found: [Estimate; 3], expected: [Estimate; 3], noise: f64, what: &str) {
     for (found, expected) in found.iter().zip(&expected) {
-        let sigmas = found.sigmas(expected);
-        println!("{what}: {found:?}, expected {expected:?}, {sigmas:.2} sigma");
-        assert!(sigmas.abs() < 4.0, "{what}: {found:?}, expected {expected:?}");
+        let (sigmas, relative_error) = (found.sigmas(expected), (*found - *expected).error / expected.mean);
+        let row = format!(
+            "{what}: {found:?}, expected {expected:?}, {sigmas:.2} sigma of {:.2} %",
+            100.0 * relative_error
+        );
+        println!("{row}");
+        assert!(sigmas.abs() < 4.0, "{row}");
+        assert!(relative_error <= noise, "too noisy to tell: {row}");
     }
 }

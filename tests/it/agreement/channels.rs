@@ -1,6 +1,6 @@
 //! Colours are three numbers and no more: which of them is called red makes no difference.
 
-use upbp_core::{FrozenPlan, Heuristic, LightPaths, RenderError, Renderer, Settings, Start, TechniqueSet};
+use upbp_core::{FrozenPlan, Heuristic, LightPaths, RenderError, Settings, Start, TechniqueSet};
 use upbp_scene::ReadyScene;
 use upbp_testing::{render, render_channels};
 
@@ -60,6 +60,7 @@ fn exchanged_channels_of_a_chromatic_medium_exchange_the_means() {
         let sigmas = (a.mean - b.mean) / a.error.hypot(b.error);
         println!("channel {c}: {:.5} and {:.5}, {sigmas:.2} standard errors", a.mean, b.mean);
         assert!(sigmas.abs() < 4.0, "channel {c}: {} and {}, {sigmas} standard errors", a.mean, b.mean);
+        assert!(a.error.hypot(b.error) < 0.02 * a.mean, "channel {c}: too noisy to tell");
     }
 }
 
@@ -70,7 +71,7 @@ fn lanes_have_no_power_heuristic() {
     let plan_with = |heuristic, plan: Option<FrozenPlan>| {
         let settings = Settings { heuristic, ..settings() }.validate().expect("settings");
         let start = Start { plan, ..Start::default() };
-        Ok::<_, RenderError>(Renderer::start(&scene, settings, start)?.state().identity().frozen_plan())
+        Ok::<_, RenderError>(scene.start_renderer(settings, start)?.state().identity().frozen_plan())
     };
     let in_lanes = plan_with(Heuristic::Balance, None).expect("a plan");
     assert!(in_lanes.plan.lanes.is_some());

@@ -74,6 +74,45 @@ pub(super) enum Fault {
 
 use Fault as F;
 
+/// The part of a host that has a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Part {
+    Scene,
+    Bsdf,
+    Medium,
+    Light,
+    Camera,
+}
+
+impl Fault {
+    pub(super) const fn part(self) -> Part {
+        match self {
+            F::BsdfNan
+            | F::BsdfNegative
+            | F::BsdfInfinite
+            | F::BsdfPdf(_)
+            | F::BsdfDirection
+            | F::BsdfRoulette(_)
+            | F::BsdfWeight(_)
+            | F::BsdfAlbedo(_) => Part::Bsdf,
+            F::Transmittance(_)
+            | F::Reach(_)
+            | F::Stop(_)
+            | F::Distance(_)
+            | F::Scattering(_)
+            | F::Continuation(_)
+            | F::FreePath(_) => Part::Medium,
+            F::Radiance(_) | F::LightPdf(_) | F::LightDirection | F::LightOutside | F::Power(_) => {
+                Part::Light
+            }
+            F::CameraPdf(_) | F::CameraDirection | F::CameraFilm | F::CameraLens | F::CameraImage(_) => {
+                Part::Camera
+            }
+            _ => Part::Scene,
+        }
+    }
+}
+
 /// A good scene with one fault.
 pub(super) struct Hostile {
     scene: ReadyScene,

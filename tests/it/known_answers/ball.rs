@@ -5,7 +5,7 @@ use upbp_testing::render;
 
 #[test]
 fn ball_nonscattering() {
-    let mut table = Table::default();
+    let mut table = Table::new(0.005);
     for case in cases("ball_nonscattering") {
         let radius = case.input("radius");
         let null = case.word("interface") == "null";

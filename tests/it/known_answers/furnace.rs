@@ -65,7 +65,7 @@ fn closed_box() -> String {
 
 #[test]
 fn white_furnace() {
-    let mut table = Table::default();
+    let mut table = Table::new(0.02);
     for case in cases("white_furnace") {
         let scene = scene(&describe(&case));
         for techniques in ["hit", "pt", "bpt", "bpt+surf+pp3d+pb2d+bb1d", "hit+surf+pb2d"] {
@@ -74,7 +74,6 @@ fn white_furnace() {
             let (result, _) = render(&scene, &settings, 12);
             let slack = if merges { BOUNDARY_LOSS } else { 0.0 };
             table.check(&format!("{} {techniques}", case.id), result, 1.0, slack);
-            assert!(result.error < 0.02, "{} {techniques}: too noisy to tell", case.id);
         }
     }
     table.finish();
@@ -136,7 +135,7 @@ fn channels_that_scatter_into_other_directions_are_white() {
 #[test]
 fn chromatic_white_furnace() {
     for body in ["homogeneous", "dielectric", "nested"] {
-        for ratio in [3.0, 1000.0] {
+        for ratio in [3.0, 200.0] {
             let scene = scene(&chromatic(ratio, body));
             for techniques in ["pt", "bpt"] {
                 let settings = settings(techniques, None);
@@ -164,7 +163,7 @@ fn a_dense_ball_keeps_its_light() {
         renderer(&scene, settings("hit+pp3d", radius)).report().plan.radii.most_mean_free_paths
     };
     assert_eq!([limit(None), limit(Some(0.01))], [Some(0.3), None]);
-    let mut table = Table::default();
+    let mut table = Table::new(0.02);
     for techniques in ["hit+pp3d", "hit+pb2d"] {
         let (result, _) = render(&scene(text), &settings(techniques, None), 24);
         table.check(techniques, result, 1.0, 0.01);

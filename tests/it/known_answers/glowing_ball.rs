@@ -51,7 +51,7 @@ impl Ball {
 
 #[test]
 fn the_light_of_a_glowing_ball_on_a_floor() {
-    let mut table = Table::default();
+    let mut table = Table::new(0.01);
     let ball = |height, radius, sigma_a, emission| Ball { height, radius, sigma_a, emission };
     for (ball, x, by_hits) in [
         (ball(1.0, 0.6, 2.0, [3.0, 0.0]), 0.5, true),

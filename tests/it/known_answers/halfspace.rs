@@ -5,7 +5,7 @@ use upbp_testing::render;
 
 #[test]
 fn halfspace_isotropic() {
-    let mut table = Table::default();
+    let mut table = Table::new(0.01);
     for case in cases("halfspace_isotropic") {
         let albedo = case.input("albedo");
         if albedo >= 1.0 {
@@ -13,9 +13,11 @@ fn halfspace_isotropic() {
         }
         let thickness = if albedo > 0.99 { 400.0 } else { 60.0 };
         let mu0 = case.input("mu0");
-        for (mu, expected) in case.inputs("mu").iter().zip(case.expected_list("emergent_radiance")) {
+        let directions = case.inputs("mu").into_iter().zip(case.expected_list("emergent_radiance"));
+        // Upright, oblique, and grazing.
+        for (mu, expected) in directions.step_by(2) {
             // Independent of the azimuth between the two.
-            let eye = [(1.0 - mu * mu).sqrt(), 0.0, *mu];
+            let eye = [(1.0 - mu * mu).sqrt(), 0.0, mu];
             let scene = scene(&format!(
                 "{} media: {{\"m\": {}}}, materials: {{\"null\": Null}},
                 shapes: [(geometry: Box(min: (-500.0, -500.0, {:?}), max: (500.0, 500.0, 0.0)), material: \"null\", interior: \"m\")],

@@ -155,6 +155,7 @@ fn scattering_layers_keep_their_energy() {
             let case = format!("{}, {techniques}", layers.name);
             println!("{case}: {:.5} ± {:.5}", found.mean, found.error);
             assert!((found.mean - 1.0).abs() < 4.0 * found.error + slack + ROUNDING, "{case}: {found:?}");
+            assert!(found.error < 0.01, "{case}: too noisy to tell");
         }
     }
 }
@@ -175,6 +176,7 @@ fn rough_layers_are_the_same_by_all_techniques() {
         let slack = if techniques == "all" { BOUNDARY_LOSS } else { 0.0 };
         let error = found.error.hypot(expected.error);
         assert!((found.mean - expected.mean).abs() < 4.0 * error + slack, "{case}: {found:?} {expected:?}");
+        assert!(error < 0.01 * expected.mean, "{case}: too noisy to tell");
     }
 }
 
@@ -193,7 +195,7 @@ fn rough_ball(alpha: f64, scattering: f64) -> ReadyScene {
 /// Facets lose nothing to each other: white by all techniques, up to the tables of what they send around.
 #[test]
 fn rough_glass_is_white() {
-    for alpha in [0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0] {
+    for alpha in [0.05, 0.3, 1.0] {
         for scattering in [0.0, 2.0] {
             let scene = rough_ball(alpha, scattering);
             for techniques in TECHNIQUES {
@@ -203,6 +205,7 @@ fn rough_glass_is_white() {
                 println!("{case}: {:.5} ± {:.5}", found.mean, found.error);
                 let slack = TABLES + if techniques == "all" { BOUNDARY_LOSS } else { 0.0 };
                 assert!((found.mean - 1.0).abs() < 4.0 * found.error + slack, "{case}: {found:?}");
+                assert!(found.error < 0.015, "{case}: too noisy to tell");
             }
         }
     }

@@ -6,15 +6,16 @@ use upbp_core::Settings;
 use upbp_scene::ReadyScene;
 use upbp_testing::reference::{Comparison, Reference, Spread};
 use upbp_testing::shipped::Shipped;
+use upbp_testing::short_renderer;
 
 /// Iterations of each render: enough for the spread to be known.
-const ITERATIONS: u64 = 40;
+const ITERATIONS: u64 = 28;
 
 /// Standard errors that the mean of an image may be off. Of 30 renders with independent errors one is beyond
 /// with a probability of 0.1 %.
 const MEAN: f64 = 4.0;
 
-/// Standard errors that one of some 100 tiles of 3 channels may be off in 30 renders. The spread of 40
+/// Standard errors that one of some 100 tiles of 3 channels may be off in 30 renders. The spread of 28
 /// iterations with a skew distribution has heavier tails than a normal one.
 const TILE: f64 = 6.0;
 
@@ -24,13 +25,9 @@ fn check(scene_name: &str) {
     let reference = Reference::read(&shipped.reference()).expect("an image with standard errors");
     let mut failures = Vec::new();
     for techniques in ["bpt", "bpt+surf+pp3d+pb2d+bb1d", "auto"] {
-        let settings = Settings {
-            techniques: techniques.parse().expect("technique names"),
-            deterministic: true,
-            ..Settings::default()
-        };
-        let settings = settings.validate().expect("valid settings");
-        let mut renderer = scene.renderer(settings).expect("a scene that can be rendered");
+        let techniques_named = techniques.parse().expect("technique names");
+        let settings = Settings { techniques: techniques_named, ..Settings::default() };
+        let mut renderer = short_renderer(&scene, settings, ITERATIONS);
         let mut spread = Spread::default();
         for _ in 0..ITERATIONS {
             assert!(renderer.iterate());

@@ -32,7 +32,7 @@ fn facets(fall: f64, elevation: f64, seen: f64) -> ReadyScene {
 
 /// Compares what next events and surface merges with a radius see with a radiance.
 fn check(scene: &ReadyScene, radius: f64, expected: f64) {
-    let mut table = Table::default();
+    let mut table = Table::new(0.01);
     for (techniques, iterations) in [("nee", 2), ("surf", 60)] {
         let settings = Settings {
             light_paths: LightPaths::Count(50_000),

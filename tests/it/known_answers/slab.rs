@@ -41,10 +41,11 @@ fn check(table: &mut Table, name: &str, scene: &upbp_scene::ReadyScene, expected
     }
 }
 
+/// One case in five: the stress grid has more slabs (`cargo run --release --example stress`).
 #[test]
 fn slabs() {
-    let mut table = Table::default();
-    for case in cases("slab_RT") {
+    let mut table = Table::new(0.15);
+    for case in cases("slab_RT").into_iter().step_by(5) {
         let expected = |at: &str| [case.expected(&[at, "R_total"]), case.expected(&[at, "T_total"])];
         for mu0 in case.inputs("mu0") {
             let camera = [0.5 * GAP * (1.0 - mu0 * mu0).sqrt() / mu0, 0.0, 0.5 * GAP];
@@ -76,7 +77,7 @@ fn slabs() {
 
 #[test]
 fn slabs_with_refracting_boundaries() {
-    let mut table = Table::default();
+    let mut table = Table::new(0.02);
     for case in cases("slab_RT_dielectric") {
         let material = format!("Dielectric(ior: {:?})", case.input("ior_inside"));
         let camera = narrow_camera([0.0, 0.0, 0.5 * GAP], [0.0; 3], 64);

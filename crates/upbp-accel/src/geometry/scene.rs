@@ -16,7 +16,7 @@ use super::primitive::{Name, Packing, Primitives, Probe};
 use super::shape::Shape;
 use super::sphere::Sphere;
 use crate::ray::Ray;
-use crate::simd::{Instructions, Task, Wide, run_or};
+use crate::simd::{Instructions, Plain, Task, Wide, best, run_or};
 
 /// The shapes of a scene, ready for rays.
 #[derive(Clone, Debug)]
@@ -117,7 +117,7 @@ impl SceneGeometry {
     }
 
     /// Whether `accept` takes any intersection in `(t_min, t_max)`; it is asked until it does, in no
-    /// particular but always the same order.
+    /// particular order, which is always the same for processors with the same instructions.
     ///
     /// Cheaper than [`for_each_hit`](Self::for_each_hit) where the nearest intersection is of no interest.
     pub fn any_where(&self, ray: Ray, mut accept: impl FnMut(&Candidate) -> bool) -> bool {
@@ -134,23 +134,29 @@ impl SceneGeometry {
     fn search<const IN_ORDER: bool>(&self, ray: Ray, mut visit: impl FnMut(&Candidate) -> Visit) {
         if self.instances.is_empty() {
             run_or(Search::<_, IN_ORDER> { scene: self, ray, visit }, |mut search| {
-                self.search_with(Instructions::Plain, IN_ORDER, ray, &mut search.visit);
+                self.search_plainly(ray, &mut search.visit);
             });
         } else {
-            self.search_with(Instructions::Best, IN_ORDER, ray, &mut visit);
+            self.search_with_copies(IN_ORDER, ray, &mut visit);
         }
     }
 
-    /// As [`search`](Self::search), with these instructions; compiled once instead of once per caller.
-    fn search_with(&self, instructions: Instructions, in_order: bool, ray: Ray, visit: OnHit) {
-        if in_order {
-            self.search_with_copies::<true>(instructions, ray, visit);
-        } else {
-            self.search_with_copies::<false>(instructions, ray, visit);
+    /// As [`search`](Self::search), compiled once instead of once per caller.
+    fn search_with_copies(&self, in_order: bool, ray: Ray, visit: OnHit) {
+        match best() {
+            Some(best) if in_order => self.search_by::<true>(best, ray, visit),
+            Some(best) => self.search_by::<false>(best, ray, visit),
+            None => self.search_plainly(ray, visit),
         }
     }
 
-    fn search_with_copies<const IN_ORDER: bool>(&self, instructions: Instructions, ray: Ray, visit: OnHit) {
+    /// As [`search`](Self::search), with instructions that all processors have. Few need them: they are
+    /// compiled for one order alone.
+    fn search_plainly(&self, ray: Ray, visit: OnHit) {
+        self.search_by::<true>(Plain, ray, visit);
+    }
+
+    fn search_by<const IN_ORDER: bool>(&self, instructions: impl Instructions, ray: Ray, visit: OnHit) {
         let (mut rest, mut is_done) = (ray, false);
         let visit_first: OnHit = &mut |candidate| {
             let answer = visit(candidate);

@@ -104,7 +104,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Notes a mesh file far from its origin many of whose triangles have no area: rounding may have taken it.
+    /// Notes a mesh file far from its origin many of whose triangles have no area: rounding may have taken
+    /// it.
     /// Nearer to it triangles without area are those at poles.
     pub(super) fn note_dropped_triangles(&mut self, item: &str, mesh: &TriangleMesh) {
         /// Largest coordinate over the extent of a mesh that is far away.

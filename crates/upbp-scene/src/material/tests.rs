@@ -11,6 +11,14 @@ const INTERFACES: [Interface; 4] = [
     Interface { above: 1.5, below: 1.5004 },
 ];
 
+/// The interfaces that make a difference to a material.
+fn interfaces(material: &Material) -> &'static [Interface] {
+    match material {
+        Material::Lambert(_) | Material::Phong(_) | Material::Mirror(_) => &INTERFACES[..1],
+        _ => &INTERFACES,
+    }
+}
+
 /// The complex index of gold.
 const GOLD: [Spectrum; 2] = [Spectrum::new(0.143, 0.375, 1.442), Spectrum::new(3.983, 2.386, 1.603)];
 
@@ -63,11 +71,10 @@ fn directions() -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// Mean weight of samples: the share of the light that is scattered.
-fn albedo(material: &Material, from: Vec3, walk: Walk, interface: Interface) -> Spectrum {
-    let count = 40_000;
+/// Mean weight of `count` samples of light: the share that is scattered.
+fn albedo(material: &Material, from: Vec3, interface: Interface, count: u32) -> Spectrum {
     points(count)
-        .filter_map(|(u_lobe, u)| material.sample(from, walk, interface, u_lobe, u))
+        .filter_map(|(u_lobe, u)| material.sample(from, Walk::Light, interface, u_lobe, u))
         .map(|sample| sample.weight)
         .sum::<Spectrum>()
         / count as f32
@@ -76,7 +83,7 @@ fn albedo(material: &Material, from: Vec3, walk: Walk, interface: Interface) -> 
 #[test]
 fn all_satisfy_the_contract() {
     for (name, material) in materials() {
-        for interface in INTERFACES {
+        for &interface in interfaces(&material) {
             check_bsdf(&material, interface)
                 .unwrap_or_else(|violation| panic!("{name} {interface:?}: {violation}"));
         }
@@ -86,9 +93,11 @@ fn all_satisfy_the_contract() {
 #[test]
 fn none_creates_energy() {
     for (name, material) in materials() {
-        for (from, interface) in directions().flat_map(|from| INTERFACES.map(|interface| (from, interface))) {
-            let albedo = albedo(&material, from, Walk::Light, interface);
-            assert!(albedo.max_component() < 1.003, "{name} {from} {interface:?}: {albedo:?}");
+        for &interface in interfaces(&material) {
+            for from in directions() {
+                let albedo = albedo(&material, from, interface, 10_000);
+                assert!(albedo.max_component() < 1.003, "{name} {from} {interface:?}: {albedo:?}");
+            }
         }
     }
 }
@@ -96,7 +105,7 @@ fn none_creates_energy() {
 #[test]
 fn smooth_glass_loses_none_either() {
     for (from, interface) in directions().flat_map(|from| INTERFACES.map(|interface| (from, interface))) {
-        let albedo = albedo(&Material::Dielectric(Dielectric), from, Walk::Light, interface);
+        let albedo = albedo(&Material::Dielectric(Dielectric), from, interface, 5000);
         assert!((albedo.r() - 1.0).abs() < 1e-6, "{from} {interface:?}: {albedo:?}");
     }
 }
@@ -108,7 +117,7 @@ fn rough_glass_loses_nothing() {
         let glass = Material::RoughDielectric(RoughDielectric { normals: TrowbridgeReitz { alpha } });
         for (above, below) in [(1.0, 1.5), (1.33, 1.0), (1.5, 1.33), (1.0, 1.05), (2.4, 1.0), (9.0, 0.2)] {
             for from in directions() {
-                let albedo = albedo(&glass, from, Walk::Light, Interface { above, below }).r();
+                let albedo = albedo(&glass, from, Interface { above, below }, 5000).r();
                 let allowed = if from.z.abs() < 0.1 { 0.04 } else { 0.012 };
                 assert!((albedo - 1.0).abs() < allowed, "{alpha}, {above} : {below}, {from}: {albedo}");
             }

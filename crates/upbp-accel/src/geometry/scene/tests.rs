@@ -10,7 +10,6 @@ use rand_xoshiro::rand_core::SeedableRng as _;
 use super::super::{Quad, TriangleMesh};
 use super::*;
 use crate::geometry::triangle::RayShear;
-use crate::simd::Instructions;
 
 struct Random(Xoshiro256PlusPlus);
 
@@ -153,7 +152,7 @@ fn check(shapes: usize, rays: usize, scale: f32, offset: Vec3, random: &mut Rand
             Visit::Continue
         };
         scene.for_each_hit(ray, &mut collect);
-        scene.search_with(Instructions::Plain, true, ray, &mut |candidate| {
+        scene.search_plainly(ray, &mut |candidate| {
             plain.push(*candidate);
             Visit::Continue
         });

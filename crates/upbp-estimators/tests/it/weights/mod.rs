@@ -134,14 +134,14 @@ impl Reached {
 /// `e^{±16}` must be short to stay within double precision.
 const RANGES: [(usize, f64); 5] = [(20, 3.0), (20, 5.0), (9, 8.0), (6, 12.0), (4, 16.0)];
 
-/// Compares by 3000 paths of each range and heuristic, with all modes.
+/// Compares by 1000 paths of each range and heuristic, with all modes.
 fn for_all_ranges(name: &str, mut compare: impl FnMut(&mut Reached, &MisPlan, &Path)) {
     for (longest, spread) in RANGES {
         let mut runner = TestRunner::deterministic();
         let strategy = (path(longest, spread), plan());
         for heuristic in [Heuristic::Balance, Heuristic::Power] {
             let mut reached = Reached::default();
-            for case in 0..3000 {
+            for case in 0..1000 {
                 let (path, plan) = strategy.new_tree(&mut runner).unwrap().current();
                 let (_, photon_beams, query_beams) = modes().nth(case % 4).unwrap();
                 compare(&mut reached, &MisPlan { heuristic, photon_beams, query_beams, ..plan }, &path);
@@ -177,14 +177,14 @@ fn the_recursion_by_technique_tells_the_part_of_each() {
     });
 }
 
-/// Compares by 2000 paths in lanes of each range.
+/// Compares by 700 paths in lanes of each range.
 fn for_all_ranges_in_lanes(name: &str, mut compare: impl FnMut(&mut Reached, &MisPlan, &Path<[f64; 3]>)) {
     for (longest, spread) in [(1, 3.0), (3, 3.0), (9, 2.0), (20, 3.0), (9, 8.0), (4, 12.0)] {
         let mut runner = TestRunner::deterministic();
         let paths = path(longest, spread).prop_flat_map(move |path| in_lanes(path, spread));
         let strategy = (paths, plan(), lane_probabilities());
         let mut reached = Reached::default();
-        for case in 0..2000 {
+        for case in 0..700 {
             let (path, plan, lanes) = strategy.new_tree(&mut runner).unwrap().current();
             let (_, photon_beams, query_beams) = modes().nth(case % 4).unwrap();
             compare(&mut reached, &MisPlan { photon_beams, query_beams, lanes, ..plan }, &path);
