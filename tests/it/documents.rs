@@ -1,5 +1,5 @@
 //! The documents: links lead somewhere; sections, tests and names that they cite exist; the scene and the
-//! host of the README work, and so do the files of settings.
+//! host of the README work, and so do the files of settings; pages name every field of settings and reports.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -230,6 +230,25 @@ fn the_page_of_settings_names_every_field() {
     }
     for technique in default["radii"].as_object().unwrap().keys() {
         assert!(page.contains(&format!("{technique}: R")), "{technique}");
+    }
+}
+
+#[test]
+fn the_page_of_reports_names_every_field() {
+    let page = fs::read_to_string(root().join("docs/report.md")).unwrap();
+    let scene = "(version: 1, film: (width: 2, height: 2), materials: {\"grey\": Lambert(0.5)},
+        camera: Perspective(origin: (0, 0, 3), target: (0, 0, 0), fov_degrees: 40), lights: [Constant(1)],
+        shapes: [(geometry: Sphere(centre: (0, 0, 0), radius: 1), material: \"grey\")])";
+    let scene = ReadyScene::from_ron_str(scene, root()).unwrap();
+    let renderer = scene.renderer(Settings::default().validate().unwrap()).unwrap();
+    let report = serde_json::to_value(renderer.report()).unwrap();
+    let names = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    let fields = [&report, &report["support"], &report["seconds"], &report["counters"]];
+    for name in fields.into_iter().flat_map(names) {
+        assert!(
+            page.contains(&format!("`{name}`")) || page.contains(&format!("`counters.{name}`")),
+            "{name}"
+        );
     }
 }
 
