@@ -43,7 +43,7 @@ fn all_subsets_agree() {
         let (estimate, _) = render_room(&room, &settings(techniques), 40);
         let sigmas = estimate.sigmas(&reference);
         let error = estimate.error.hypot(reference.error);
-        assert!(error < 0.01 * reference.mean, "{techniques}: too noisy to tell, {estimate:?}");
+        assert!(error < 0.02 * reference.mean, "{techniques}: too noisy to tell, {estimate:?}");
         println!("{techniques:12} {:.5} ± {:.5}  {sigmas:+.2} sigma", estimate.mean, estimate.error);
         worst = worst.max(sigmas.abs());
     }
@@ -64,7 +64,7 @@ fn the_ready_made_scene_looks_the_same() {
         );
         assert!(sigmas.abs() < 4.0, "{techniques}: {theirs:?} against {ours:?}");
         let error = theirs.error.hypot(ours.error);
-        assert!(error < 0.01 * ours.mean, "{techniques}: too noisy to tell, {theirs:?} against {ours:?}");
+        assert!(error < 0.02 * ours.mean, "{techniques}: too noisy to tell, {theirs:?} against {ours:?}");
         // Two independent images with a relMSE of about 3e-3 each: a shifted or mirrored one is far beyond.
         assert!(difference < 2e-2, "{techniques}: {difference}");
     }

@@ -214,12 +214,8 @@ fn preparations_take_what_is_allowed() {
     fn prepare(scene: &ReadyScene, techniques: &str, longest: u32) {
         let before = status("VmRSS");
         let techniques = techniques.parse().expect("technique names");
-        let settings = Settings {
-            techniques,
-            memory: Some(std::env::var("XMEM").map_or(MEMORY, |m| m.parse().unwrap())),
-            max_length: longest,
-            ..Settings::default()
-        };
+        let settings =
+            Settings { techniques, memory: Some(MEMORY), max_length: longest, ..Settings::default() };
         let renderer = scene.renderer(settings.validate().expect("valid settings")).expect("a renderer");
         let taken = (status("VmHWM") - before) / MIB;
         println!("{taken:.1} MiB");
@@ -239,10 +235,9 @@ fn preparations_take_what_is_allowed() {
         // Beams alone are stored, no vertices.
         Some("beams") => prepare_text(FOG, "hit+nee+bb1d", 1024),
         // Long walks: with all of their queries the preparation takes a hundred MiB.
-        Some("fogall") => prepare_text(FOG, "all", 4096),
         Some(_) => prepare_text(FOG, "auto", 4096),
         None => {
-            // Each has one thread, and reads its own numbers.
+            // At the same time: each has one thread, and reads its own numbers.
             std::thread::scope(|scope| {
                 for case in ["clusters", "milk", "fog", "beams"] {
                     let test = "runs::memory::preparations_take_what_is_allowed";
