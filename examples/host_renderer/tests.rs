@@ -43,7 +43,9 @@ fn all_subsets_agree() {
         let (estimate, _) = render_room(&room, &settings(techniques), 40);
         let sigmas = estimate.sigmas(&reference);
         let error = estimate.error.hypot(reference.error);
-        assert!(error < 0.02 * reference.mean, "{techniques}: too noisy to tell, {estimate:?}");
+        // Few walks meet the lamp by chance.
+        let noise = if techniques == "hit" { 0.06 } else { 0.02 };
+        assert!(error < noise * reference.mean, "{techniques}: too noisy to tell, {estimate:?}");
         println!("{techniques:12} {:.5} ± {:.5}  {sigmas:+.2} sigma", estimate.mean, estimate.error);
         worst = worst.max(sigmas.abs());
     }

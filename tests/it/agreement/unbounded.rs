@@ -166,7 +166,7 @@ fn beams_of_light_that_arrives_in_part_lose_none() {
     let [without, within] = ["", RED_PASSES].map(|outside| sky(outside, sun, ball));
     // The power heuristic has no lanes.
     for (techniques, heuristic, iterations) in
-        [("bp2d", Heuristic::Balance, 300), ("bb1d", Heuristic::Power, 100)]
+        [("bp2d", Heuristic::Balance, 300), ("bb1d", Heuristic::Power, 200)]
     {
         let settings = Settings {
             photon_beams: BeamExtent::Long,

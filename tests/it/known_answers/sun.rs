@@ -28,7 +28,7 @@ fn a_wall_in_the_sun_is_as_bright_as_by_parallel_light() {
                   film: (width: 8, height: 8),";
     let wall = square("Lambert(0.5)", camera);
     let expected = 0.5 / PI * IRRADIANCE * 0.8;
-    let mut table = Table::new(0.005);
+    let mut table = Table::new(0.02);
     for techniques in ["hit", "nee", "lt", "surf", "bpt+surf"] {
         let settings = Settings { light_paths: LightPaths::Count(10_000), ..settings(techniques, Some(0.1)) };
         let (result, _) = render(&wall, &settings, 100);

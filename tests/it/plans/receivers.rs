@@ -117,8 +117,8 @@ fn a_choice_by_receiver_is_part_of_the_plan() {
 fn subsets_of_techniques_agree_where_receivers_choose() {
     let scene = cells(3);
     let set = |names: &str| Techniques::Set(names.parse().expect("names"));
-    let expected = picture(&scene, set("hit+lt"), 32);
+    let expected = picture(&scene, set("hit+lt"), 64);
     for names in ["pt", "bpt", "hit+nee+surf"] {
-        assert_same(picture(&scene, set(names), 32), expected, 0.01, names);
+        assert_same(picture(&scene, set(names), 64), expected, 0.01, names);
     }
 }
