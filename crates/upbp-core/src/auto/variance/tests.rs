@@ -355,7 +355,7 @@ fn a_plan_that_cannot_find_what_was_seen_is_out_of_the_question() {
 
 /// Variances by light tracing with some numbers of light sub-paths, from a splat in each cell. Of `rare` ones
 /// one of ten is light tracing's own, the others are of techniques that the plan does not have.
-fn by_splats(rare: u32) -> impl Fn(u32) -> f64 {
+fn by_splats(rare: u32, together: bool) -> impl Fn(u32) -> f64 {
     let mut pilot = PilotRender { samples: Vec::new(), ends: vec![0; 2 * (SIDE * SIDE) as usize], ..pilot() };
     let splat = |cell| {
         let own = if cell < rare { 0.1 } else { 1.0 };
@@ -364,7 +364,7 @@ fn by_splats(rare: u32) -> impl Fn(u32) -> f64 {
         weights[Technique::Bb1d as usize] = 1.0 - own;
         Sample {
             technique: Technique::LightTracing,
-            light_path: None,
+            light_path: Some(if together && cell < rare { 0 } else { cell }),
             albedos: 1.0,
             value: Vec3::ONE,
             weights,
@@ -381,8 +381,14 @@ fn by_splats(rare: u32) -> impl Fn(u32) -> f64 {
 
 #[test]
 fn rare_samples_are_charged_more_unless_the_plan_would_have_met_some() {
-    for (rare, met_by_16, met_by_4) in [(8, 1.0, 1.0), (400, 40.0, 10.0), (SIDE * SIDE, 1638.4, 409.6)] {
-        let of = by_splats(rare);
+    for (rare, together, met_by_16, met_by_4) in [
+        (8, false, 1.0, 1.0),
+        (400, false, 40.0, 10.0),
+        (SIDE * SIDE, false, 1638.4, 409.6),
+        // Of one light sub-path they are one sample.
+        (400, true, 1.0, 1.0),
+    ] {
+        let of = by_splats(rare, together);
         assert!((of(64) / of(16) - 0.25).abs() < 1e-2, "{rare}: {} {}", of(64), of(16));
         let sum = |relative: f64, met: f64| {
             let rarity = 10.0 / relative;
