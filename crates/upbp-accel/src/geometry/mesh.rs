@@ -355,20 +355,22 @@ impl TriangleMesh {
     /// corners: planes that are meant to be one differ by roundings of these.
     #[must_use]
     pub fn rounded(&self, triangle: u32) -> Vec3 {
-        let [a, b, c] = self.surface.corners(triangle).map(Vec3::abs);
-        self.rounded_up_to(a.max(b).max(c))
+        let [a, b, c] = self.corners(triangle).map(Vec3::abs);
+        self.rounded_by_placing().max(a.max(b).max(c))
     }
 
     /// The most that [`rounded`](Self::rounded) is for any triangle.
     #[must_use]
     pub fn most_rounded(&self) -> Vec3 {
-        self.rounded_up_to(largest(self.surface.bounds()))
+        self.rounded_by_placing().max(largest(self.bounds))
     }
 
-    /// What is rounded for corners of coordinates up to some, before the mesh is placed.
-    fn rounded_up_to(&self, coordinates: Vec3) -> Vec3 {
-        let own = self.surface.rounded.max(coordinates);
-        self.placement.as_ref().map_or(own, |placement| placement.rounded(own))
+    /// What was rounded when the mesh was placed or transformed; zero if it was not.
+    fn rounded_by_placing(&self) -> Vec3 {
+        let before = self.surface.rounded;
+        self.placement
+            .as_ref()
+            .map_or(before, |placement| placement.rounded(before.max(largest(self.surface.bounds()))))
     }
 
     /// The point with weights `b` and `c` for the second and third corner.
