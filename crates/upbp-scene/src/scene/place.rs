@@ -125,6 +125,11 @@ impl ReadyScene {
             met.push((*candidate, is_first || anchor.coincides(&self.plane_of(ray, candidate), ray)));
             Visit::Continue
         });
+        // In an order that is not that of the traversal: of equal ranks the first counts.
+        met.sort_unstable_by(|(a, _), (b, _)| {
+            let key = |candidate: &Candidate| (candidate.shape.0, candidate.primitive);
+            a.t.total_cmp(&b.t).then_with(|| key(a).cmp(&key(b)))
+        });
         // What is behind something else belongs to another place.
         let beyond = met.iter().filter(|(candidate, coincides)| candidate.t > anchor.t && !coincides);
         let beyond = beyond.map(|(candidate, _)| candidate.t).fold(f32::INFINITY, f32::min);
