@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use upbp_estimators::mis::VolumeMerges;
-use upbp_estimators::{Kernel, Kernels, NO_LIMIT, RadiusField, Technique, TechniqueSet};
+use upbp_estimators::{Kernel, Kernels, NO_LIMIT, PerMerge, RadiusField, Technique, TechniqueSet};
 
 /// The largest radius of a kernel, scene units: single precision holds the values of all kernels.
 pub(crate) const LARGEST_RADIUS: f32 = 1e12;
@@ -52,15 +52,9 @@ impl Radii {
     }
 
     /// The first radius of a technique; [automatic](Radius::Auto) if it does not merge.
-    pub(crate) const fn of(&self, technique: Technique) -> Radius {
-        match technique {
-            Technique::Surf => self.surf,
-            Technique::Pp3d => self.pp3d,
-            Technique::Pb2d => self.pb2d,
-            Technique::Bp2d => self.bp2d,
-            Technique::Bb1d => self.bb1d,
-            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => Radius::Auto,
-        }
+    pub(crate) fn of(&self, technique: Technique) -> Radius {
+        let Self { surf, pp3d, pb2d, bp2d, bb1d } = *self;
+        PerMerge { surf, pp3d, pb2d, bp2d, bb1d }.get(technique).copied().unwrap_or(Radius::Auto)
     }
 
     /// Whether all that `techniques` use are [automatic](Radius::Auto).
@@ -104,15 +98,9 @@ pub struct RadiusSchedule {
 
 impl RadiusSchedule {
     /// The first radius of a technique, 0 if it does not merge.
-    pub(crate) const fn first(&self, technique: Technique) -> f32 {
-        match technique {
-            Technique::Surf => self.surf,
-            Technique::Pp3d => self.pp3d,
-            Technique::Pb2d => self.pb2d,
-            Technique::Bp2d => self.bp2d,
-            Technique::Bb1d => self.bb1d,
-            Technique::Hit | Technique::Nee | Technique::Connect | Technique::LightTracing => 0.0,
-        }
+    pub(crate) fn first(&self, technique: Technique) -> f32 {
+        let Self { surf, pp3d, pb2d, bp2d, bb1d, .. } = *self;
+        PerMerge { surf, pp3d, pb2d, bp2d, bb1d }.get(technique).copied().unwrap_or(0.0)
     }
 
     /// The radius of a technique in some iteration, or between two.

@@ -365,7 +365,7 @@ impl TriangleMesh {
         self.rounded_by_placing().max(largest(self.bounds))
     }
 
-    /// What was rounded when the mesh was placed or transformed; zero if it was not.
+    /// Numbers that were rounded when the mesh was placed or transformed; zero if it was not.
     fn rounded_by_placing(&self) -> Vec3 {
         let before = self.surface.rounded;
         self.placement

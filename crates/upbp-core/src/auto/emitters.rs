@@ -59,8 +59,8 @@ pub(super) const TIME_FOR_EMITTERS: f64 = 0.2;
 const QUICK_LOOK: f64 = 0.2;
 
 /// Lets the scene choose its emitters, and the starts of light sub-paths on them, by what they contribute
-/// under a plan with all techniques; returns the light that each brought from light sub-paths, in any
-/// unit. The scene has to be as it was prepared.
+/// under a plan with all techniques of `inputs`; returns the light that each brought from light sub-paths, in
+/// any unit. The scene has to be as it was prepared.
 ///
 /// # Errors
 /// [`RenderError::Cancelled`].
@@ -247,7 +247,7 @@ fn measure<S: Scene, L: Lanes>(
     let (full, plan) = (plan, &plan.blurred(light_paths, beam_paths));
     // In an iteration kernels are narrower, and contributions rarer and brighter by that; there are more
     // light sub-paths, of which connections alone do not make more. So squares count this many times.
-    let growth_of_squares = |technique| {
+    let growth_of_squares = |technique: Technique| {
         let blur = match [plan, full].map(|plan| plan.kernels.get(technique)) {
             [Some(wide), Some(narrow)] if narrow.effective_volume() > 0.0 => {
                 wide.effective_volume() / narrow.effective_volume()
@@ -256,7 +256,7 @@ fn measure<S: Scene, L: Lanes>(
         };
         let [few, many] = [plan, full].map(|plan| match technique {
             Technique::Connect => 1.0,
-            Technique::Bp2d | Technique::Bb1d => f64::from(plan.beam_paths.max(1)),
+            _ if technique.uses_beams() => f64::from(plan.beam_paths.max(1)),
             _ => f64::from(plan.light_paths.max(1)),
         });
         blur * few / many

@@ -36,7 +36,7 @@ const fn photons(technique: Technique) -> f64 {
     if matches!(technique, Technique::Bb1d) { 15.0 } else { 8.0 }
 }
 
-/// What is decided before light sub-paths are counted.
+/// Choices that are made before light sub-paths are counted.
 #[derive(Clone, Copy)]
 pub(super) struct Inputs<'a> {
     pub(super) settings: &'a CheckedSettings,

@@ -1,4 +1,4 @@
-//! What a camera sub-path sees first: features, and the light that it meets before anything scatters.
+//! Features of the first vertex of a camera sub-path that scatters, and the light that it meets before.
 
 use glam::Vec3;
 use upbp_media::Spectrum;

@@ -20,7 +20,7 @@ pub(super) struct Builder<'a> {
     pub(super) base_dir: &'a Path,
     pub(super) problems: Problems,
     pub(super) notes: Problems,
-    /// What was noted and is not to be noted again.
+    /// Notes that are not to be made again, by item and message.
     pub(super) noted: BTreeSet<(String, String)>,
     /// Fingerprint of the description and of the files that were read.
     pub(super) hash: Fnv1a,

@@ -105,8 +105,7 @@ impl Builder<'_> {
     }
 
     /// Notes a mesh file far from its origin many of whose triangles have no area: rounding may have taken
-    /// it.
-    /// Nearer to it triangles without area are those at poles.
+    /// it. Near the origin triangles without area are those at the poles of turned meshes.
     pub(super) fn note_dropped_triangles(&mut self, item: &str, mesh: &TriangleMesh) {
         /// Largest coordinate over the extent of a mesh that is far away.
         const FAR: f32 = 10.0;

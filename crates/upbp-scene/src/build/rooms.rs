@@ -48,7 +48,7 @@ impl Places<'_> {
     }
 }
 
-/// What a lamp around the camera does, and what may have been meant.
+/// The end of a message about a lamp around the camera: light that may have been meant instead.
 const OUTWARDS: &str =
     "shines outwards only: light from all around is a `Constant`, or a mesh whose normals point inwards";
 

@@ -11,7 +11,7 @@ pub(super) const MAX_CORNERS: usize = 1 << 12;
 /// The work of dividing all such polygons of a file, which is the square of the number of corners for each.
 const MAX_WORK: u64 = 1 << 32;
 
-/// What is left of the work that polygons of a file may take.
+/// The rest of the work that polygons of a file may take.
 #[derive(Clone, Debug)]
 pub(super) struct Budget(u64);
 

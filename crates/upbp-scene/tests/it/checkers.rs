@@ -275,7 +275,7 @@ fn draws_that_do_not_follow_their_densities_are_found() {
     assert_eq!(guided, 1, "the sky");
 }
 
-/// What is chosen for a receiver on the dark side is never compared with what is emitted.
+/// Receivers on the dark side alone: light that is chosen is never compared with light that is emitted.
 #[test]
 fn a_light_that_reaches_no_receiver_is_not_checked() {
     let bounds = BoundingSphere { centre: Vec3::ZERO, radius: 2.0 };

@@ -244,8 +244,8 @@ impl PilotRender {
 
     /// As many photons or beams within a query's kernel, relative to the first iteration of the plan of this
     /// render, as make the variance of another plan's iterations together.
-    pub(super) fn telling_photons(&self, technique: Technique, plan: &Plan) -> f64 {
-        self.photons(technique, plan) * self.mean_photons(technique)
+    pub(super) fn relative_photons(&self, technique: Technique, plan: &Plan) -> f64 {
+        self.photons(technique, plan) * self.harmonic_mean_photons(technique)
     }
 
     /// Photons or beams within a query's kernel in the first iteration of another plan, relative to that of
@@ -261,7 +261,7 @@ impl PilotRender {
 
     /// As many photons or beams within a query's kernel, relative to the first iteration, as make the
     /// variance of all iterations together.
-    pub(super) fn mean_photons(&self, technique: Technique) -> f64 {
+    pub(super) fn harmonic_mean_photons(&self, technique: Technique) -> f64 {
         self.plan.radii.harmonic_mean_photons(technique, self.iterations)
     }
 

@@ -19,7 +19,7 @@ use super::pilot_render::recorder::Sample;
 use super::pilot_render::{PilotRender, PixelPair};
 use crate::plan::Plan;
 use limits::{limiting_factors, relative_to, surroundings};
-use sample_pairs::{Excess, ReadySamples, Reweighted, density_of_pilot, mean_photons};
+use sample_pairs::{Excess, ReadySamples, Reweighted, density_of_pilot, harmonic_mean_photons};
 
 /// The least variance, relative to the second moments of single samples.
 const LEAST_PART: f64 = 0.05;
@@ -72,7 +72,7 @@ impl Counts {
             counts.relative[technique as usize] = if technique.is_per_camera_vertex() {
                 1.0
             } else {
-                active * pilot.telling_photons(technique, plan)
+                active * pilot.relative_photons(technique, plan)
             };
         }
         counts
@@ -174,13 +174,13 @@ impl Variance {
             groups[group(cell)].add(&self.of_cell(cell, &mut reweighted, &mut charges));
         }
         let mut variance = variances(&groups, counts.light_paths).map(|sum| sum / pilot.cells as f64);
-        let mean_photons = mean_photons(pilot);
+        let photons = harmonic_mean_photons(pilot);
         for of_path in pilot.splats.chunk_by(|(_, a), (_, b)| a.light_path == b.light_path) {
             let mut excess = Excess::default();
             for (cell, splat) in of_path {
                 let densities = reweighted.densities(&splat.weights);
                 let square = pilot.second_moment(splat) as f32;
-                let of_pilot = density_of_pilot(&splat.weights, &mean_photons);
+                let of_pilot = density_of_pilot(&splat.weights, &photons);
                 variance[group(*cell as usize)] += pilot.per_splat() * f64::from(densities.single(square));
                 densities.excess(square, of_pilot).inspect(|more| excess.add(more));
             }

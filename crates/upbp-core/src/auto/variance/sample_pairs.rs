@@ -41,7 +41,7 @@ impl ReadySamples {
     /// Takes the samples of a pilot render.
     pub(super) fn new(pilot: &PilotRender) -> Self {
         let mut ready = Self { samples: Vec::with_capacity(pilot.samples.len()), ends: Vec::new() };
-        let mean_photons = mean_photons(pilot);
+        let mean_photons = harmonic_mean_photons(pilot);
         let of_one_path = |a: &Sample, b: &Sample| a.light_path.is_some() && a.light_path == b.light_path;
         for path in 0..pilot.cells * pilot.passes {
             let start = ready.samples.len();
@@ -296,13 +296,13 @@ impl Excess {
     }
 }
 
-/// Photons of each technique in a query of the pilot render's plan, mean over iterations, relative to the
-/// first iteration.
-pub(super) fn mean_photons(pilot: &PilotRender) -> PerTechnique<f32> {
-    Technique::ALL.map(|technique| pilot.mean_photons(technique) as f32)
+/// Photons of each technique in a query of the pilot render's plan, harmonic mean over iterations, relative
+/// to the first iteration.
+pub(super) fn harmonic_mean_photons(pilot: &PilotRender) -> PerTechnique<f32> {
+    Technique::ALL.map(|technique| pilot.harmonic_mean_photons(technique) as f32)
 }
 
-/// Density of a path with the pilot render's plan, mean over iterations, relative to the first iteration.
+/// Density of a path with the pilot render's plan, by such means over iterations.
 pub(super) fn density_of_pilot(weights: &PerTechnique<f32>, mean_photons: &PerTechnique<f32>) -> f32 {
     weights.iter().zip(mean_photons).map(|(weight, photons)| weight * photons).sum()
 }
