@@ -30,7 +30,7 @@ pub enum Extent {
 /// A stretch of an edge inside one medium.
 #[derive(Clone, Copy, Debug)]
 pub struct MediumSpan<L = f64> {
-    /// Distance along the ray where it begins, scene units.
+    /// Distance along the ray where it begins, scene units; −∞ for light that has come from infinity.
     pub start: f32,
     /// Distance along the ray where it ends; may be infinite.
     pub end: f32,
@@ -56,8 +56,8 @@ impl<L> MediumSpan<L> {
 pub struct EdgeTrace<B, L: Lanes = f64> {
     /// The ray; the edge begins at its lower end.
     pub ray: Ray,
-    /// Stretches in order, adjoining, from 0 to the surface. With [`Extent::ToStop`] the one in which the
-    /// walk stops is the last, and its end means nothing.
+    /// Stretches in order, adjoining, from the ray's lower end to the surface or to infinity. With
+    /// [`Extent::ToStop`] the one in which the walk stops is the last, and its end means nothing.
     pub spans: Vec<MediumSpan<L>>,
     /// Stop of the walk in a medium: index of the stretch and distance along the ray.
     pub stop: Option<(usize, f32)>,
@@ -119,8 +119,8 @@ struct FreeFlight<'a, L: Lanes> {
     /// Distance where the walk stops if the current medium goes on; infinite if it never does, or if that is
     /// not known yet, where the ray is followed to the surface anyway.
     stop: f32,
-    /// The largest coordinate of the ray's origin.
-    origin: f32,
+    /// The largest coordinate of the ray's origin, without its sign.
+    largest_coordinate: f32,
 }
 
 impl<L: Lanes> FreeFlight<'_, L> {
@@ -132,7 +132,7 @@ impl<L: Lanes> FreeFlight<'_, L> {
 
     /// Distance that a stop at distance `t` keeps from boundaries.
     fn inset(&self, t: f32) -> f32 {
-        ROUNDINGS * f32::EPSILON * (self.origin + t)
+        ROUNDINGS * f32::EPSILON * (self.largest_coordinate + t)
     }
 
     /// The stop at distance `t`, moved away from the boundaries next to it; at distance 0 there is none.
@@ -224,7 +224,7 @@ impl<B: Copy, L: Lanes> EdgeTrace<B, L> {
             stream: &mut state.stream,
             decision: None,
             stop: f32::INFINITY,
-            origin: self.ray.origin.abs().max_element(),
+            largest_coordinate: self.ray.origin.abs().max_element(),
         };
         let medium = medium_of(scene, &self.start);
         let start = self.ray.t_min;
