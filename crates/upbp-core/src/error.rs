@@ -71,7 +71,7 @@ pub enum RenderError {
         /// MiB that are allowed.
         limit: MemoryLimit,
     },
-    /// A plan whose choice of emitters is for another scene.
+    /// A plan whose choice of emitters does not go with the scene.
     #[error("plan: {0}")]
     PlanEmitters(EmitterChoiceError),
     /// A value of a plan is out of its range.

@@ -38,6 +38,35 @@ impl EmitterChoice {
         self.guides.get(emitter.0 as usize)?.as_ref()
     }
 
+    /// Checks that a scene can choose so, whose emitters have some `power` and are in some `clusters`, if it
+    /// has a tree over them; `axes` are the numbers of a start that a guide of an emitter may split.
+    pub(crate) fn check(
+        &self,
+        power: &Selection,
+        clusters: Option<usize>,
+        bounds: &BoundingSphere,
+        axes: impl Fn(EmitterId) -> [bool; 4],
+    ) -> Result<(), EmitterChoiceError> {
+        let emitters = power.len();
+        if ![&self.emission, &self.next_event].iter().all(|selection| selection.fits(power)) {
+            return Err(EmitterChoiceError::Emitters { emitters });
+        }
+        let can_follow = |(emitter, guide): (u32, &Option<EmissionGuide>)| {
+            guide.as_ref().is_none_or(|guide| guide.is_valid(axes(EmitterId(emitter))))
+        };
+        if self.guides.len() > emitters || !(0..).zip(&self.guides).all(can_follow) {
+            return Err(EmitterChoiceError::Guides);
+        }
+        if self.focus.is_some() && !self.emission_bounds(bounds).has_density_on_disc() {
+            return Err(EmitterChoiceError::Focus);
+        }
+        let fits = |receivers: &ReceiverShares| clusters.is_some_and(|clusters| receivers.fits(clusters));
+        if self.receivers.as_ref().is_some_and(|receivers| !fits(receivers)) {
+            return Err(EmitterChoiceError::Receivers);
+        }
+        Ok(())
+    }
+
     /// The sphere that light from infinity has to start in front of: around the focus, and about all of
     /// `bounds`. So starts that lead to the focus have one place on the disc, whatever their direction.
     pub(crate) fn emission_bounds(&self, bounds: &BoundingSphere) -> BoundingSphere {
@@ -100,6 +129,27 @@ impl EmitterChoice {
 /// Part of the next events that choose an emitter without regard to the receiver: no contribution has more
 /// than the inverse of it times the weight that it would have without.
 const EVERYWHERE: f64 = 1.0 / 16.0;
+
+/// The choice of emitters of a plan that does not go with the scene.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EmitterChoiceError {
+    /// A choice among other emitters, or one that leaves out an emitter that shines.
+    #[error("expected a choice among the {emitters} emitters of this scene that leaves out none that shines")]
+    Emitters {
+        /// The number of emitters of the scene.
+        emitters: usize,
+    },
+    /// A guide without an emitter, or one that its emitter cannot follow.
+    #[error("expected guides that the emitters of this scene can follow")]
+    Guides,
+    /// A focus that light from infinity cannot start around.
+    #[error("expected a focus that is not so far away that light from infinity has no density around it")]
+    Focus,
+    /// Receivers that choose among other clusters of emitters.
+    #[error("expected receivers that choose among the clusters of emitters of this scene")]
+    Receivers,
+}
 
 #[cfg(test)]
 mod tests;

@@ -163,6 +163,11 @@ impl Selection {
         Self::new(&rest)
     }
 
+    /// The number of emitters, with those that are never chosen.
+    pub(crate) const fn len(&self) -> usize {
+        self.cumulative.len()
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.cumulative.last().is_none_or(|&end| end == 0)
     }

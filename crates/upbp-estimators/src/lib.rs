@@ -33,7 +33,7 @@ pub use upbp_media as media;
 
 pub use counters::Counters;
 pub use emission_guide::{EmissionGuide, EmissionSample};
-pub use emitter_choice::EmitterChoice;
+pub use emitter_choice::{EmitterChoice, EmitterChoiceError};
 pub use emitter_selection::{EmitterSample, EmitterShares, effective_samples};
 pub use features::Features;
 pub use film_sample::CameraWalk;
@@ -41,7 +41,7 @@ pub use iteration::{IterationChoices, IterationPlan, Kernels, LEAST_RADIUS, NO_L
 pub use kernel::Kernel;
 pub use light_map::LightMap;
 pub use merge_periods::MergePeriods;
-pub use prepared_scene::{EmitterChoiceError, PrepareError, PreparedScene};
+pub use prepared_scene::{PrepareError, PreparedScene};
 pub use radius_field::{FootprintField, RadiusField};
 pub use random::{Decision, Stream, StreamKind, half, pixel_index};
 pub use roulette::{Roulette, Surroundings, Survival};

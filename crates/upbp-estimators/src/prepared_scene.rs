@@ -6,7 +6,7 @@ use glam::Vec2;
 use upbp_media::{BodyId, Lanes, Medium, MediumId, MediumStack, RaySegment, SegmentDensity};
 
 use crate::emission_guide::{EmissionGuide, even_numbers};
-use crate::emitter_choice::EmitterChoice;
+use crate::emitter_choice::{EmitterChoice, EmitterChoiceError};
 use crate::emitter_selection::{EmitterSample, EmitterShares, Selection};
 use crate::emitter_tree::EmitterTree;
 use crate::emitters_by_receiver::{ClusterSample, ReceiverShares};
@@ -44,6 +44,13 @@ pub struct PreparedScene<'a, S: Scene> {
     emitting_media: bool,
     /// Media that are [dense](Self::is_dense).
     dense_media: Box<[bool]>,
+}
+
+/// The emitters of a scene, some volumes left out.
+struct Remaining {
+    volumes: Vec<(BodyId, EmitterId)>,
+    power: Selection,
+    tree: Option<EmitterTree>,
 }
 
 impl<'a, S: Scene> PreparedScene<'a, S> {
@@ -240,25 +247,17 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// [left out](Self::leave_out_volumes).
     ///
     /// # Errors
-    /// If it is of other emitters.
+    /// If the choice is among other emitters than those of the scene, or leaves out one that shines; if it
+    /// has a guide that an emitter cannot follow; if light from infinity cannot start on discs around its
+    /// focus; if it is by receivers that choose among other clusters. The scene is unchanged then.
     pub fn set_emitter_choice(&mut self, choice: &Arc<EmitterChoice>) -> Result<(), EmitterChoiceError> {
-        self.leave_out_volumes(|emitter| choice.emission.probability(emitter) == 0.0);
-        let is_of_these =
-            [&choice.emission, &choice.next_event].iter().all(|selection| selection.fits(&self.power));
-        let can_follow = |(emitter, guide): (u32, &Option<EmissionGuide>)| {
-            let axes = || self.emission_axes(EmitterId(emitter)).unwrap_or_default();
-            guide.as_ref().is_none_or(|guide| guide.is_valid(axes()))
-        };
-        let can_be_followed = choice.guides.len() <= self.scene.emitters().len()
-            && (0..).zip(&choice.guides).all(can_follow)
-            && (choice.focus.is_none() || choice.emission_bounds(&self.bounds).has_density_on_disc());
-        let clusters = self.tree.as_ref().map(EmitterTree::clusters);
-        let is_by_these = choice
-            .receivers
-            .as_ref()
-            .is_none_or(|receivers| clusters.is_some_and(|clusters| receivers.fits(clusters)));
-        if !(is_of_these && is_by_these && can_be_followed) {
-            return Err(EmitterChoiceError { emitters: self.scene.emitters().len() });
+        let rest = self.without_volumes(|emitter| choice.emission.probability(emitter) == 0.0);
+        let (power, tree) = rest.as_ref().map_or((&self.power, &self.tree), |rest| (&rest.power, &rest.tree));
+        let clusters = tree.as_ref().map(EmitterTree::clusters);
+        let axes = |emitter| self.emission_axes(emitter).unwrap_or_default();
+        choice.check(power, clusters, &self.bounds, axes)?;
+        if let Some(rest) = rest {
+            self.keep(rest);
         }
         self.set(choice.clone());
         Ok(())
@@ -360,16 +359,28 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
     /// Leaves volumes that emit to the rays that pass through them: no sub-path begins there any more. Other
     /// kinds of emitters stay; all are chosen by power.
     pub fn leave_out_volumes(&mut self, is_left_out: impl Fn(EmitterId) -> bool) {
-        let (out, kept): (Vec<_>, Vec<_>) =
+        if let Some(rest) = self.without_volumes(is_left_out) {
+            self.keep(rest);
+            self.choose_emitters_by_power();
+        }
+    }
+
+    /// The emitters without some volumes; `None` if all of them stay.
+    fn without_volumes(&self, is_left_out: impl Fn(EmitterId) -> bool) -> Option<Remaining> {
+        let (out, volumes): (Vec<_>, Vec<_>) =
             self.volumes.iter().copied().partition(|&(_, emitter)| is_left_out(emitter));
         if out.is_empty() {
-            return;
+            return None;
         }
-        self.volumes = kept;
-        self.power = self.power.without(|id| out.iter().any(|&(_, other)| other == id));
+        let power = self.power.without(|id| out.iter().any(|&(_, other)| other == id));
         // What is left to hits must not be found by next events: they would not be weighed beside each other.
-        self.tree = tree_of(self.scene, &self.power, &self.bounds);
-        self.choose_emitters_by_power();
+        let tree = tree_of(self.scene, &power, &self.bounds);
+        Some(Remaining { volumes, power, tree })
+    }
+
+    /// Forgets the emitters that do not remain; emitters have yet to be chosen anew.
+    fn keep(&mut self, Remaining { volumes, power, tree }: Remaining) {
+        (self.volumes, self.power, self.tree) = (volumes, power, tree);
     }
 
     /// The emitter that is the volume of a body, if sub-paths begin there.
@@ -541,15 +552,6 @@ fn tree_of<S: Scene>(scene: &S, power: &Selection, bounds: &BoundingSphere) -> O
 /// Media whose mean free path is a smaller part of their [extent](Scene::medium_extent) are dense: of their
 /// vertices next to a boundary, one in ten thousand is within rounding of it.
 const DENSE: f32 = 1e-3;
-
-/// The choice of emitters of a plan that was made for another scene.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("expected a choice among the {emitters} emitters of this scene that leaves out none that shines")]
-#[non_exhaustive]
-pub struct EmitterChoiceError {
-    /// The number of emitters of the scene.
-    pub emitters: usize,
-}
 
 /// A fault of a scene as a whole.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -7,8 +7,8 @@ use upbp_core::{Settings, Start, Stop, TechniqueSet, Techniques};
 use upbp_estimators::mis::{BeamExtent, Heuristic};
 use upbp_estimators::scene::{Emitter, EmitterId, Scene};
 use upbp_estimators::{
-    EmissionGuide, EmissionSample, EmitterChoice, IterationChoices, IterationPlan, Kernel, Kernels,
-    MergePeriods, NO_LIMIT, PathLengths, PreparedScene, RadiusField, Roulette,
+    EmissionGuide, EmissionSample, EmitterChoice, EmitterChoiceError, IterationChoices, IterationPlan,
+    Kernel, Kernels, MergePeriods, NO_LIMIT, PathLengths, PreparedScene, RadiusField, Roulette,
 };
 use upbp_scene::ReadyScene;
 use upbp_testing::{Estimate, assert_same, channels, renderer, short_renderer};
@@ -276,4 +276,31 @@ fn guides_of_another_kind_of_emitter_are_refused() {
     for far in [1.2e19, 1e20] {
         assert!(!accepts(&sky, &choice(&sky, 0, far * Vec3::X)), "{far}");
     }
+}
+
+/// A plan for a lamp says nothing of the flame beside it.
+#[test]
+fn a_choice_that_is_refused_changes_nothing() {
+    let scene = |flame: &str| {
+        let text = format!(
+            r#"(version: 1, camera: Perspective(origin: (0, 1, 4), target: (0, 1, 0), fov_degrees: 40),
+              media: {{ "flame": Homogeneous(glow: 1) }},
+              materials: {{ "white": Lambert(0.5), "null": Null }},
+              shapes: [
+                (material: "white", emission: 1,
+                  geometry: Quad(origin: (-1, 2, -1), edge_u: (2, 0, 0), edge_v: (0, 0, 2))),
+                {flame}
+              ])"#
+        );
+        ReadyScene::from_ron_str(&text, "").expect("a valid scene")
+    };
+    let lamp = scene("");
+    let both =
+        scene(r#"(material: "null", interior: "flame", geometry: Sphere(centre: (0, 1, 0), radius: 0.5))"#);
+    let of_lamp = PreparedScene::new(&lamp).expect("a valid scene").emitter_choice().clone();
+    let mut prepared = PreparedScene::new(&both).expect("a valid scene");
+    let before = prepared.emitter_choice().clone();
+    let refused = prepared.set_emitter_choice(&of_lamp);
+    assert_eq!(refused, Err(EmitterChoiceError::Emitters { emitters: 2 }));
+    assert!(prepared.has_volume_emitters() && *prepared.emitter_choice() == before);
 }
