@@ -201,7 +201,7 @@ impl Scene for ReadyScene {
     }
 
     fn medium_extent(&self, medium: MediumId) -> f32 {
-        self.extents.get(medium.0 as usize).copied().unwrap_or(self.bounds.radius)
+        self.extents.get(medium.0 as usize).copied().unwrap_or_else(|| self.bounds.largest_coordinate())
     }
 
     #[inline]

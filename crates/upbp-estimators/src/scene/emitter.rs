@@ -13,6 +13,12 @@ pub struct BoundingSphere {
 }
 
 impl BoundingSphere {
+    /// The largest coordinate of all points inside, without its sign, scene units.
+    #[must_use]
+    pub fn largest_coordinate(&self) -> f32 {
+        self.centre.abs().max_element() + self.radius
+    }
+
     /// Whether single precision holds the density of light from infinity that starts on a disc as wide.
     #[must_use]
     pub fn has_density_on_disc(&self) -> bool {

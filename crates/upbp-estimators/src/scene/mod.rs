@@ -71,12 +71,12 @@ pub trait Scene: Sync {
     /// The largest coordinate of places in a medium, or the distance from which rays get into it without a
     /// surface that scatters, whichever is more, scene units: positions in it are rounded in proportion.
     ///
-    /// By default the radius of the [bounds](Self::bounds). Of a medium that is only in bodies that refract,
-    /// away from all others, a host may tell less; then walks in one that is dense in the scene, but not in
-    /// its body, are shorter.
+    /// By default the [largest coordinate](BoundingSphere::largest_coordinate) of the bounds. Of a medium
+    /// that is only in bodies that refract, away from all others, a host may tell less; then walks in one
+    /// that is dense in the scene, but not in its body, are shorter.
     fn medium_extent(&self, medium: MediumId) -> f32 {
         let _ = medium;
-        self.bounds().radius
+        self.bounds().largest_coordinate()
     }
 
     /// Whether every straight line from a place where `body` counts (`None`: where none does) to `end` is

@@ -164,25 +164,26 @@ pub(super) fn meets(geometry: &SceneGeometry, shape: ShapeId, (min, max): Aabb) 
 }
 
 /// The largest coordinate of places in each medium, or the distance from which a ray may get into it without
-/// a surface, whichever is more: the radius of the scene, but for media in bodies that are all enclosed.
+/// a surface, whichever is more: the largest coordinate `of_scene`, but for media in bodies that are all
+/// enclosed.
 pub(super) fn extents(
     bodies: &[Body],
     enclosures: &Enclosures,
     geometry: &SceneGeometry,
     media: usize,
     outside: Option<MediumId>,
-    radius: f32,
+    of_scene: f32,
 ) -> Vec<f32> {
     let mut extents = vec![0.0_f32; media];
     if let Some(medium) = outside {
-        extents[medium.0 as usize] = radius;
+        extents[medium.0 as usize] = of_scene;
     }
     for (id, body) in (0_u32..).map(BodyId).zip(bodies) {
         let Some(medium) = body.interior.medium else { continue };
         let (min, max) = geometry.shape(body.shape).aabb();
         let within = min.abs().max(max.abs()).max_element().max(min.distance(max));
         let extent = &mut extents[medium.0 as usize];
-        *extent = extent.max(if enclosures.contains(id) { within } else { radius });
+        *extent = extent.max(if enclosures.contains(id) { within } else { of_scene });
     }
     extents
 }

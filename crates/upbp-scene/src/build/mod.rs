@@ -156,8 +156,8 @@ impl Builder<'_> {
             surfaces.iter().filter_map(|surface| surface.boundary.bsdf()).any(Material::is_specular)
                 || bodies::may_match(&bodies, &surfaces, &geometry);
         let enclosures = enclosures::find(&bodies, &surfaces, &geometry, &lights, &camera);
-        let extents =
-            enclosures::extents(&bodies, &enclosures, &geometry, media.len(), outside, bounds.radius);
+        let of_scene = bounds.largest_coordinate();
+        let extents = enclosures::extents(&bodies, &enclosures, &geometry, media.len(), outside, of_scene);
         let (hash, files) = (self.hash.0, std::mem::take(&mut self.files));
         let notes = std::mem::take(&mut self.notes).list("notes");
         Some(ReadyScene {

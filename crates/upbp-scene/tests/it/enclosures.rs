@@ -116,7 +116,8 @@ fn milk_hides_what_is_out_of_it_and_the_rest_what_is_in_it_unless_a_cloud_reache
     }
     let outside = scene(FAR, &(milk + haze), "Constant(1)");
     let haze = outside.stack_at(Vec3::new(5.0, 0.0, 0.0)).medium().expect("haze");
-    assert!(outside.medium_extent(haze) == outside.bounds().radius && haze != MediumId(u32::MAX));
+    let of_scene = outside.bounds().largest_coordinate();
+    assert!(outside.medium_extent(haze) == of_scene && haze != MediumId(u32::MAX));
 }
 
 #[test]
