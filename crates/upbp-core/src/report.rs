@@ -108,7 +108,7 @@ impl Report {
         }
         if c.dropped > 0 {
             warnings.push(format!(
-                "{} contributions, light sub-paths or pixels were negative or not finite and are left out",
+                "{} contributions, sub-paths or pixels were negative or not finite and are left out",
                 c.dropped
             ));
         }

@@ -21,7 +21,7 @@ pub struct Counters {
     pub photon_beams: u64,
     /// Contributions of each technique.
     pub contributions: PerTechnique<u64>,
-    /// Contributions, throughputs of light sub-paths, and values of an iteration's pixels, that were not
+    /// Contributions, throughputs of sub-paths, and values of an iteration's pixels, that were not
     /// finite or negative, and were dropped.
     pub dropped: u64,
     /// Camera sub-paths that were ended by the limit of the path length at a vertex that scatters.
@@ -77,8 +77,8 @@ impl Counters {
         }
     }
 
-    /// Whether the throughput of a light sub-path is out of range, which is counted as dropped: what it would
-    /// have contributed is missing.
+    /// Whether the throughput of a sub-path is out of range, which is counted as dropped: what it would have
+    /// contributed is missing.
     #[inline]
     pub(crate) fn overflows(&mut self, throughput: Spectrum) -> bool {
         let overflows = !throughput.is_finite();

@@ -38,12 +38,14 @@ fn render(fault: Fault, techniques: &str) -> Result<Counters, String> {
 
 #[test]
 fn nothing_bad_reaches_the_film_and_nothing_panics() {
-    for techniques in ["all", "auto", "bpt", "hit+nee+lt"] {
+    for techniques in ["all", "auto", "bpt", "hit+nee+lt", "hit+nee"] {
         let good = render(F::None, techniques).expect("a good scene");
         assert_eq!((good.dropped, good.lost_walks), (0, 0));
         let mut faults = match techniques {
             "all" => faults(),
             "hit+nee+lt" => vec![F::EndlessBodies],
+            // Without light sub-paths, which drop as much.
+            "hit+nee" => vec![F::BsdfWeight(f32::NAN), F::BsdfWeight(f32::INFINITY)],
             _ => GEOMETRY.to_vec(),
         };
         // Seconds for each set: every ray meets as many boundaries as are followed at all, and stacks of
@@ -61,6 +63,9 @@ fn nothing_bad_reaches_the_film_and_nothing_panics() {
             // what cannot be are lost.
             match fault {
                 F::BsdfNan | F::BsdfNegative | F::BsdfInfinite | F::Radiance(_) => {
+                    assert!(counters.expect("renders").dropped > 0, "{fault:?}");
+                }
+                F::BsdfWeight(weight) if !weight.is_finite() => {
                     assert!(counters.expect("renders").dropped > 0, "{fault:?}");
                 }
                 F::NormalNan

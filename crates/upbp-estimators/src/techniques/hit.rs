@@ -142,7 +142,7 @@ pub(crate) fn environment<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let density = edge_trace.density(prepared.scene);
     let throughput =
         edge.throughput * density.transmittance / density.pass_probability.mean(&edge.mis.shares) as f32;
-    if throughput.is_black() || !throughput.is_finite() {
+    if throughput.is_black() || out.counters.overflows(throughput) {
         return;
     }
     let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.mis.start, false);

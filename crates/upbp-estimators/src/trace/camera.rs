@@ -87,7 +87,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         let in_medium = arrived.interaction.in_medium();
         let t = arrived.density.forward(in_medium).mean(&edge.mis.shares);
         let throughput = edge.throughput * arrived.density.transmittance / t as f32;
-        if !(t > 0.0) || throughput.is_black() || !throughput.is_finite() {
+        if !(t > 0.0) || throughput.is_black() || out.counters.overflows(throughput) {
             break;
         }
         let from = -ray.direction;
