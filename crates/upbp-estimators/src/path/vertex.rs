@@ -197,6 +197,8 @@ impl<B: Bsdf, D: Densities, L: Lanes> CameraVertex<B, D, L> {
 
 /// An edge of a camera sub-path: a query beam through all its media.
 pub(crate) struct CameraEdge<D: Densities, L: Lanes> {
+    /// Position of the first vertex, for which next events choose lights: the ray may start off its surface.
+    pub(crate) receiver: Vec3,
     /// Importance over density at the edge's first vertex, after scattering.
     pub(crate) throughput: Spectrum,
     /// Densities for the weights, at the first vertex.

@@ -1,7 +1,5 @@
 //! Light that a camera sub-path meets: emitters, environments, emitting media.
 
-use glam::Vec3;
-use upbp_accel::Ray;
 use upbp_media::{Lanes, Medium, Spectrum};
 
 use crate::film_sample::Output;
@@ -60,7 +58,7 @@ fn emission_at<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     let prepared = context.prepared;
     let pdf = medium.pdf_emitted(&edge_trace.segment(span, span.end), t);
     let density = edge_trace.density_to(prepared.scene, span, t);
-    let (receiver, direction) = (edge_trace.ray.origin, -edge_trace.ray.direction);
+    let direction = -edge_trace.ray.direction;
     let position = edge_trace.ray.at(t);
     let value = edge.throughput * density.transmittance * (medium.source(position) / pdf as f32);
     let point = EmitterPoint { position, normal: direction };
@@ -70,7 +68,7 @@ fn emission_at<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         Some((
             emitter,
             light.pdf_passage(&point),
-            light.hit(prepared.emission_bounds(), &point, direction, receiver)?,
+            light.hit(prepared.emission_bounds(), &point, direction, edge.receiver)?,
         ))
     });
     let Some((emitter, passage, densities)) = seen else {
@@ -86,7 +84,7 @@ fn emission_at<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         ends_in_medium: false,
     };
     let end = LightEnd { emitter, point, direction };
-    let weight = weight_of_hit(context, &end, &densities, receiver, &mis_edge, edge);
+    let weight = weight_of_hit(context, &end, &densities, &mis_edge, edge);
     record_hit(edge, Completion::Hit(end), weight, value, out);
 }
 
@@ -111,13 +109,12 @@ fn weight_of_hit<S: Scene, D: Densities, L: Lanes>(
     context: &Context<'_, S>,
     end: &LightEnd,
     densities: &HitDensities,
-    receiver: Vec3,
     mis_edge: &Edge<L>,
     edge: &CameraEdge<D, L>,
 ) -> Weight<D> {
     let Context { prepared, plan } = *context;
     let mis = &plan.mis;
-    let LightEnd { emitter, point, direction } = *end;
+    let (LightEnd { emitter, point, direction }, receiver) = (*end, edge.receiver);
     // On arrival at a light the vertex before is connected by next event estimation.
     let vertex_mis = edge.mis.arrive(mis, Walk::Camera, mis_edge, D::of(Technique::Nee, mis.pow(mis.nee)));
     mis.hit_weight(
@@ -146,12 +143,12 @@ pub(crate) fn environment<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         return;
     }
     let mis_edge = Edge::new(&density, f64::INFINITY, 1.0, edge.mis.start, false);
-    let Ray { origin, direction, .. } = edge_trace.ray;
+    let direction = edge_trace.ray.direction;
     let away = prepared.bounds.centre + direction * (2.0 * prepared.bounds.radius);
     let point = EmitterPoint { position: away, normal: -direction };
     for &emitter in prepared.environments() {
         let end = LightEnd { emitter, point, direction: -direction };
-        shine(context, &end, origin, &mis_edge, throughput, edge, out);
+        shine(context, &end, &mis_edge, throughput, edge, out);
     }
 }
 
@@ -168,18 +165,16 @@ pub(crate) fn hit<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     if edge_trace.stop.is_none()
         && let Some(Hit { emitter: Some(emitter), position, geometric_normal, .. }) = edge_trace.hit
     {
-        let Ray { origin, direction, .. } = edge_trace.ray;
         let point = EmitterPoint { position, normal: geometric_normal };
-        let end = LightEnd { emitter, point, direction: -direction };
-        shine(context, &end, origin, mis_edge, throughput, edge, out);
+        let end = LightEnd { emitter, point, direction: -edge_trace.ray.direction };
+        shine(context, &end, mis_edge, throughput, edge, out);
     }
 }
 
-/// An emitter's light at the `end` of a camera sub-path, which gets there from `receiver` by `mis_edge`.
+/// An emitter's light at the `end` of a camera sub-path, which gets there by `mis_edge`.
 fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     context: &Context<'_, S>,
     end: &LightEnd,
-    receiver: Vec3,
     mis_edge: &Edge<L>,
     throughput: Spectrum,
     edge: &CameraEdge<O::Densities, L>,
@@ -191,7 +186,8 @@ fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
     }
     let LightEnd { emitter, point, direction } = *end;
     let Some(light) = prepared.scene.emitters().get(emitter.0 as usize) else { return };
-    let Some(densities) = light.hit(prepared.emission_bounds(), &point, direction, receiver) else { return };
+    let densities = light.hit(prepared.emission_bounds(), &point, direction, edge.receiver);
+    let Some(densities) = densities else { return };
     let weight = if edge.depth == 1 {
         let pdf_ray = edge.mis.rho * mis_edge.cos_in / mis_edge.distance_squared;
         let passes = mis_edge.pass_probability.mean(&edge.mis.shares);
@@ -200,7 +196,7 @@ fn shine<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
             None => Weight::alone(Technique::Hit),
         }
     } else {
-        weight_of_hit(context, end, &densities, receiver, mis_edge, edge)
+        weight_of_hit(context, end, &densities, mis_edge, edge)
     };
     record_hit(edge, Completion::Hit(*end), weight, throughput * densities.radiance, out);
 }

@@ -51,6 +51,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
 
     let mut stack = prepared.stack_at_camera(ray.origin);
     let mut edge = CameraEdge {
+        receiver: ray.origin,
         throughput: Spectrum::ONE,
         mis: EdgeMis::at_camera(&plan.mis, f64::from(camera_ray.pdf)),
         connections: O::Densities::of(Technique::LightTracing, plan.mis.pow(plan.mis.light_tracing)),
@@ -132,6 +133,7 @@ pub fn trace_camera_path<S: Scene, L: Lanes, O: Observer<S::Bsdf> + ?Sized>(
         ray = Ray::new(ray_origin(&interaction, position, scattered.direction), scattered.direction);
         stack.clone_from(sides.towards(scattered.transmitted));
         edge = CameraEdge {
+            receiver: position,
             throughput: throughput * scattered.weight,
             mis: depart(context, &mis, &interaction, scale, &scattered),
             connections: plan.mis.connections(),
