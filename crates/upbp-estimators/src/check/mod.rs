@@ -30,6 +30,7 @@ use glam::Vec3;
 
 use crate::Spectrum;
 use crate::random::mix;
+use crate::scene::BoundingSphere;
 
 /// An implementation does not keep a contract.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -52,6 +53,11 @@ fn fail<T>(what: &'static str, details: impl Debug) -> Result<T, ContractViolati
 
 fn require(condition: bool, what: &'static str, details: impl Debug) -> Check {
     if condition { Ok(()) } else { fail(what, details) }
+}
+
+/// A distance that is short in a scene, yet beyond rounding anywhere in it.
+fn short_distance(bounds: &BoundingSphere) -> f32 {
+    (1e-4 * bounds.radius).max(64.0 * f32::EPSILON * bounds.largest_coordinate())
 }
 
 /// Random numbers of the checkers: Steele et al., "Fast Splittable Pseudorandom Number Generators", OOPSLA

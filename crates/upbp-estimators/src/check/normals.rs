@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 use upbp_media::BodyId;
 
-use super::{Check, require};
+use super::{Check, require, short_distance};
 use crate::Ray;
 use crate::scene::{Boundary, Bsdf, EmitterId, Hit, Interface, MAX_CROSSINGS, Scene, Walk};
 
@@ -42,8 +42,8 @@ impl Normals {
     /// Follows a ray that starts outside of everything through all that it meets, and looks at each surface
     /// from the other side, too. What has an inside that matters must tell of it.
     pub(super) fn look<S: Scene>(&mut self, scene: &S, ray: &Ray) -> Check {
-        // Far enough to be beyond rounding, and nearer than anything else.
-        let beyond = 1e-4 * scene.bounds().radius;
+        // Nearer than anything else.
+        let beyond = short_distance(&scene.bounds());
         let mut rest = *ray;
         let mut met: Vec<BodyId> = Vec::new();
         for _ in 0..MAX_CROSSINGS {

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use upbp_media::{Medium as _, MediumId, RaySegment, Spectrum};
 
 use super::normals::Normals;
-use super::{Check, Random, is_unit, require, same_spectrum};
+use super::{Check, Random, is_unit, require, same_spectrum, short_distance};
 use crate::Ray;
 use crate::path::{cross_all, has_surface};
 use crate::scene::{
@@ -76,9 +76,9 @@ fn check_lights(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random
                 continue;
             };
             let position = emission.point.position;
-            let inside = position.distance(bounds.centre) <= bounds.radius * (1.0 + 1e-3);
+            let before = short_distance(bounds);
+            let inside = position.distance(bounds.centre) <= bounds.radius + 10.0 * before;
             require(inside, "lights lie within the bounds", (bounds, position))?;
-            let before = 1e-4 * bounds.radius;
             let (origin, direction) = (position + emission.direction * before, -emission.direction);
             let ray = Ray { origin, direction, t_min: 0.0, t_max: 2.0 * before };
             let hit = scene.intersect(&ray).filter(|hit| hit.emitter == Some(EmitterId(index as u32)));
@@ -89,7 +89,7 @@ fn check_lights(scene: &impl Scene, bounds: &BoundingSphere, random: &mut Random
             let is_there = !is_judged || stops_on_surface(scene, &ray);
             require(is_there, "no light is on a surface that another body hides", (index, ray))?;
             // Another part of a hollow lamp may be in front of it.
-            let is_start = |position: Vec3| position.distance(emission.point.position) <= 1e-2 * before;
+            let is_start = |position: Vec3| position.distance(emission.point.position) <= 0.1 * before;
             let start = hit.as_ref().filter(|hit| is_judged && is_start(hit.position));
             let shines = start.is_none_or(|hit| {
                 let point = EmitterPoint { position: hit.position, normal: hit.geometric_normal };
@@ -238,11 +238,11 @@ fn check_lobes(scene: &impl Scene, ray: &Ray, random: &mut Random) -> Check {
 }
 
 fn check_ray(scene: &impl Scene, ray: &Ray, random: &mut Random) -> Check {
-    let radius = scene.bounds().radius;
+    let short = short_distance(&scene.bounds());
     if let Some(hit) = scene.intersect(ray) {
         let case = (ray, hit.t, hit.geometric_normal, hit.shading_normal);
         require(hit.t > ray.t_min && hit.t < ray.t_max, "a hit is within the ray", case)?;
-        let near = hit.position.distance(ray.origin + ray.direction * hit.t) < 1e-4 * radius;
+        let near = hit.position.distance(ray.origin + ray.direction * hit.t) < short;
         require(near, "a hit's position is on the ray", case)?;
         let units = is_unit(hit.geometric_normal) && is_unit(hit.shading_normal);
         require(units, "normals are unit vectors", case)?;
@@ -275,17 +275,17 @@ fn check_ray(scene: &impl Scene, ray: &Ray, random: &mut Random) -> Check {
 
     // Short of the hit nothing blocks; beyond an opaque one something does.
     let mut passed = Vec::new();
-    let before = Ray { t_max: end - 1e-3 * radius, ..*ray };
+    let before = Ray { t_max: end - 10.0 * short, ..*ray };
     let clear = before.t_max <= before.t_min || scene.is_clear(&before, &mut passed);
     require(clear, "nothing blocks before the nearest hit", (ray, end))?;
     if hit.is_some_and(|hit| matches!(hit.boundary, Boundary::Opaque(_))) {
-        let beyond = Ray { t_max: end + 1e-3 * radius, ..*ray };
+        let beyond = Ray { t_max: end + 10.0 * short, ..*ray };
         require(!scene.is_clear(&beyond, &mut Vec::new()), "an opaque hit blocks", (ray, end))?;
     }
 
     // The bodies around a point of the first stretch: those at the start, and the boundaries since.
     let t = end * random.next();
-    let near_boundary = crossings.iter().any(|crossing| (crossing.t - t).abs() < 1e-3 * radius);
+    let near_boundary = crossings.iter().any(|crossing| (crossing.t - t).abs() < 10.0 * short);
     if near_boundary {
         return Ok(());
     }
