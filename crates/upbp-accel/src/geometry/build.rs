@@ -68,7 +68,10 @@ impl Boxed {
 
     fn around(min: Vec3, max: Vec3, kind: Kind) -> Self {
         let margin = EDGE_ROUNDING * (max - min).max_element();
-        Self { min: min - margin, max: max + margin, kind }
+        // Of a small triangle far from the origin the margin is less than a rounding, but not nothing.
+        let min = (min - margin).min(min.map(f32::next_down));
+        let max = (max + margin).max(max.map(f32::next_up));
+        Self { min, max, kind }
     }
 }
 
@@ -430,5 +433,20 @@ impl Collapse<'_> {
             level = above.collect();
         }
         level[0].0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_are_wider_than_triangles_wherever_they_are() {
+        for offset in [0.0, 1.0, -300.0, 1e6] {
+            let corners = [Vec3::ZERO, 0.1 * Vec3::X, 0.1 * Vec3::Y].map(|corner| corner + offset);
+            let [a, b, c] = corners;
+            let Boxed { min, max, .. } = Boxed::triangle(corners);
+            assert!(min.cmplt(a.min(b).min(c)).all() && max.cmpgt(a.max(b).max(c)).all(), "{offset}");
+        }
     }
 }
