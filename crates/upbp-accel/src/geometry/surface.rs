@@ -153,7 +153,13 @@ impl Surface {
 
     /// The cells of its inside, which `cover` finds.
     pub(super) fn cells(&self, cover: impl FnOnce() -> Cells) -> &Arc<Cells> {
-        self.measures.cells.get_or_init(|| Arc::new(cover()))
+        let cells = &self.measures.cells;
+        if let Some(found) = cells.get() {
+            return found;
+        }
+        // Not inside of the cell, as with the hierarchy.
+        let found = Arc::new(cover());
+        cells.get_or_init(|| found)
     }
 
     /// Adds a vector to all positions.

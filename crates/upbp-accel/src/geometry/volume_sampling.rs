@@ -9,8 +9,10 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3, Vec3};
 
 use super::axis_box::AxisBox;
+use super::hit::ShapeId;
 use super::mesh::TriangleMesh;
 use super::placement::Placement;
+use super::scene::SceneGeometry;
 use super::shape::Shape;
 use super::sphere::Sphere;
 
@@ -20,6 +22,10 @@ const CELLS: u32 = 32;
 /// Part of a cell by which triangles are taken to be larger than they are, so that no rounding loses a cell:
 /// that of a copy neither, as far away as some hundred times its size.
 const MARGIN: f64 = 1e-2;
+
+/// Regions of the grid of a mesh from which on a hierarchy tells whether they are inside: it takes as long to
+/// build as some passes over all triangles.
+const MOST_WITHOUT_HIERARCHY: u32 = 32;
 
 /// The inside of a closed shape.
 #[derive(Clone, Debug)]
@@ -131,13 +137,23 @@ impl Cells {
         for triangle in 0..mesh.triangle_count() {
             cells.mark(mesh.corners(triangle).map(|corner| corner.as_dvec3() - min), &mut state);
         }
-        // Cells that no triangle touches hang together, all inside or all outside.
+        // Regions of cells that no triangle touches are all inside or all outside.
+        let (mut regions, mut geometry) = (0, None);
         for start in 0..state.len() as u32 {
-            if state[start as usize] == State::Unknown {
-                let centre = (min + cells.corner(start) + 0.5 * size).as_vec3();
-                let is_inside = mesh.contains(centre) == Some(true);
-                cells.fill(start, if is_inside { State::Covered } else { State::Outside }, &mut state);
+            if state[start as usize] != State::Unknown {
+                continue;
             }
+            regions += 1;
+            if regions == MOST_WITHOUT_HIERARCHY {
+                geometry = SceneGeometry::build(vec![mesh.clone().into()]).ok();
+            }
+            let centre = (min + cells.corner(start) + 0.5 * size).as_vec3();
+            let is_inside = match &geometry {
+                Some(geometry) => geometry.contains(ShapeId(0), centre),
+                None => mesh.contains(centre),
+            };
+            let to = if is_inside == Some(true) { State::Covered } else { State::Outside };
+            cells.fill(start, to, &mut state);
         }
         cells.indices =
             (0..state.len() as u32).filter(|&index| state[index as usize] == State::Covered).collect();
@@ -329,10 +345,24 @@ mod tests {
         }
     }
 
+    /// Sixty-four octahedra apart from each other, with a region inside of each.
+    fn octahedra() -> TriangleMesh {
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for place in (0..64).map(|i| UVec3::new(i % 4, i / 4 % 4, i / 16).as_vec3()) {
+            let first = positions.len() as u32;
+            positions
+                .extend(Vec3::AXES.into_iter().flat_map(|axis| [place + 0.45 * axis, place - 0.45 * axis]));
+            triangles.extend((0..8).map(|sides: u32| {
+                let [x, y, z] = [0, 1, 2].map(|axis| first + 2 * axis + (sides >> axis & 1));
+                if sides.count_ones().is_multiple_of(2) { [x, y, z] } else { [x, z, y] }
+            }));
+        }
+        TriangleMesh::new(positions, triangles, None).unwrap()
+    }
+
     #[test]
     fn cells_cover_every_point_of_a_mesh() {
-        for segments in [3, 7, 400] {
-            let mesh = ring(segments);
+        for mesh in [ring(3), ring(7), ring(400), octahedra()] {
             let cells = Cells::cover(&mesh);
             let (min, max) = mesh.aabb();
             for u in points(20_000) {
