@@ -17,7 +17,7 @@ pub(super) struct Surface {
     pub(super) border: Border,
     /// Triangles without area that were left out.
     pub(super) dropped: usize,
-    /// [`rounded`](super::TriangleMesh::rounded) where corners were transformed, else zero.
+    /// [`rounded`](super::TriangleMesh::rounded) where corners were transformed or moved, else zero.
     pub(super) rounded: Vec3,
     bounds: (Vec3, Vec3),
     measures: Measures,
@@ -162,8 +162,9 @@ impl Surface {
         cells.get_or_init(|| found)
     }
 
-    /// Adds a vector to all positions.
+    /// Adds a vector to all positions. They remain as coarse as they were in their old place.
     pub(super) fn translate(&mut self, by: Vec3) {
+        self.rounded = self.rounded.max(self.bounds.0.abs().max(self.bounds.1.abs()));
         self.positions.iter_mut().for_each(|position| *position += by);
         self.bounds = (self.bounds.0 + by, self.bounds.1 + by);
         // The volume does not depend on how corners are rounded in their place.

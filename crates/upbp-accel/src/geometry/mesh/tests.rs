@@ -242,3 +242,16 @@ fn points_of_the_surface_are_not_inside() {
         assert_eq!(cube.contains(point), Some(is_inside), "{point}");
     }
 }
+
+/// Planes that were one in a file are one as well as before when the scene is moved near its origin.
+#[test]
+fn coordinates_that_are_moved_are_as_coarse_as_before() {
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|corner| corner + Vec3::new(1e4, -2e4, 10.0));
+    let mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]], None).unwrap();
+    let rounded = Vec3::new(10_001.0, 2e4, 10.0);
+    for mesh in [mesh.placed(&Affine3A::IDENTITY).unwrap(), mesh] {
+        assert_eq!(mesh.most_rounded(), rounded);
+        let moved = mesh.translated(-corners[0]);
+        assert_eq!((moved.bounds.1, moved.most_rounded()), (Vec3::new(1.0, 1.0, 0.0), rounded));
+    }
+}
