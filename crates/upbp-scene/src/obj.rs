@@ -5,9 +5,9 @@
 //! they are, such as texture coordinates, lines and libraries of materials, are skipped; anything else, such
 //! as a free-form surface, is an error.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io::{BufRead, Read as _};
-use std::sync::Arc;
+use std::ops::Range;
 
 use glam::Vec3;
 
@@ -35,41 +35,33 @@ pub struct ObjFile {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
     triangles: Vec<[Corner; 3]>,
-    /// In the order of their triangles; what is before the first has no name.
-    sections: Vec<Section>,
-    /// The number of each name.
+    /// The number of each name: after reading, of those that have triangles.
     names: BTreeMap<String, u32>,
+    /// Triangles that have a name, by its number and by the statement that gives it.
+    ranges: Vec<[Vec<Range<u32>>; 3]>,
+    /// The names that the next triangles have, by the statement.
+    current: [Names; 3],
     /// Whether some faces are in a smoothing group (`s`).
     has_smoothing_groups: bool,
     budget: polygon::Budget,
 }
 
-/// Triangles one after the other that have the same names.
+/// The names that the last statement of a kind gives.
 #[derive(Clone, Debug, Default)]
-struct Section {
-    first: usize,
-    object: Option<u32>,
-    groups: Arc<[u32]>,
-    material: Option<u32>,
-}
-
-impl Section {
-    fn names(&self) -> impl Iterator<Item = u32> {
-        self.groups.iter().copied().chain(self.object).chain(self.material)
-    }
-
-    /// Whether a statement of this kind gives the triangles this name.
-    fn has(&self, statement: &str, name: u32) -> bool {
-        match statement {
-            "o" => self.object == Some(name),
-            "g" => self.groups.contains(&name),
-            _ => self.material == Some(name),
-        }
-    }
+struct Names {
+    /// The first triangle that has them.
+    first: u32,
+    /// By number.
+    names: Vec<u32>,
 }
 
 /// The statements that give triangles a name, and what they name.
 const STATEMENTS: [(&str, &str); 3] = [("o", "an object"), ("g", "a group"), ("usemtl", "a material")];
+
+/// The place of groups among [`STATEMENTS`].
+const GROUP: usize = 1;
+/// The place of materials among [`STATEMENTS`].
+const MATERIAL: usize = 2;
 
 /// The reason for which a name does not tell triangles of an OBJ file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -183,19 +175,21 @@ impl ObjFile {
         if parsed.triangles.is_empty() {
             return Err(ObjError { line: line.max(1), message: "the file ends without a face (`f`)".into() });
         }
+        (0..STATEMENTS.len()).for_each(|statement| parsed.end(statement));
+        let Self { names, ranges, .. } = &mut parsed;
+        names.retain(|_, number| ranges[*number as usize].iter().any(|ranges| !ranges.is_empty()));
         Ok(parsed)
     }
 
     /// Names of objects, groups and materials that have triangles.
-    pub fn parts(&self) -> impl Iterator<Item = &str> {
-        let used: BTreeSet<u32> = self.named_ranges().flat_map(|(section, _)| section.names()).collect();
-        self.names.iter().filter(move |(_, number)| used.contains(number)).map(|(name, _)| name.as_str())
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.names.keys().map(String::as_str)
     }
 
     /// The number of materials that have triangles.
     #[must_use]
     pub fn material_count(&self) -> usize {
-        self.named_ranges().filter_map(|(section, _)| section.material).collect::<BTreeSet<_>>().len()
+        self.ranges.iter().filter(|ranges| !ranges[MATERIAL].is_empty()).count()
     }
 
     /// Whether faces are meant to look smooth, in smoothing groups, and the file has no normals for it.
@@ -218,20 +212,19 @@ impl ObjFile {
     /// If no triangles have this name; or if an object, a group or a material have it, and not the same
     /// triangles.
     pub fn part(&self, name: &str) -> Result<ObjMesh, PartError> {
-        let of = |statement: &str, name: &str| -> Vec<_> {
-            let number = self.names.get(name);
-            let named = |section: &Section| number.is_some_and(|number| section.has(statement, *number));
-            self.named_ranges().filter(|(section, _)| named(section)).map(|(_, range)| range).collect()
+        let of = |statement: usize, name: &str| match self.names.get(name) {
+            Some(number) => &self.ranges[*number as usize][statement][..],
+            None => &[],
         };
-        let mut found = STATEMENTS.map(|(statement, what)| (statement, what, of(statement, name))).to_vec();
-        found.retain(|(_, _, ranges)| !ranges.is_empty());
-        if let [(_, _, first), others @ ..] = &found[..]
-            && others.iter().any(|(_, _, ranges)| ranges != first)
+        let found = STATEMENTS.iter().enumerate().map(|(place, statement)| (statement, of(place, name)));
+        let found: Vec<_> = found.filter(|(_, ranges)| !ranges.is_empty()).collect();
+        if let [(_, first), others @ ..] = &found[..]
+            && others.iter().any(|(_, ranges)| ranges != first)
         {
             let shown = Shortened(name);
-            let whats: Vec<&str> = found.iter().map(|(_, what, _)| *what).collect();
+            let whats: Vec<&str> = found.iter().map(|((_, what), _)| *what).collect();
             let lines: Vec<String> =
-                found.iter().map(|(statement, ..)| format!("`part: \"{statement} {shown}\"`")).collect();
+                found.iter().map(|((statement, _), _)| format!("`part: \"{statement} {shown}\"`")).collect();
             return Err(PartError::SeveralKinds(format!(
                 "`{shown}` is the name of {} with different triangles: {}, the line as in the file, tells which",
                 whats.join(" and "),
@@ -240,20 +233,15 @@ impl ObjFile {
         }
         let statement = || {
             let (statement, name) = name.split_once(char::is_whitespace)?;
-            STATEMENTS.iter().find(|(known, _)| *known == statement).map(|_| of(statement, name.trim()))
+            let place = STATEMENTS.iter().position(|(known, _)| *known == statement)?;
+            Some(of(place, name.trim()))
         };
-        let ranges = found.pop().map(|(_, _, ranges)| ranges).or_else(statement).unwrap_or_default();
+        let ranges = found.first().map(|(_, ranges)| *ranges).or_else(statement).unwrap_or_default();
         if ranges.is_empty() {
             return Err(PartError::Unknown);
         }
-        Ok(self.mesh_of(ranges.iter().flat_map(|range| &self.triangles[range.clone()])))
-    }
-
-    /// Sections with the numbers of their triangles.
-    fn named_ranges(&self) -> impl Iterator<Item = (&Section, std::ops::Range<usize>)> + Clone {
-        let ends = self.sections.iter().skip(1).map(|next| next.first).chain([self.triangles.len()]);
-        let ranges = self.sections.iter().zip(ends).map(|(section, end)| (section, section.first..end));
-        ranges.filter(|(_, range)| !range.is_empty())
+        let triangles = |range: &Range<u32>| &self.triangles[range.start as usize..range.end as usize];
+        Ok(self.mesh_of(ranges.iter().flat_map(triangles)))
     }
 
     fn line(&mut self, line: &str) -> Result<(), String> {
@@ -279,43 +267,51 @@ impl ObjFile {
                 let triangles = polygon::triangles(&places, &mut self.budget)?;
                 self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|place| corners[place])));
             }
-            Some(kind @ ("o" | "g" | "usemtl")) => self.begin(kind, &line[kind.len()..])?,
             Some("s") => self.has_smoothing_groups |= words.next().is_some_and(|s| s != "off" && s != "0"),
-            Some(word) if !SKIPPED.contains(&word) => {
-                return Err(format!(
-                    "expected a statement about polygons, such as `v` or `f`, found `{}`",
-                    beginning(word)
-                ));
+            Some(word) => {
+                if let Some(statement) = STATEMENTS.iter().position(|(known, _)| *known == word) {
+                    self.begin(statement, &line[word.len()..])?;
+                } else if !SKIPPED.contains(&word) {
+                    return Err(format!(
+                        "expected a statement about polygons, such as `v` or `f`, found `{}`",
+                        beginning(word)
+                    ));
+                }
             }
-            _ => {}
+            None => {}
         }
         Ok(())
     }
 
-    /// Begins triangles under another name.
-    fn begin(&mut self, kind: &str, name: &str) -> Result<(), String> {
+    /// Begins triangles under other names of a kind of [`STATEMENTS`].
+    fn begin(&mut self, statement: usize, names: &str) -> Result<(), String> {
+        self.end(statement);
         // Within a name no comment begins.
-        let name = name.split(" #").next().unwrap_or("").trim();
-        if kind == "g" {
-            self.section().groups =
-                name.split_whitespace().map(|name| self.number(name)).collect::<Result<_, _>>()?;
-            return Ok(());
-        }
-        let number = if name.is_empty() { None } else { Some(self.number(name)?) };
-        let section = self.section();
-        *(if kind == "o" { &mut section.object } else { &mut section.material }) = number;
+        let names = names.split(" #").next().unwrap_or("").trim();
+        let first = self.triangles.len() as u32;
+        let names = if statement == GROUP {
+            names.split_whitespace().map(|name| self.number(name)).collect::<Result<_, _>>()?
+        } else if names.is_empty() {
+            Vec::new()
+        } else {
+            vec![self.number(names)?]
+        };
+        self.current[statement] = Names { first, names };
         Ok(())
     }
 
-    /// The section of the next triangles.
-    fn section(&mut self) -> &mut Section {
-        let first = self.triangles.len();
-        let last = self.sections.last().cloned().unwrap_or_default();
-        // Names without a triangle are forgotten.
-        if self.sections.last().is_none_or(|section| section.first < first) {
-            self.sections.push(Section { first, ..last });
+    /// Ends the triangles under the names of a kind. Ranges are as long as they can be, so that those of two
+    /// names are equal if their triangles are.
+    fn end(&mut self, statement: usize) {
+        let Names { first, names } = std::mem::take(&mut self.current[statement]);
+        let end = self.triangles.len() as u32;
+        for name in names.into_iter().filter(|_| first < end) {
+            let ranges = &mut self.ranges[name as usize][statement];
+            match ranges.last_mut() {
+                Some(last) if last.end >= first => last.end = end,
+                _ => ranges.push(first..end),
+            }
         }
-        self.sections.last_mut().expect("there is one")
     }
 
     fn number(&mut self, name: &str) -> Result<u32, String> {
@@ -327,6 +323,7 @@ impl ObjFile {
             return Err(format!("the mesh has more than {MAX_NAMES} names of objects, groups and materials"));
         }
         self.names.insert(name.to_owned(), number as u32);
+        self.ranges.push(<[_; 3]>::default());
         Ok(number as u32)
     }
 

@@ -267,8 +267,8 @@ impl Builder<'_> {
         }
         let item = format!("mesh `{}`", Shortened(file));
         let mesh = self.obj_file(file).and_then(|read| {
-            let materials = read.material_count();
-            if part.is_none() && materials > 1 {
+            let materials = if part.is_none() { read.material_count() } else { 0 };
+            if materials > 1 {
                 let message = format!("has {materials} materials, and all of it is one shape: with `part` a shape takes the triangles of one of them");
                 self.note_once(&item, message);
             }
@@ -281,7 +281,7 @@ impl Builder<'_> {
             }
             let mesh = match part {
                 Some(part) => read.part(part).map_err(|error| match error {
-                    PartError::Unknown => unknown("part", part, read.parts().count(), read.parts()),
+                    PartError::Unknown => unknown("part", part, read.parts().len(), read.parts()),
                     error @ PartError::SeveralKinds(_) => error.to_string(),
                 }),
                 None => Ok(read.mesh()),
