@@ -12,7 +12,7 @@ use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId
 use upbp_media::{BodyId, Homogeneous, Interior, MediumId, MediumStack};
 
 pub(crate) use self::enclosures::{Enclosures, Ends};
-pub(crate) use self::place::COINCIDENT;
+pub(crate) use self::place::{COINCIDENT, IN_PLANE};
 use self::place::largest_width_of_plane;
 use crate::camera::PerspectiveCamera;
 use crate::error::Problem;

@@ -72,7 +72,8 @@ pub(super) fn find(
         matches!(boundary(body), Boundary::Refracting(..))
             && !matched.iter().any(|(other, aabb)| *other > place && touch(own, *aabb))
     };
-    let is_in_surface = |body: &Body, end: Aabb| touch(aabb(body), end) && meets(geometry, body.shape, end);
+    let is_in_surface =
+        |body: &Body, end: Aabb| touch(aabb(body), end) && meets(geometry, body.shape, end, off(aabb(body)));
     let is_lens_in_surface: Vec<bool> = bodies.iter().map(|body| is_in_surface(body, lens)).collect();
     let is_lamp_in_surface: Vec<bool> = bodies
         .iter()
@@ -129,7 +130,7 @@ fn place(light: &Light) -> Place {
 /// Whether a box is all inside of a closed shape, and does not touch its surface.
 fn is_all_inside((min, max): Aabb, shape: &Shape) -> bool {
     let (low, high) = shape.aabb();
-    let off = OFF * low.abs().max(high.abs()).max_element();
+    let off = off((low, high));
     match shape {
         Shape::Sphere(sphere) => {
             let farthest = (min - sphere.centre()).abs().max((max - sphere.centre()).abs());
@@ -150,11 +151,14 @@ fn is_all_inside((min, max): Aabb, shape: &Shape) -> bool {
     }
 }
 
-/// Whether the surface of a shape meets a diagonal of a box, or almost: that of a plane does if it meets the
-/// box at all, unless it ends within.
-pub(super) fn meets(geometry: &SceneGeometry, shape: ShapeId, (min, max): Aabb) -> bool {
-    let (low, high) = geometry.shape(shape).aabb();
-    let off = Vec3::splat(OFF * low.abs().max(high.abs()).max_element());
+/// Distance by which starts of sub-paths may be off the surface of a shape in a box.
+fn off((min, max): Aabb) -> f32 {
+    OFF * min.abs().max(max.abs()).max_element()
+}
+
+/// Whether the surface of a shape meets a diagonal of a box that is wider by `off`, a distance above 0, on
+/// each side: that of a plane does if it meets the box at all, unless it ends within.
+pub(super) fn meets(geometry: &SceneGeometry, shape: ShapeId, (min, max): Aabb, off: f32) -> bool {
     let (middle, half) = (0.5 * (min + max), 0.5 * (max - min) + off);
     let signs = [Vec3::ONE, Vec3::new(-1.0, 1.0, 1.0), Vec3::new(1.0, -1.0, 1.0), Vec3::new(1.0, 1.0, -1.0)];
     signs.into_iter().map(|sign| half * sign).any(|corner| {

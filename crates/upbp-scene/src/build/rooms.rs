@@ -10,6 +10,7 @@ use super::enclosures::meets;
 use super::lights;
 use super::surfaces::SurfaceDraft;
 use crate::light::Light;
+use crate::scene::IN_PLANE;
 
 /// The shapes of a scene behind the hierarchies that tell which of them are around a point.
 #[derive(Clone, Copy)]
@@ -32,7 +33,12 @@ impl Places<'_> {
 
     /// Whether a point lies in the surface of a shape, as a lamp in a ceiling, but for rounding.
     fn is_on(&self, point: Vec3, index: usize) -> bool {
-        meets(self.geometry, ShapeId(index as u32), (point, point))
+        /// Part of the extent of a shape that is well inside of it: a lamp amid a small housing is not on it.
+        const INSIDE: f32 = 0.01;
+        let (min, max) = self.shape(index).aabb();
+        let largest = min.abs().max(max.abs()).max_element();
+        let off = (IN_PLANE * largest).min(INSIDE * (max - min).max_element());
+        meets(self.geometry, ShapeId(index as u32), (point, point), off)
     }
 
     /// Whether the front of a closed shape is that towards its inside, where its emission is then.
@@ -114,7 +120,7 @@ impl Builder<'_> {
         for (index, (description, light)) in self.description.lights.iter().zip(lights).enumerate() {
             let Some(position) = light.position() else { continue };
             for room in places.rooms_around(position) {
-                if !(rooms.contains(&room) || places.is_on(position, room)) {
+                if rooms.binary_search(&room).is_err() && !places.is_on(position, room) {
                     let message = self.message_of_room(room);
                     self.problem(lights::item(index, description), message);
                 }

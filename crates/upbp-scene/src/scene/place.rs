@@ -20,7 +20,7 @@ pub(crate) const COINCIDENT: f32 = 1.25 * RAY_OFFSET;
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 /// Distance behind an opaque surface at which a lamp is meant to be in its plane, relative to the largest
 /// coordinate of the place. Rays start from a lamp farther off than this, or its light would not get out.
-const IN_PLANE: f32 = 0.875 * RAY_OFFSET;
+pub(crate) const IN_PLANE: f32 = 0.875 * RAY_OFFSET;
 /// Roundings of a distance along a ray.
 const DISTANCE: f32 = 2.0 * f32::EPSILON;
 /// Least cosine between a ray and the normal: distances between surfaces grow along rays that graze them.
@@ -49,7 +49,7 @@ impl Plane {
 
     /// Whether another plane coincides: a ray that goes on from the nearer one starts `across` off it, and
     /// has passed the other. So faces that are turned away from each other, as those at the rim of a ball
-    /// are, or stand upright on each other, never do.
+    /// are, or stand upright on each other, do not, but where the ray meets their common edge.
     fn coincides(&self, other: &Self, ray: &Ray) -> bool {
         let between = (self.t - other.t).abs() - DISTANCE * self.t.max(other.t);
         let cosine = self.normal.dot(ray.direction).min(other.normal.dot(ray.direction));
@@ -185,7 +185,7 @@ impl ReadyScene {
             if !(before || behind) {
                 continue;
             }
-            let planes = self.planes(&ray.with_range(t - largest, t + largest));
+            let planes = self.planes(&ray.with_range((t - largest).max(ray.t_min), t + largest));
             let plane_of = |crossing: &Crossing| {
                 let is_its = |(body, plane): &&(BodyId, Plane)| {
                     *body == crossing.interior.body && plane.t == crossing.t

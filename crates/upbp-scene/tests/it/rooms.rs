@@ -80,6 +80,17 @@ fn a_lamp_in_a_face_of_a_closed_mesh_is_not_inside_of_it() {
 }
 
 #[test]
+fn a_lamp_in_a_small_housing_far_from_the_origin_is_inside_of_it() {
+    let ground = "geometry: Quad(origin: (-2000, -1, -2000), edge_u: (0, 0, 4000), edge_v: (4000, 0, 0))";
+    let housing =
+        format!("geometry: Sphere(centre: (1000, 1, 0), radius: 0.008)), (material: \"white\", {ground}");
+    let light = |y: f32| format!("Point(position: (1000, {y:?}, 0), intensity: 1)");
+    let inside = "light 1 (Point): lies inside of the opaque shape `room`, and the camera does not";
+    assert_eq!(verdict(&housing, &light(1.0)), Err(inside.to_owned()));
+    assert_eq!(verdict(&housing, &light(1.008)), Ok(Vec::new()));
+}
+
+#[test]
 fn a_dome_that_shines_outwards_is_told() {
     let dome = "geometry: Sphere(centre: (0, 0, 0), radius: 100), emission: 1";
     let outwards =
