@@ -5,6 +5,8 @@
 //! earlier. The second rule makes nested bodies work without any number: the inner one is smaller.
 
 use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::iter;
 
 use glam::Vec3;
 use upbp_accel::{BoxTree, GeometryError, SceneGeometry, Shape, ShapeId, offset_origin};
@@ -40,9 +42,10 @@ pub(super) fn rank(drafts: &[SurfaceDraft], geometry: &SceneGeometry) -> Result<
     for ((place, &(shape, inside)), priority) in drafts.iter().enumerate().zip(0..) {
         let ior = inside.ior.unwrap_or_else(|| {
             let centre = centre(geometry.shape(shape));
-            let mut lower = shapes_around(&boxes, centre, |other| other < place).into_iter().rev();
-            let surrounding =
-                lower.find(|other| surrounds(drafts[*other].0, geometry.shape(shape), geometry));
+            // Hardly more than the first is looked at: a heap is made faster than an order.
+            let mut lower = BinaryHeap::from(any_around(&boxes, centre, |other| other < place));
+            let surrounding = iter::from_fn(|| lower.pop())
+                .find(|other| surrounds(drafts[*other].0, geometry.shape(shape), geometry));
             surrounding.map_or(1.0, |other| bodies[other].interior.ior)
         });
         let interior = Interior { body: BodyId(place as u32), medium: inside.medium, priority, ior };
@@ -78,14 +81,20 @@ pub(super) fn touch((min, max): (Vec3, Vec3), (other_min, other_max): (Vec3, Vec
 
 /// Those of some shapes whose boxes hold a point, in their order: whatever lies inside of a shape has the
 /// centre of its box in that of the shape. In a scene of a million there is no time to ask each about each.
-pub(super) fn shapes_around(boxes: &BoxTree, point: Vec3, is_one: impl Fn(usize) -> bool) -> Vec<usize> {
+pub(super) fn shapes_around(boxes: &BoxTree, point: Vec3, is_one: impl FnMut(usize) -> bool) -> Vec<usize> {
+    let mut around = any_around(boxes, point, is_one);
+    around.sort_unstable();
+    around
+}
+
+/// As [`shapes_around`], in any order.
+fn any_around(boxes: &BoxTree, point: Vec3, mut is_one: impl FnMut(usize) -> bool) -> Vec<usize> {
     let mut around = Vec::new();
     boxes.for_each_around(point, |index| {
         if is_one(index) {
             around.push(index);
         }
     });
-    around.sort_unstable();
     around
 }
 
@@ -102,8 +111,9 @@ impl Builder<'_> {
         for (index, _) in drafts.iter().enumerate().filter(|(_, draft)| !draft.emission.is_black()) {
             let lamp = places.shape(index);
             let is_opaque = |outer: usize| drafts[outer].boundary.inside().is_none();
-            let is_around =
-                |outer: &usize| !rooms.contains(outer) && is_buried(lamp, ShapeId(*outer as u32), geometry);
+            let is_around = |outer: &usize| {
+                rooms.binary_search(outer).is_err() && is_buried(lamp, ShapeId(*outer as u32), geometry)
+            };
             let mut opaque = shapes_around(boxes, centre(lamp), is_opaque).into_iter();
             if let Some(outer) = opaque.find(is_around) {
                 self.problem(self.shape_item(index), self.message_of_room(outer));
@@ -113,17 +123,21 @@ impl Builder<'_> {
 
     /// Reports bodies that lie all inside of an opaque shape that the camera is not in, or of a body with a
     /// higher priority: they would be nowhere.
-    pub(super) fn check_bodies_count(&mut self, rooms: &[usize], places: Places<'_>) {
-        let Places { drafts, geometry, boxes } = places;
+    ///
+    /// # Errors
+    /// Shapes without finite bounds, or too many.
+    pub(super) fn check_bodies_count(
+        &mut self,
+        rooms: &[usize],
+        places: Places<'_>,
+    ) -> Result<(), GeometryError> {
+        let Places { drafts, geometry, .. } = places;
+        let inside = |index: usize| drafts[index].boundary.inside();
         let mut bodies = drafts_of_bodies(drafts);
-        let around = |id: ShapeId, is_one: &dyn Fn(usize) -> bool| {
-            let shape = geometry.shape(id);
-            let is_around = |outer| is_one(outer) && is_inside(shape, places.shape(outer));
-            shapes_around(boxes, centre(shape), is_around)
-        };
-        let is_opaque = |outer: usize| drafts[outer].boundary.inside().is_none() && !rooms.contains(&outer);
+        let is_opaque = |index: usize| inside(index).is_none() && rooms.binary_search(&index).is_err();
+        let opaque = Solids::of(places, is_opaque)?;
         for &(id, _) in &bodies {
-            if let Some(&outer) = around(id, &is_opaque).first() {
+            if let Some(&outer) = opaque.around(geometry.shape(id)).first() {
                 let outer = self.shape_item(outer);
                 let message = format!(
                     "lies inside of the opaque {outer}: it would be nowhere (a basin is made of quads)"
@@ -132,11 +146,13 @@ impl Builder<'_> {
             }
         }
         bodies.sort_by_key(|(_, inside)| inside.priority);
+        let Some((_, lowest)) = bodies.first() else { return Ok(()) };
+        let priority_of = |index: usize| inside(index).map(|inside| inside.priority);
+        let higher = Solids::of(places, |index| priority_of(index) > Some(lowest.priority))?;
         for &(id, Inside { priority, .. }) in &bodies {
-            let priority_of = |outer: usize| drafts[outer].boundary.inside().map(|inside| inside.priority);
-            let is_higher = |outer| priority_of(outer).is_some_and(|other| other > priority);
-            let outer = around(id, &is_higher).into_iter();
-            if let Some((other, outer)) = outer.map(|outer| (priority_of(outer).unwrap_or(0), outer)).min() {
+            let around = higher.around(geometry.shape(id)).into_iter();
+            let around = around.filter_map(|outer| Some((priority_of(outer)?, outer)));
+            if let Some((other, outer)) = around.filter(|(other, _)| *other > priority).min() {
                 let message = format!(
                     "lies inside of {}, whose priority {other} is higher than its own {priority}: it would be nowhere",
                     self.shape_item(outer)
@@ -144,6 +160,32 @@ impl Builder<'_> {
                 self.problem(self.shape_item(id.0 as usize), message);
             }
         }
+        Ok(())
+    }
+}
+
+/// Some of the spheres and boxes of a scene, which tell what is all inside of them.
+struct Solids<'a> {
+    places: Places<'a>,
+    /// Their numbers as shapes.
+    indices: Vec<usize>,
+    boxes: BoxTree,
+}
+
+impl<'a> Solids<'a> {
+    fn of(places: Places<'a>, is_one: impl Fn(usize) -> bool) -> Result<Self, GeometryError> {
+        let is_solid = |index: &usize| matches!(places.shape(*index), Shape::Sphere(_) | Shape::Box(_));
+        let indices = (0..places.drafts.len()).filter(|index| is_one(*index)).filter(is_solid);
+        let indices: Vec<usize> = indices.collect();
+        let boxes = BoxTree::new(indices.iter().map(|index| places.shape(*index).aabb()))?;
+        Ok(Self { places, indices, boxes })
+    }
+
+    /// Those that a shape is all inside of, in their order.
+    fn around(&self, shape: &Shape) -> Vec<usize> {
+        let is_around = |place: usize| is_inside(shape, self.places.shape(self.indices[place]));
+        let around = shapes_around(&self.boxes, centre(shape), is_around);
+        around.into_iter().map(|place| self.indices[place]).collect()
     }
 }
 

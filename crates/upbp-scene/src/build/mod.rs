@@ -136,7 +136,7 @@ impl Builder<'_> {
         let outside_medium = outside.and_then(|id| media.get(id.0 as usize));
         self.check_camera_is_lit(&rooms, places, &lights, &media, outside_medium);
         self.check_lights_are_free(&rooms, places, &lights);
-        self.check_bodies_count(&rooms, places);
+        self.check_bodies_count(&rooms, places).map_err(|error| self.problem("shapes", error)).ok()?;
         self.check_lamps_are_free(&rooms, places);
         self.note_media();
         self.note_without_effect(&drafts);
