@@ -12,8 +12,8 @@ use upbp_estimators::scene::{Boundary, BoundingSphere, Bsdf, Crossing, EmitterId
 use upbp_media::{BodyId, Homogeneous, Interior, MediumId, MediumStack};
 
 pub(crate) use self::enclosures::{Enclosures, Ends};
-pub(crate) use self::place::{COINCIDENT, IN_PLANE};
 use self::place::largest_width_of_plane;
+pub(crate) use self::place::{COINCIDENT, IN_PLANE, ROUNDING};
 use crate::camera::PerspectiveCamera;
 use crate::error::Problem;
 use crate::light::Light;
@@ -92,7 +92,7 @@ impl ReadyScene {
     }
 
     /// Notes about parts of the scene that can be rendered, but may not be meant: a medium that is nowhere, a
-    /// priority of an opaque shape, a mesh whose parts overlap, an image that is not twice as wide as high.
+    /// priority of an opaque shape, a mesh whose pieces overlap, an image that is not twice as wide as high.
     /// Beyond a thousand the last one says how many more there are.
     #[must_use]
     pub fn notes(&self) -> &[Problem] {

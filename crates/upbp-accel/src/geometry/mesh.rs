@@ -301,15 +301,15 @@ impl TriangleMesh {
         self.surface.border
     }
 
-    /// A point of each part of the mesh, amid its largest triangle, and the unit normal there. Parts have no
-    /// corner in common.
+    /// A point of each piece of the mesh, amid its largest triangle, and the unit normal there. Pieces have
+    /// no corner in common.
     ///
     /// Found when they are first asked for, once for all copies.
-    pub fn parts(&self) -> impl ExactSizeIterator<Item = (Vec3, Vec3)> {
+    pub fn pieces(&self) -> impl ExactSizeIterator<Item = (Vec3, Vec3)> {
         let centre = |&triangle: &u32| {
             (self.point(triangle, 1.0 / 3.0, 1.0 / 3.0).as_vec3(), self.geometric_normal(triangle))
         };
-        self.surface.parts().iter().map(centre)
+        self.surface.pieces().iter().map(centre)
     }
 
     /// Whether `point` lies inside; `None` for a mesh that is not closed.
@@ -328,8 +328,8 @@ impl TriangleMesh {
     /// only where it matters.
     ///
     /// The intersection test decides edges and corners consistently, so that any direction gives the right
-    /// parity; but for a point of the surface, which a ray does not cross where it starts: there two opposite
-    /// directions differ.
+    /// parity; but for a point of the surface, which a ray does not cross where it starts: amid a face two
+    /// opposite directions differ. At the edge of a dent both may go inside, and the point counts as inside.
     pub(super) fn contains_by(&self, point: Vec3, crossings: impl Fn(Ray) -> usize) -> Option<bool> {
         if !self.is_closed() {
             return None;
@@ -385,9 +385,9 @@ impl TriangleMesh {
         cross(self.corners(triangle))
     }
 
-    /// The unit normal of the plane of a triangle.
+    /// The unit normal of the plane of a triangle; zero for one that a copy has flattened.
     pub(super) fn geometric_normal(&self, triangle: u32) -> Vec3 {
-        self.across(triangle).normalize().as_vec3()
+        self.across(triangle).normalize_or_zero().as_vec3()
     }
 
     /// The interpolated normal, in the hemisphere of `geometric`.

@@ -69,7 +69,7 @@ impl SceneGeometry {
 
     /// Whether `point` lies strictly inside of a shape; `None` if the shape is not closed.
     ///
-    /// Costs a ray for a mesh, where [`Shape::contains`] tests all of its triangles.
+    /// Costs up to two rays for a mesh, where [`Shape::contains`] tests all of its triangles for each.
     ///
     /// # Panics
     /// If `id` does not belong to this scene.
@@ -212,7 +212,7 @@ impl SceneGeometry {
             Shape::Mesh(mesh) => {
                 let [b, c] = candidate.uv;
                 let across = mesh.across(candidate.primitive);
-                let geometric_normal = across.normalize().as_vec3();
+                let geometric_normal = across.normalize_or_zero().as_vec3();
                 SurfacePoint {
                     position: in_plane(mesh.point(candidate.primitive, b as f64, c as f64), across),
                     geometric_normal,

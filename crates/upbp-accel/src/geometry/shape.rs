@@ -69,7 +69,7 @@ impl Shape {
 
     /// Whether `point` lies strictly inside; `None` for a shape that is not closed.
     ///
-    /// Costs one test per triangle for a mesh.
+    /// Costs up to two tests per triangle for a mesh, if `point` lies in its box.
     #[must_use]
     pub fn contains(&self, point: Vec3) -> Option<bool> {
         match self {

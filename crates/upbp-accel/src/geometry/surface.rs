@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec3, Vec3};
 
 use super::model::Model;
-use super::topology::{Border, parts};
+use super::topology::{Border, pieces};
 use super::volume_sampling::Cells;
 
 /// Triangles in coordinates of their own.
@@ -30,7 +30,7 @@ struct Measures {
     areas: OnceLock<Areas>,
     signed_volume: OnceLock<f64>,
     normal_cone: OnceLock<Option<(Vec3, f32)>>,
-    parts: OnceLock<Vec<u32>>,
+    pieces: OnceLock<Vec<u32>>,
     model: OnceLock<Arc<Model>>,
     cells: OnceLock<Arc<Cells>>,
 }
@@ -134,9 +134,9 @@ impl Surface {
         *self.measures.normal_cone.get_or_init(|| normal_cone(|| self.each()))
     }
 
-    /// The largest triangle of each [part](super::TriangleMesh::parts).
-    pub(super) fn parts(&self) -> &[u32] {
-        self.measures.parts.get_or_init(|| parts(&self.positions, &self.triangles))
+    /// The largest triangle of each [piece](super::TriangleMesh::pieces).
+    pub(super) fn pieces(&self) -> &[u32] {
+        self.measures.pieces.get_or_init(|| pieces(&self.positions, &self.triangles))
     }
 
     /// The hierarchy over the triangles.

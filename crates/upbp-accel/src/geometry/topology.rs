@@ -1,4 +1,4 @@
-//! Edges at which a mesh is not closed, and parts of it that do not hang together.
+//! Edges at which a mesh is not closed, and pieces of it that do not hang together.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -98,9 +98,9 @@ impl Border {
     }
 }
 
-/// The largest triangle of each part: parts have no corner in common, equal positions counting as one.
-pub(super) fn parts(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
-    // Trees of vertices: above each is one at the same place or in the same part, above a root itself.
+/// The largest triangle of each piece: pieces have no corner in common, equal positions counting as one.
+pub(super) fn pieces(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
+    // Trees of vertices: above each is one at the same place or in the same piece, above a root itself.
     let mut above = places(positions);
     for &[a, b, c] in triangles {
         for other in [b, c] {
@@ -111,12 +111,12 @@ pub(super) fn parts(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut largest = BTreeMap::new();
     for (number, triangle) in triangles.iter().enumerate() {
         let area = cross(triangle.map(|vertex| positions[vertex as usize])).length();
-        let (most, part) = largest.entry(root(&mut above, triangle[0])).or_insert((0.0, 0));
+        let (most, piece) = largest.entry(root(&mut above, triangle[0])).or_insert((0.0, 0));
         if area > *most {
-            (*most, *part) = (area, number as u32);
+            (*most, *piece) = (area, number as u32);
         }
     }
-    largest.into_values().map(|(_, part)| part).collect()
+    largest.into_values().map(|(_, piece)| piece).collect()
 }
 
 /// The root of a vertex, which comes nearer to it.

@@ -216,7 +216,7 @@ fn only_meshes_without_a_border_are_closed() {
 }
 
 #[test]
-fn parts_share_no_corner() {
+fn pieces_share_no_corner() {
     let cubes =
         [(Vec3::ZERO, Vec3::ONE), (Vec3::splat(2.0), Vec3::splat(4.0)), (Vec3::splat(9.0), Vec3::splat(9.5))];
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
@@ -233,15 +233,15 @@ fn parts_share_no_corner() {
         (mesh.placed(&moved).unwrap(), Vec3::X),
         (mesh.transformed(&moved).unwrap(), Vec3::X),
     ] {
-        let parts: Vec<_> = mesh.parts().collect();
-        assert_eq!(parts.len(), cubes.len());
+        let pieces: Vec<_> = mesh.pieces().collect();
+        assert_eq!(pieces.len(), cubes.len());
         for (min, max) in cubes {
             let inside = |(point, normal): &&(Vec3, Vec3)| {
                 let (behind, front) = (point - normal * 0.01, point + normal * 0.01);
                 let holds = |p: Vec3| (min + by).cmple(p).all() && p.cmple(max + by).all();
                 holds(behind) && !holds(front)
             };
-            assert_eq!(parts.iter().filter(inside).count(), 1, "{parts:?}");
+            assert_eq!(pieces.iter().filter(inside).count(), 1, "{pieces:?}");
         }
     }
 }

@@ -141,7 +141,8 @@ impl Builder<'_> {
         self.note_media();
         self.note_without_effect(&drafts);
         self.note_light_from_below();
-        self.note_parts(places, origin);
+        self.note_pieces(places, origin);
+        self.note_flattened_triangles(places);
         self.note_thin_bodies(places, origin);
         self.note_quads_in_planes(places);
         let bodies = bodies::rank(&drafts, &geometry).map_err(|error| self.problem("shapes", error)).ok()?;

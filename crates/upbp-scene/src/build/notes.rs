@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use upbp_accel::{Shape, ShapeId, TriangleMesh, offset_origin};
 
 use super::builder::Builder;
@@ -12,7 +12,10 @@ use super::surfaces::{BoundaryDraft, SurfaceDraft};
 use crate::description::{Camera, Geometry, Light, Medium, Positive};
 use crate::error::Shortened;
 use crate::light::EnvironmentImage;
-use crate::scene::COINCIDENT;
+use crate::scene::{COINCIDENT, ROUNDING};
+
+/// Largest coordinate over the extent of a mesh from which on it is far away.
+const FAR: f32 = 10.0;
 
 impl Builder<'_> {
     /// Notes something about a part of the scene.
@@ -74,17 +77,26 @@ impl Builder<'_> {
                 }
                 _ => thickness(),
             };
-            (thickness < COINCIDENT * largest).then_some((index, thickness, largest))
+            let rounded = match shape {
+                // Across its wide faces: the largest triangle is in one of these.
+                Shape::Mesh(mesh) if thickness < ROUNDING * mesh.most_rounded().length() => {
+                    let largest = mesh.pieces().next();
+                    largest.map_or(0.0, |(_, normal)| mesh.most_rounded().dot(normal.abs()))
+                }
+                _ => 0.0,
+            };
+            let across = (COINCIDENT * largest).max(ROUNDING * rounded);
+            (thickness < across).then_some((index, [thickness, across, largest]))
         };
         let thin: Vec<_> = (0..places.drafts.len()).filter_map(is_thin).collect();
-        if let [(index, thickness, largest), others @ ..] = &thin[..] {
-            let message = too_thin(*thickness, *largest, origin) + &and_others(others.len(), ["is", "are"]);
+        if let [(index, sizes), others @ ..] = &thin[..] {
+            let message = too_thin(*sizes, origin) + &and_others(others.len(), ["is", "are"]);
             self.note(self.shape_item(*index), message);
         }
     }
 
-    /// Notes light from infinitely far away that comes from below. What is upright in the image tells where
-    /// that is, as long as it is about +y or -y: in a view from above it may be any direction.
+    /// Notes light from infinitely far away that comes from below. What is upright in the image tells whether
+    /// that is -y or +y, unless it is nearer to another axis, as in a view from above.
     pub(super) fn note_light_from_below(&mut self) {
         let description = self.description;
         let Camera::Perspective { up, .. } = &description.camera;
@@ -94,7 +106,7 @@ impl Builder<'_> {
         }
         for (index, light) in description.lights.iter().enumerate() {
             if let Light::Sun { direction, .. } | Light::Directional { direction, .. } = light
-                && direction.get().dot(up) > 0.0
+                && direction.get().y * up.y > 0.0
             {
                 self.note(
                     lights::item(index, light),
@@ -107,8 +119,6 @@ impl Builder<'_> {
     /// Notes a mesh file far from its origin many of whose triangles have no area: rounding may have taken
     /// it. Near the origin triangles without area are those at the poles of turned meshes.
     pub(super) fn note_dropped_triangles(&mut self, item: &str, mesh: &TriangleMesh) {
-        /// Largest coordinate over the extent of a mesh that is far away.
-        const FAR: f32 = 10.0;
         let dropped = mesh.dropped_triangles();
         let count = dropped + mesh.triangle_count() as usize;
         let (min, max) = mesh.aabb();
@@ -119,6 +129,37 @@ impl Builder<'_> {
                  its origin before it is written"
             );
             self.note_once(item, message);
+        }
+    }
+
+    /// Notes meshes many of whose triangles have lost their area by rounding where they have been placed.
+    pub(super) fn note_flattened_triangles(&mut self, places: Places<'_>) {
+        /// Triangles of a mesh that are looked at, evenly spaced: there may be very many copies.
+        const MOST: u32 = 256;
+        let flattened = |index: usize| {
+            let Shape::Mesh(mesh) = places.shape(index) else { return None };
+            let (min, max) = mesh.aabb();
+            let largest = mesh.most_rounded().max_element();
+            if largest <= FAR * (max - min).max_element() {
+                return None;
+            }
+            let step = mesh.triangle_count().div_ceil(MOST);
+            let triangles = (0..mesh.triangle_count()).step_by(step as usize);
+            let is_flat = |triangle: &u32| {
+                let [a, b, c] = mesh.corners(*triangle).map(Vec3::as_dvec3);
+                (b - a).cross(c - a) == DVec3::ZERO
+            };
+            let (count, flat) = (triangles.len(), triangles.filter(is_flat).count());
+            (100 * flat > count).then_some((index, 100 * flat / count, largest))
+        };
+        let flattened: Vec<_> = (0..places.drafts.len()).filter_map(flattened).collect();
+        if let [(index, percent, largest), others @ ..] = &flattened[..] {
+            let message = format!(
+                "about {percent} % of its triangles have no area at coordinates up to {largest}: move the \
+                 scene near its origin{}",
+                and_others(others.len(), ["does", "do"])
+            );
+            self.note(self.shape_item(*index), message);
         }
     }
 
@@ -169,10 +210,10 @@ impl Builder<'_> {
         }
     }
 
-    /// Notes bodies of several parts of which one has its inside in front of it: nothing that is met there
+    /// Notes bodies of several pieces of which one has its inside in front of it: nothing that is met there
     /// agrees with what is inside of what. `origin` is the point that has become the origin.
-    pub(super) fn note_parts(&mut self, places: Places<'_>, origin: Vec3) {
-        /// Parts of a mesh that are looked at, evenly spaced: each takes a ray through it.
+    pub(super) fn note_pieces(&mut self, places: Places<'_>, origin: Vec3) {
+        /// Pieces of a mesh that are looked at, evenly spaced: each takes up to two rays through it.
         const MOST: usize = 1000;
         let mut known = BTreeSet::new();
         for (index, draft) in places.drafts.iter().enumerate() {
@@ -181,20 +222,20 @@ impl Builder<'_> {
             };
             // Of copies one is enough.
             let is_copy = is_known_mesh(&self.description.shapes[index].geometry, &mut known);
-            if is_copy || mesh.parts().len() < 2 {
+            if is_copy || mesh.pieces().len() < 2 {
                 continue;
             }
             let has_inside_in_front = |&(point, normal): &(Vec3, Vec3)| {
                 let front = offset_origin(point, normal, normal);
                 places.geometry.contains(ShapeId(index as u32), front) == Some(true)
             };
-            let step = mesh.parts().len().div_ceil(MOST);
-            if let Some((point, _)) = mesh.parts().step_by(step).find(has_inside_in_front) {
+            let step = mesh.pieces().len().div_ceil(MOST);
+            if let Some((point, _)) = mesh.pieces().step_by(step).find(has_inside_in_front) {
                 self.note(
                     self.shape_item(index),
                     format!(
-                        "the part of the mesh at {} is wound the wrong way round or overlaps another part: give each \
-                         body a shape of its own, and let normals point out of it, into the hollows of it too",
+                        "the piece of the mesh at {} is wound the wrong way round or overlaps another piece: give \
+                         each body a shape of its own, and let normals point out of it, into the hollows of it too",
                         point + origin
                     ),
                 );
@@ -211,12 +252,13 @@ fn is_known_mesh<'a>(geometry: &'a Geometry, known: &mut BTreeSet<(&'a str, Opti
     }
 }
 
-/// The note about what is too thin for its coordinates, from the point that has become the origin.
-pub(super) fn too_thin(thickness: f32, largest: f32, origin: Vec3) -> String {
+/// The note about what is too thin: its thickness, the distance up to which surfaces are met as one, and the
+/// largest coordinate there, from the point that has become the origin.
+pub(super) fn too_thin([thickness, across, largest]: [f32; 3], origin: Vec3) -> String {
     let from = if origin == Vec3::ZERO { String::new() } else { format!(" from {origin}") };
     format!(
-        "is {thickness} thick, and is not seen at coordinates up to {largest}{from}: surfaces that are nearer \
-         to each other than 5e-6 of their coordinates are met as one"
+        "is {thickness} thick, and is not seen at coordinates up to {largest}{from}: surfaces nearer to each \
+         other than {across} are met as one there"
     )
 }
 

@@ -16,6 +16,9 @@ use crate::scene::{Body, COINCIDENT};
 /// Pairs of shapes that are looked at: in a scene of more there are no notes about the others.
 const MOST_PAIRS: usize = 1 << 20;
 
+/// Pairs of a mesh and another shape for which rays tell whether they cross, up to 96 each.
+const MOST_PAIRS_BY_RAYS: usize = 1 << 14;
+
 /// Distance between what is meant to be in one place, relative to the largest coordinate there.
 const ROUNDING: f32 = 2.0 * f32::EPSILON;
 
@@ -30,8 +33,10 @@ impl Builder<'_> {
             if !(matches!(quad, Shape::Quad(_)) && is_opaque(index) && draft.emission.is_black()) {
                 continue;
             }
-            let before = shapes_around(boxes, centre(quad), |other| other < index && is_opaque(other));
-            left = left.saturating_sub(1 + before.len());
+            let before = shapes_around(boxes, centre(quad), |other| {
+                left = left.saturating_sub(1);
+                other < index && is_opaque(other)
+            });
             if left == 0 {
                 break;
             }
@@ -64,8 +69,10 @@ impl Builder<'_> {
         for number in (0..bodies.len()).filter(|number| is_refracting(*number)) {
             let inner = &bodies[number];
             let shape = places.geometry.shape(inner.shape);
-            let lower = shapes_around(boxes, centre(shape), |other| other < number);
-            left = left.saturating_sub(1 + lower.len());
+            let lower = shapes_around(boxes, centre(shape), |other| {
+                left = left.saturating_sub(1);
+                other < number
+            });
             if left == 0 {
                 break;
             }
@@ -81,9 +88,10 @@ impl Builder<'_> {
             let around = places.geometry.shape(outer.shape);
             let (min, max) = around.aabb();
             let largest = min.abs().max(max.abs()).max_element();
-            let is_lost = |wall: &f32| (ROUNDING * largest..COINCIDENT * largest).contains(wall);
+            let across = COINCIDENT * largest;
+            let is_lost = |wall: &f32| (ROUNDING * largest..across).contains(wall);
             if let Some(wall) = walls(shape, around).into_iter().filter(is_lost).reduce(f32::min) {
-                thin.push((inner.shape, outer.shape, wall, largest));
+                thin.push((inner.shape, outer.shape, [wall, across, largest]));
             }
         }
         let item = |id: ShapeId| self.shape_item(id.0 as usize);
@@ -96,11 +104,11 @@ impl Builder<'_> {
             );
             (item(*inner), message)
         });
-        let thin = thin.split_first().map(|((inner, outer, wall, largest), others)| {
+        let thin = thin.split_first().map(|((inner, outer, sizes), others)| {
             let message = format!(
                 "the wall of {} around it {}{}",
                 item(*outer),
-                too_thin(*wall, *largest, origin),
+                too_thin(*sizes, origin),
                 and_others(others.len(), ["is", "are"])
             );
             (item(*inner), message)
@@ -118,12 +126,17 @@ impl Builder<'_> {
         if refracting.len().saturating_mul(matched.len()) > MOST_PAIRS {
             return;
         }
-        let aabb = |body: &Body| places.geometry.shape(body.shape).aabb();
-        let covered = |fog: &Body| {
+        let shape = |body: &Body| places.geometry.shape(body.shape);
+        let mut left = MOST_PAIRS_BY_RAYS;
+        let mut covered = |fog: &Body| {
             refracting.iter().copied().find(|water| {
-                water.interior.priority < fog.interior.priority
-                    && touch(aabb(water), aabb(fog))
-                    && crosses(fog.shape, water.shape, places.geometry)
+                let may_cross = water.interior.priority < fog.interior.priority
+                    && touch(shape(water).aabb(), shape(fog).aabb());
+                if may_cross && [shape(water), shape(fog)].iter().any(|shape| matches!(shape, Shape::Mesh(_)))
+                {
+                    left = left.saturating_sub(1);
+                }
+                may_cross && left > 0 && crosses(fog.shape, water.shape, places.geometry)
             })
         };
         let found: Vec<_> =
@@ -133,7 +146,7 @@ impl Builder<'_> {
                 "reaches out of {} and counts more, so that the surface of that is not seen inside of it: fog \
                  over water has `priority: -1`{}",
                 self.shape_item(water.0 as usize),
-                and_others(others.len(), ["do", "do"])
+                and_others(others.len(), ["does", "do"])
             );
             self.note(self.shape_item(fog.0 as usize), message);
         }

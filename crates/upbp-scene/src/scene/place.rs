@@ -17,7 +17,7 @@ use crate::material::Material;
 pub(crate) const COINCIDENT: f32 = 1.25 * RAY_OFFSET;
 /// Distance between planes of triangles that are meant to coincide, relative to what is rounded for their
 /// corners across the planes. It counts where the plane passes near the origin, far from the corners.
-const ROUNDING: f32 = 4.0 * f32::EPSILON;
+pub(crate) const ROUNDING: f32 = 4.0 * f32::EPSILON;
 /// Distance behind an opaque surface at which a lamp is meant to be in its plane, relative to the largest
 /// coordinate of the place. Rays start from a lamp farther off than this, or its light would not get out.
 pub(crate) const IN_PLANE: f32 = 0.875 * RAY_OFFSET;

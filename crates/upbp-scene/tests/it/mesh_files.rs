@@ -1,4 +1,4 @@
-//! Mesh files of several parts: those that shapes take, and those whose insides contradict each other.
+//! Mesh files of several parts, and meshes of several pieces whose insides contradict each other.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -110,18 +110,20 @@ fn smoothing_groups_without_normals_are_noted_once() {
     assert!(folder.notes(&[smooth("a"), smooth("b")].join(", ")).is_empty());
 }
 
-/// At 500 km from the origin, coordinates are no finer than 1/32.
+/// A strip of 198 triangles from x = `offset` on. At 500 km from the origin, coordinates are no finer than
+/// 1/32.
+fn strip(offset: f64, step: f64) -> String {
+    let mut text = String::new();
+    for i in 0..100 {
+        let x = offset + step * f64::from(i);
+        writeln!(text, "v {x} 0 0\nv {x} 0 1").unwrap();
+    }
+    (1..199).for_each(|i| writeln!(text, "f {i} {} {}", i + 1, i + 2).unwrap());
+    text
+}
+
 #[test]
 fn triangles_that_coordinates_have_flattened_are_noted() {
-    let strip = |offset: f64, step: f64| {
-        let mut text = String::new();
-        for i in 0..100 {
-            let x = offset + step * f64::from(i);
-            writeln!(text, "v {x} 0 0\nv {x} 0 1").unwrap();
-        }
-        (1..199).for_each(|i| writeln!(text, "f {i} {} {}", i + 1, i + 2).unwrap());
-        text
-    };
     let shape = "(geometry: Mesh(file: \"m.obj\"), material: \"white\")";
     let notes = |offset: f64, step: f64| Folder::with("flattened", &strip(offset, step)).notes(shape);
     assert!(notes(0.0, 0.01).is_empty());
@@ -129,6 +131,24 @@ fn triangles_that_coordinates_have_flattened_are_noted() {
     let [note] = &notes(5e5, 0.02)[..] else { panic!("one note") };
     assert!(note.starts_with("mesh `m.obj`: ") && note.contains(" of 198 triangles have no area"), "{note}");
     assert!(note.ends_with("up to 500001.97: move the mesh near its origin before it is written"), "{note}");
+}
+
+#[test]
+fn triangles_that_their_place_has_flattened_are_noted() {
+    let folder = |step: f64| Folder::with("placed", &strip(0.0, step));
+    let far = |name: &str| {
+        format!(
+            "(name: \"{name}\", geometry: Mesh(file: \"m.obj\", translate: (5e5, 0, 0)), material: \"white\"),"
+        )
+    };
+    assert!(folder(0.0625).notes(&far("a")).is_empty());
+    let [note] = &folder(0.02).notes(&(far("a") + &far("b")))[..] else { panic!("one note") };
+    assert!(
+        note.starts_with("shape `a`: about ") && note.contains(" % of its triangles have no area"),
+        "{note}"
+    );
+    let end = "at coordinates up to 500001.97: move the scene near its origin (and so does 1 other)";
+    assert!(note.ends_with(end), "{note}");
 }
 
 /// A cylinder without normals in a file and in the scene.
@@ -219,16 +239,16 @@ fn hollows_that_are_wound_the_wrong_way_round_are_noted() {
     let wrong = Folder::with("wrong", &(wall.clone() + &cube("inner", 0.9, false, 1)));
     let notes = wrong.notes(&(glass.to_owned() + copy));
     let [note] = &notes[..] else { panic!("{notes:?}") };
-    assert!(note.starts_with("shape `bulb`: the part of the mesh at ["), "{note}");
+    assert!(note.starts_with("shape `bulb`: the piece of the mesh at ["), "{note}");
     // Opaque walls have no inside.
     let opaque = glass.replace("\"glass", "\"white");
     assert!(wrong.notes(&opaque).is_empty());
     assert_eq!(wrong.notes(&(opaque + copy)).len(), 1);
-    // Coordinates have few digits there.
-    let far = glass.replace("m.obj\"", "m.obj\", translate: (3e5, 0, 0)");
+    // Coordinates have few digits there, but enough for the wall.
+    let far = glass.replace("m.obj\"", "m.obj\", translate: (1.5e5, 0, 0)");
     assert!(hollow.notes(&far).is_empty());
     let [note] = &wrong.notes(&far)[..] else { panic!("far away") };
-    assert!(note.starts_with("shape `bulb`: the part of the mesh at [3"), "{note}");
+    assert!(note.starts_with("shape `bulb`: the piece of the mesh at [1"), "{note}");
     // As bodies of their own both are right.
     let parts = glass.replace("m.obj\"", "m.obj\", part: \"outer\"")
         + &copy.replace("m.obj\"", "m.obj\", part: \"inner\"");

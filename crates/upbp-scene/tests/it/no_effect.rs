@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::fs;
 
+use glam::Vec3;
 use upbp_scene::ReadyScene;
 
 /// The notes about a scene with a lens and shapes like these.
@@ -59,6 +60,10 @@ fn light_from_below_is_noted() {
     );
     let directional = up.replace("Sun", "Directional");
     assert_eq!(notes("(0, 1, 0)", &directional, &ball).len(), 1);
+    // In a pitched view what is below is along -y as well.
+    let pitched = "Sun(direction: (0, -0.4, -0.92), irradiance: 3)";
+    assert!(notes("(0, 0.87, -0.5)", pitched, &ball).is_empty());
+    assert_eq!(notes("(0, 0.87, -0.5)", &pitched.replace("-0.4", "0.1"), &ball).len(), 1);
     // There +z may be up, or the view from above.
     assert!(notes("(0, 0.5, 1)", &up, &ball).is_empty());
     assert_eq!(notes("(0, -1, 0)", down, &ball).len(), 1);
@@ -86,6 +91,31 @@ fn bodies_too_thin_to_be_seen_are_noted() {
         found[0].contains("coordinates up to 1001") && found[0].ends_with("(and so is 1 other)"),
         "{found:?}"
     );
+}
+
+/// Near the origin they are as coarse as they were at their old place, across it.
+#[test]
+fn panes_that_were_too_thin_before_they_were_moved_are_noted() {
+    let pane = |x: f32, size: [f32; 3], place: &str| {
+        let corner = |i: u32| {
+            Vec3::new(x, 0.0, 0.0)
+                + Vec3::from([i & 1, i >> 1 & 1, i >> 2].map(|i| i as f32)) * Vec3::from(size)
+        };
+        let position = |Vec3 { x, y, z }: Vec3| format!("({x:?}, {y:?}, {z:?}),");
+        let positions: String = (0..8).map(corner).map(position).collect();
+        format!(
+            "(name: \"pane\", material: \"glass\", geometry: Mesh(positions: [{positions}],
+              indices: [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3),
+                (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)] {place})),"
+        ) + &ball(3, "white", "")
+    };
+    let moved = |size| notes("", &pane(1e4, size, ", translate: (-10000, 0, 0)"));
+    let [note] = &moved([0.006, 1.0, 1.0])[..] else { panic!("one note") };
+    assert!(note.starts_with("shape `pane`: is 0.0057"), "{note}");
+    assert!(note.contains("surfaces nearer to each other than 0.0095"), "{note}");
+    // Thick enough, or seen from another side.
+    assert!(moved([0.011, 1.0, 1.0]).is_empty());
+    assert!(moved([1.0, 1.0, 0.006]).is_empty());
 }
 
 #[test]

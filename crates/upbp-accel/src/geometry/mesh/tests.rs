@@ -255,3 +255,13 @@ fn coordinates_that_are_moved_are_as_coarse_as_before() {
         assert_eq!((moved.bounds.1, moved.most_rounded()), (Vec3::new(1.0, 1.0, 0.0), rounded));
     }
 }
+
+#[test]
+fn triangles_that_a_copy_has_flattened_have_no_normal() {
+    let positions = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let positions = positions.into_iter().chain(positions.map(|corner| 1e-4 * corner - Vec3::X)).collect();
+    let mesh = TriangleMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]], None).unwrap();
+    let far = mesh.placed(&Affine3A::from_translation(Vec3::splat(1e5))).unwrap();
+    let normals = |mesh: &TriangleMesh| mesh.pieces().map(|(_, normal)| normal).collect::<Vec<_>>();
+    assert_eq!((normals(&mesh), normals(&far)), (vec![Vec3::Z; 2], vec![Vec3::Z, Vec3::ZERO]));
+}
