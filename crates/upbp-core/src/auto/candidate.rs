@@ -23,6 +23,9 @@ const BEAM_PATH_FACTORS: [f64; 3] = [0.25, 1.0, 4.0];
 /// Factors of emission hits, next events and connections in the weights: photons and beams tell less than as
 /// many independent samples would, by how much depends on what they share.
 const CAMERA_FACTORS: [f32; 3] = [1.0, 2.0, 4.0];
+/// Width of beams in a pilot render over that of candidates, and by which part there are as many: pairs of
+/// pixels that share a beam, the evidence of rays in a picture, are more the wider beams are.
+const WIDER_BEAMS: u32 = 4;
 /// Period of queries that only some pixels make.
 const PERIOD: NonZeroU32 = NonZeroU32::new(8).unwrap();
 /// Factor by which an iteration may take longer with the safeguard.
@@ -31,11 +34,15 @@ const SAFEGUARD_OVERHEAD: f64 = 1.05;
 /// All plans that may be chosen: whatever settings do not fix.
 #[derive(Clone, Debug)]
 pub(super) struct Candidates {
-    /// All techniques, a light sub-path per pixel if there is room, the widest radius: what pilot renders
-    /// run, since they can tell what less of anything, or more light sub-paths, would do.
+    /// All techniques, a light sub-path per pixel if there is room, the widest radii: what pilot renders run,
+    /// since they can tell what less of anything, or more light sub-paths, would do.
     pub(super) full: Plan,
+    /// Beams, and the radius of them, that the full plan has where it is no pilot render.
+    usual_beams: (u32, f32),
     /// Techniques that stay on: some paths may have no other.
     always: TechniqueSet,
+    /// Techniques of which one stays on at least: each finds the same paths, which may have no other.
+    any_of: TechniqueSet,
     /// Techniques that a plan with light sub-paths has at least in some pixels: there may be light that a
     /// pilot render misses.
     safeguard: TechniqueSet,
@@ -71,9 +78,12 @@ impl Candidates {
             counts(full.beam_paths, &BEAM_PATH_FACTORS, is_fixed, &|count| is_room([longest, count]));
         let usual = full.radii.surf;
         let widest = if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };
+        let needed = if support.needs_merges { full.techniques } else { TechniqueSet::EMPTY };
         let mut candidates = Self {
             full: Plan { roulette: settings.roulette.unwrap_or(roulette::OF_PILOT), ..full },
-            always: if support.needs_merges { finds_all(full.techniques) } else { TechniqueSet::EMPTY },
+            usual_beams: (full.beam_paths, full.radii.bb1d),
+            always: needed.intersection(TechniqueSet::only(Technique::Surf)),
+            any_of: needed.intersection(TechniqueSet::VOLUME_MERGES),
             safeguard: if scene.scene.has_specular_surfaces() {
                 full.techniques.intersection(TechniqueSet::only(Technique::Surf))
             } else {
@@ -85,24 +95,36 @@ impl Candidates {
             roulettes: settings.roulette.map_or_else(|| roulette::all().to_vec(), |own| vec![own]),
         };
         candidates.full.radii.surf = widest;
+        let wider = WIDER_BEAMS as f32 * full.radii.bb1d;
+        if !is_fixed
+            && settings.radii.bb1d == Radius::Auto
+            && wider <= full.radii.field.largest_radius().min(LARGEST_RADIUS)
+        {
+            candidates.full.radii.bb1d = wider;
+            candidates.full.beam_paths = full.beam_paths.div_ceil(WIDER_BEAMS);
+        }
         candidates
     }
 
-    /// The full plan with the usual radius: what runs if there is no time for a choice.
+    /// The full plan with the usual radii: what runs if there is no time for a choice.
     pub(super) fn usual(&self) -> Plan {
         let mut plan = self.full;
         plan.radii.surf = self.surf_radii[0];
+        (plan.beam_paths, plan.radii.bb1d) = self.usual_beams;
         plan
     }
 
     /// Plans to begin with, the simplest first: camera sub-paths alone, paths alone, everything.
     pub(super) fn starts(&self) -> [Plan; 3] {
         let everything = self.with_techniques(self.full.techniques);
-        let with = |set: TechniqueSet| self.with_techniques(set.union(self.always));
+        let fast = [Technique::Pb2d, Technique::Pp3d, Technique::Bb1d, Technique::Bp2d];
+        let one = fast.into_iter().find(|technique| self.any_of.has(*technique));
+        let least = one.map_or(self.always, |technique| self.always.with(technique));
+        let with = |set: TechniqueSet| self.with_techniques(set.union(least));
         // What stays on only for the sake of paths that were not seen is to cost little.
         let camera = Plan { light_paths: self.light_paths[0], ..with(TechniqueSet::PT) };
         let mut paths = with(TechniqueSet::BPT.union(self.safeguard));
-        for technique in self.safeguard.without(self.always).iter() {
+        for technique in self.safeguard.without(least).iter() {
             paths = with_period(paths, technique, PERIOD);
         }
         [camera, paths, everything].map(|plan| self.possible(plan))
@@ -127,9 +149,9 @@ impl Candidates {
             if technique.merges() {
                 steps.push(Plan { techniques, ..with_period(always, technique, PERIOD) });
             }
-            if !self.always.has(technique) {
-                let alone = TechniqueSet::only(technique);
-                steps.push(Plan { techniques: always.techniques.without(alone), ..always });
+            let without = Plan { techniques: techniques.without(TechniqueSet::only(technique)), ..always };
+            if self.has_enough(without.techniques) {
+                steps.push(without);
             }
         }
         steps.extend(self.light_paths(from));
@@ -141,6 +163,12 @@ impl Candidates {
         }
         steps.extend(self.roulettes.iter().map(|&roulette| Plan { roulette, ..*from }));
         steps.into_iter().map(|step| self.possible(step)).filter(|step| step != from).collect()
+    }
+
+    /// Whether no technique is missing that has to stay on.
+    fn has_enough(&self, techniques: TechniqueSet) -> bool {
+        let any = self.any_of.is_empty() || techniques.intersects(self.any_of);
+        any && self.always.without(techniques).is_empty()
     }
 
     /// A plan with each camera factor, if it has light sub-paths.
@@ -217,14 +245,6 @@ fn widest(usual: f32, statistics: &Statistics) -> f32 {
     if footprint >= LEAST * usual { footprint.min(MOST * usual) } else { usual }
 }
 
-/// Merges that find every path with a vertex where anything but specular surfaces scatters: those on
-/// surfaces, and one kind of those in media.
-fn finds_all(techniques: TechniqueSet) -> TechniqueSet {
-    let volume = [Technique::Pb2d, Technique::Pp3d, Technique::Bb1d, Technique::Bp2d];
-    let one = volume.into_iter().find(|technique| techniques.has(*technique));
-    one.into_iter().chain([Technique::Surf]).collect::<TechniqueSet>().intersection(techniques)
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::VecDeque;
@@ -232,8 +252,8 @@ mod tests {
     use super::*;
     use crate::plan::tests::plan;
 
-    #[test]
-    fn beams_come_from_light_sub_paths() {
+    /// Candidates beside a full plan of all techniques.
+    fn candidates() -> Candidates {
         let full = Plan {
             techniques: TechniqueSet::ALL,
             light_paths: 1600,
@@ -242,15 +262,42 @@ mod tests {
             periods: MergePeriods::ONE,
             ..plan()
         };
-        let candidates = Candidates {
+        Candidates {
             full,
+            usual_beams: (full.beam_paths, full.radii.bb1d),
             always: TechniqueSet::EMPTY,
+            any_of: TechniqueSet::EMPTY,
             safeguard: TechniqueSet::EMPTY,
             light_paths: vec![100, 400, 1600],
             beam_paths: vec![200, 800],
             surf_radii: vec![full.radii.surf],
             roulettes: vec![roulette::OF_PILOT],
-        };
+        }
+    }
+
+    #[test]
+    fn any_merges_in_media_may_be_those_that_stay() {
+        let surf = TechniqueSet::only(Technique::Surf);
+        let candidates = Candidates { always: surf, any_of: TechniqueSet::VOLUME_MERGES, ..candidates() };
+        let mut found: Vec<TechniqueSet> = Vec::new();
+        let mut next: Vec<Plan> = candidates.starts().to_vec();
+        while let Some(from) = next.pop() {
+            if found.contains(&from.techniques) {
+                continue;
+            }
+            assert!(from.techniques.has(Technique::Surf), "{}", from.techniques);
+            assert!(from.techniques.intersects(TechniqueSet::VOLUME_MERGES), "{}", from.techniques);
+            found.push(from.techniques);
+            next.extend(candidates.steps(&from));
+        }
+        for one in TechniqueSet::VOLUME_MERGES.iter() {
+            assert!(found.contains(&TechniqueSet::BPT.union(surf).with(one)), "{one:?}");
+        }
+    }
+
+    #[test]
+    fn beams_come_from_light_sub_paths() {
+        let candidates = candidates();
         let mut found = candidates.starts().to_vec();
         let mut next = VecDeque::from(found.clone());
         let mut fewer = 0;

@@ -27,8 +27,15 @@ const LIGHT_TIME: f64 = 0.05;
 const CROWD: f64 = 1024.0;
 
 /// Largest automatic first radius, relative to the [size](Planner::size) of what the picture shows.
+///
+/// Beams are narrow and many, since they cost a query only where it meets them: half as wide and twice as many
+/// leave as much noise in a pixel, and half of what neighbours have in common.
 const fn largest_radius(technique: Technique) -> f32 {
-    if matches!(technique, Technique::Pp3d) { 5e-3 } else { 3e-3 }
+    match technique {
+        Technique::Pp3d => 5e-3,
+        Technique::Bb1d => 7.5e-4,
+        _ => 3e-3,
+    }
 }
 
 /// Photons or beams within an automatic first kernel, mean over queries.
@@ -63,7 +70,7 @@ impl<S: Scene> Planner<'_, '_, S> {
             LightPaths::Auto => (self.in_time(budget).min(self.crowding()) as u32).clamp(1, pixels),
         };
         let wanted_beams =
-            settings.beams.unwrap_or_else(|| self.enough_beams().min(wanted / 10).max(1)).min(wanted).max(1);
+            settings.beams.unwrap_or_else(|| self.enough_beams().min(wanted / 3).max(1)).min(wanted).max(1);
         self.plan_with(room.limited::<S>([wanted, wanted_beams], self.statistics))
     }
 
@@ -124,13 +131,15 @@ impl<S: Scene> Planner<'_, '_, S> {
     fn enough_beams(&self) -> u32 {
         /// Photon beams within the kernel of a query beam.
         const HITS: f64 = 1.0;
+        /// The fewest: they are to tell something of what there is.
+        const FEWEST: f64 = 256.0;
         let Some(found) = self.statistics.neighbours.bb1d else { return 1024 };
         let radius = match self.inputs.settings.radii.bb1d {
             Radius::Auto => largest_radius(Technique::Bb1d) * self.size(),
             Radius::Scene(fraction) => fraction * self.scene.bounds.radius,
             Radius::Absolute(radius) => radius,
         };
-        found.paths(HITS, f64::from(radius)).clamp(64.0, 1e6) as u32
+        found.paths(HITS, f64::from(radius)).clamp(FEWEST, 1e6) as u32
     }
 
     /// Width of what the picture shows, where its camera sub-paths first scatter, and at most the radius of

@@ -103,7 +103,7 @@ impl<'a> Renderer<'a> {
     ) -> Self {
         /// Nanoseconds per sum of a pixel, where its memory is used for the first time.
         const SUM: u64 = 60;
-        let sums = state.film.rect().pixels() * (state.film.layers().len() as u64 + 2);
+        let sums = state.film.rect().pixels() * (state.film.layers().len() as u64 + 3);
         Self {
             engine,
             state,

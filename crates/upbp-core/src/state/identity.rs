@@ -15,7 +15,7 @@ use crate::state::fingerprint;
 
 /// Version of what an iteration samples. Raised by a change that alters images, so that states of code before
 /// and after it are not mixed.
-pub(crate) const SAMPLES: u32 = 13;
+pub(crate) const SAMPLES: u32 = 14;
 
 /// The identity of a render: whatever its iterations depend on, besides their index.
 ///

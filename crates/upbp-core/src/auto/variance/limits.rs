@@ -3,10 +3,22 @@
 use glam::DVec3;
 
 /// The largest part that a sample may have in the whole, where 67 or more have any ([`largest`]).
-pub(super) const LARGEST_PART: f64 = 0.03;
+const LARGEST_PART: f64 = 0.03;
 /// Part of the squared mean of the picture that is added to the squared radiance which errors are relative
 /// to: for a picture of mean 0.5 the 0.01 of relMSE.
 pub(super) const DARKNESS: f64 = 0.04;
+
+/// Makes means of cells smaller that have more than a [part](largest) of the picture's light: one pixel of a
+/// lamp is not what errors of all others are relative to.
+pub(super) fn limit_means(cells: &mut [DVec3]) {
+    let lengths: Vec<f64> = cells.iter().map(|mean| mean.length()).collect();
+    let most = largest(lengths.clone());
+    for (mean, length) in cells.iter_mut().zip(lengths) {
+        if length > most {
+            *mean *= most / length;
+        }
+    }
+}
 
 /// Means over squares of five by five cells, without the one in the middle, unless there is no other.
 pub(super) fn surroundings(cells: &[DVec3], columns: usize) -> Vec<DVec3> {
@@ -61,4 +73,50 @@ pub(super) fn largest(mut parts: Vec<f64>) -> f64 {
         rest -= part;
     }
     f64::INFINITY
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_only_cell_is_relative_to_itself() {
+        let [own, others] = [DVec3::new(0.5, 0.25, 0.125), DVec3::splat(0.75)];
+        assert_eq!(surroundings(&[own], 1), [own]);
+        assert!(relative_to(&surroundings(&[own], 1))[0].max_element() < 10.0);
+        assert_eq!(surroundings(&[own, others], 2), [others, own]);
+    }
+
+    #[test]
+    fn no_part_is_more_than_the_largest() {
+        let mut parts = vec![1.0; 1000];
+        parts.extend([1e6, 1e3]);
+        let most = largest(parts.clone());
+        let sum: f64 = parts.iter().map(|part: &f64| part.min(most)).sum();
+        assert!((most / sum - LARGEST_PART).abs() < 1e-9, "{most} of {sum}");
+        // Nothing to limit, in a picture that is mostly black, too.
+        assert!(largest(vec![1.0; 1000]) >= 1.0);
+        for lit in [1, 2, 10, 33, 34, 100] {
+            let mut parts = vec![0.0; 4096];
+            parts[..lit].fill(1.0);
+            assert!(largest(parts) >= 1.0, "{lit}");
+        }
+        // Few are limited against each other.
+        let most = largest(vec![1e9, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
+        assert!(most > 1.0 && most < 10.0, "{most}");
+    }
+
+    #[test]
+    fn one_lamp_is_not_what_all_errors_are_relative_to() {
+        let mut cells = vec![DVec3::splat(0.005); 2048];
+        cells[..205].fill(DVec3::splat(0.05));
+        cells[1000] = DVec3::splat(40.0);
+        limit_means(&mut cells);
+        assert!(cells[1000].x < 1.0 && cells[0].x == 0.05 && cells[2047].x == 0.005);
+        let sky = relative_to(&surroundings(&cells, 64))[2047].x * 0.005 * 3.0_f64.sqrt();
+        assert!(sky > 0.9, "{sky}");
+        let mut even = vec![DVec3::ONE; 25];
+        limit_means(&mut even);
+        assert!(even.iter().all(|mean| *mean == DVec3::ONE));
+    }
 }

@@ -18,7 +18,7 @@ use upbp_estimators::{PerTechnique, Technique, TechniqueSet};
 use super::pilot_render::recorder::Sample;
 use super::pilot_render::{PilotRender, PixelPair};
 use crate::plan::Plan;
-use limits::{limiting_factors, relative_to, surroundings};
+use limits::{limit_means, limiting_factors, relative_to, surroundings};
 use sample_pairs::{Excess, ReadySamples, Reweighted, density_of_pilot, harmonic_mean_photons};
 
 /// The least variance, relative to the second moments of single samples.
@@ -90,7 +90,9 @@ impl Variance {
     /// Takes a pilot render. Samples that say too much are made smaller, and so are those of camera sub-paths
     /// that do together. Not so pairs of pixels: what these share is in few light sub-paths by its nature.
     pub(super) fn of(mut pilot: PilotRender) -> Self {
-        pilot.make_relative(&relative_to(&surroundings(&pilot.means(), pilot.columns)));
+        let mut means = pilot.means();
+        limit_means(&mut means);
+        pilot.make_relative(&relative_to(&surroundings(&means, pilot.columns)));
         let per_path = 1.0 / (pilot.cells * pilot.passes) as f64;
         let mut parts: Vec<f64> = pilot.samples.iter().map(|s| per_path * pilot.second_moment(s)).collect();
         parts.extend(pilot.splats.iter().map(|(_, splat)| pilot.per_splat() * pilot.second_moment(splat)));
@@ -100,11 +102,8 @@ impl Variance {
             sample.value *= factor;
         }
         let camera_paths = (0..pilot.cells).flat_map(|cell| (0..pilot.passes).map(move |pass| (cell, pass)));
-        let together = |(cell, pass)| {
-            let sum: DVec3 = pilot.samples_of(cell, pass).iter().map(|s| s.value.as_dvec3()).sum();
-            sum.length_squared()
-        };
-        let parts: Vec<f64> = camera_paths.clone().map(together).collect();
+        let parts: Vec<f64> =
+            camera_paths.clone().map(|(cell, pass)| pilot.second_moment_together(cell, pass)).collect();
         for ((cell, pass), factor) in camera_paths.zip(limiting_factors(&parts)) {
             let range = pilot.range(cell, pass);
             pilot.samples[range].iter_mut().for_each(|sample| sample.value *= factor);
@@ -328,6 +327,27 @@ impl PilotRender {
     /// The square of a sample, as large as that of all samples of the plan together.
     fn second_moment(&self, sample: &Sample) -> f64 {
         f64::from(sample.value.length_squared()) * self.thinning(sample.technique)
+    }
+
+    /// The square of all samples of a camera sub-path together, as large as with all light sub-paths of the
+    /// plan: what different ones bring counts as it is, and what the same one brings as often as it is here.
+    fn second_moment_together(&self, cell: usize, pass: usize) -> f64 {
+        let [points_kept, beams_kept] = self.thinning;
+        let mut all = DVec3::ZERO;
+        let mut of_others = 0.0;
+        for samples in self.samples_of(cell, pass).chunk_by(|a, b| a.light_path == b.light_path) {
+            let mut sums = [DVec3::ZERO; 2];
+            for sample in samples {
+                sums[usize::from(sample.technique.uses_beams())] += sample.value.as_dvec3();
+            }
+            let [points, beams] = sums;
+            all += points + beams;
+            if samples[0].light_path.is_some() {
+                of_others += (1.0 - points_kept) * points.dot(points + 2.0 * beams)
+                    + (1.0 - beams_kept) * beams.length_squared();
+            }
+        }
+        all.length_squared() - of_others
     }
 
     /// The part of a splat in a mean over pixels.

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use upbp_estimators::scene::PixelRect;
 use upbp_estimators::{MergePeriods, Technique};
 
-use super::limits::{DARKNESS, LARGEST_PART, largest, relative_to, surroundings};
+use super::limits::DARKNESS;
 use super::*;
 use crate::auto::pilot_render::grid::Grid;
 use crate::auto::pilot_render::recorder::mis_weights;
@@ -98,14 +98,6 @@ fn only(technique: Technique) -> PerTechnique<f32> {
 
 pub(in crate::auto) fn pilot() -> PilotRender {
     pilot_of(Technique::Connect)
-}
-
-#[test]
-fn the_only_cell_is_relative_to_itself() {
-    let [own, others] = [DVec3::new(0.5, 0.25, 0.125), DVec3::splat(0.75)];
-    assert_eq!(surroundings(&[own], 1), [own]);
-    assert!(relative_to(&surroundings(&[own], 1))[0].max_element() < 10.0);
-    assert_eq!(surroundings(&[own, others], 2), [others, own]);
 }
 
 fn quadrature(f: impl Fn(f64) -> f64) -> f64 {
@@ -400,23 +392,35 @@ fn rare_samples_are_charged_more_unless_the_plan_would_have_met_some() {
     }
 }
 
+/// A few photons of a thinned pilot render stand for hundreds of the plan: it is these whose part is limited.
 #[test]
-fn no_part_is_more_than_the_largest() {
-    let mut parts = vec![1.0; 1000];
-    parts.extend([1e6, 1e3]);
-    let most = largest(parts.clone());
-    let sum: f64 = parts.iter().map(|part: &f64| part.min(most)).sum();
-    assert!((most / sum - LARGEST_PART).abs() < 1e-9, "{most} of {sum}");
-    // Nothing to limit, in a picture that is mostly black, too.
-    assert!(largest(vec![1.0; 1000]) >= 1.0);
-    for lit in [1, 2, 10, 33, 34, 100] {
-        let mut parts = vec![0.0; 4096];
-        parts[..lit].fill(1.0);
-        assert!(largest(parts) >= 1.0, "{lit}");
+fn photons_that_are_rare_in_a_thinned_render_are_not_limited() {
+    const THINNING: f64 = 0.018;
+    const PHOTON: f32 = 50.0;
+    const CELLS: usize = 2048;
+    let sample = |technique, light_path, value| Sample {
+        technique,
+        light_path,
+        albedos: 1.0,
+        value: Vec3::splat(value),
+        weights: only(technique),
+    };
+    let (mut samples, mut ends) = (Vec::new(), Vec::new());
+    for path in 0..2 * CELLS as u32 {
+        samples.push(sample(Technique::Hit, None, 1.0));
+        if path % 200 == 100 {
+            samples.push(sample(Technique::Pb2d, Some(path), PHOTON));
+        }
+        ends.push(samples.len() as u32);
     }
-    // Few are limited against each other.
-    let most = largest(vec![1e9, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
-    assert!(most > 1.0 && most < 10.0, "{most}");
+    let photons = (samples.len() - ends.len()) as f64 / ends.len() as f64;
+    let pilot = PilotRender { samples, ends, cells: CELLS, columns: 64, thinning: [THINNING; 2], ..pilot() };
+    let all = counts([(Technique::Hit, 1.0), (Technique::Pb2d, 1.0)], 1.0);
+    let found = Variance::of(pilot).with(&all).iter().sum::<f64>();
+    // Hits are all alike, so that photons alone vary.
+    let mean = 1.0 + photons * f64::from(PHOTON);
+    let expected = photons * THINNING * f64::from(PHOTON).powi(2) / (1.0 + DARKNESS * mean * mean);
+    assert!((found / expected - 1.0).abs() < 0.02, "{found}, expected {expected}");
 }
 
 /// A sample under a plan.
@@ -548,6 +552,25 @@ proptest! {
         let pair = PixelPair { cell: 0, path: 0, weight, samples: [own, other] };
         let found = Reweighted::new(&pilot, &ready, &counts).pair_product(&pair);
         prop_assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1e-3), "{found}, expected {expected}");
+    }
+
+    #[test]
+    fn moments_together_are_those_of_single_samples_and_of_pairs(
+        mut samples in prop::collection::vec(sample(), 0..24),
+        thinning in prop::array::uniform2(0.01_f64..1.0),
+    ) {
+        samples.retain(|sample| sample.technique != Technique::LightTracing);
+        for sample in &mut samples {
+            sample.albedos = 1.0;
+        }
+        samples.sort_by_key(|sample| sample.light_path);
+        // The plan of the pilot render.
+        let counts = Counts { relative: [1.0; Technique::COUNT], ..counts([], 1.0) };
+        let pairs = products(&samples, thinning, &counts);
+        let pilot = PilotRender { cells: 1, passes: 1, ends: vec![samples.len() as u32], samples, thinning, ..pilot() };
+        let single: f64 = pilot.samples.iter().map(|sample| pilot.second_moment(sample)).sum();
+        let (found, expected) = (pilot.second_moment_together(0, 0), single + pairs);
+        prop_assert!((found - expected).abs() <= 1e-6 * expected.max(1e-3), "{found}, expected {expected}");
     }
 
     #[test]
