@@ -133,8 +133,8 @@ impl<'a> Cost<'a> {
     /// photons, with the radii of the pilot render.
     ///
     /// Among photon points they grow as the depth of the tree for queries around a point, and as the number
-    /// of boxes that a line meets for those around a query beam. Among beams the power is as measured, 0.4 to
-    /// 0.75.
+    /// of boxes that a line meets for those around a query beam. Among beams they grow by a power of the number
+    /// within the kernel, measured as 0.4 to 0.75: of more and narrower ones a query looks at as many.
     fn tests(self, technique: Technique, plan: &Plan) -> f64 {
         /// Tests of a query that finds nothing near, whatever there is: the root and a leaf.
         const LEAST: f64 = 2.0;
@@ -148,7 +148,9 @@ impl<'a> Cost<'a> {
             Technique::Surf => levels(points[0]),
             Technique::Pp3d => levels(points[1]),
             Technique::Pb2d => (other / own).cbrt(),
-            Technique::Bp2d | Technique::Bb1d => (other / own).powf(2.0 / 3.0),
+            Technique::Bp2d | Technique::Bb1d => {
+                (self.0.kernel(technique, plan) * other / own).powf(2.0 / 3.0)
+            }
         };
         let least = tests[i][roulette].min(LEAST * calls[i][roulette]);
         least + growth * (tests[i][roulette] - least)

@@ -251,13 +251,17 @@ impl PilotRender {
     /// Photons or beams within a query's kernel in the first iteration of another plan, relative to that of
     /// the plan of this render.
     fn photons(&self, technique: Technique, plan: &Plan) -> f64 {
+        self.kernel(technique, plan) * self.relative_paths(technique, plan)
+    }
+
+    /// The kernel of another plan's first iteration, relative to that of this render.
+    pub(super) fn kernel(&self, technique: Technique, plan: &Plan) -> f64 {
         let [own, other] = [&self.plan, plan].map(|plan| plan.radii);
-        let kernel = match technique {
+        match technique {
             Technique::Surf if own.surf > 0.0 => f64::from(other.surf / own.surf).powi(2),
             Technique::Bb1d if own.bb1d > 0.0 => f64::from(other.bb1d / own.bb1d),
             _ => 1.0,
-        };
-        kernel * self.relative_paths(technique, plan)
+        }
     }
 
     /// As many photons or beams within a query's kernel, relative to the first iteration, as make the
