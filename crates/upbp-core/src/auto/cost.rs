@@ -133,8 +133,8 @@ impl<'a> Cost<'a> {
     /// photons, with the radii of the pilot render.
     ///
     /// Among photon points they grow as the depth of the tree for queries around a point, and as the number
-    /// of boxes that a line meets for those around a query beam. Among beams they grow by a power of the number
-    /// within the kernel, measured as 0.4 to 0.75: of more and narrower ones a query looks at as many.
+    /// of boxes that a line meets for those around a query beam. Among beams they grow by a power of the
+    /// number within the kernel, measured as 0.4 to 0.75: of more and narrower ones a query looks at as many.
     fn tests(self, technique: Technique, plan: &Plan) -> f64 {
         /// Tests of a query that finds nothing near, whatever there is: the root and a leaf.
         const LEAST: f64 = 2.0;

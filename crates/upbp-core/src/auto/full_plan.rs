@@ -28,8 +28,8 @@ const CROWD: f64 = 1024.0;
 
 /// Largest automatic first radius, relative to the [size](Planner::size) of what the picture shows.
 ///
-/// Beams are narrow and many, since they cost a query only where it meets them: half as wide and twice as many
-/// leave as much noise in a pixel, and half of what neighbours have in common.
+/// Beams are narrow and many, since they cost a query only where it meets them: half as wide and twice as
+/// many leave as much noise in a pixel, and half of what neighbours have in common.
 const fn largest_radius(technique: Technique) -> f32 {
     match technique {
         Technique::Pp3d => 5e-3,
