@@ -37,11 +37,13 @@ pub(super) fn surroundings(cells: &[DVec3], columns: usize) -> Vec<DVec3> {
     cells.iter().enumerate().map(mean).collect()
 }
 
-/// Factors that make radiance relative to what is around, such that squares are means over channels.
-pub(super) fn relative_to(means: &[DVec3]) -> Vec<DVec3> {
-    let overall = means.iter().map(|mean| mean.element_sum()).sum::<f64>() / (3 * means.len()) as f64;
+/// Factors that make radiance relative to what is around, or to half of what is `steady` if that is more,
+/// such that squares are means over channels. Half, since noise of an even picture is not brightness.
+pub(super) fn relative_to(around: &[DVec3], steady: &[DVec3]) -> Vec<DVec3> {
+    let overall = around.iter().map(|mean| mean.element_sum()).sum::<f64>() / (3 * around.len()) as f64;
     let dark = (DARKNESS * overall * overall).max(f64::MIN_POSITIVE);
-    means.iter().map(|mean| (3.0 * (mean * mean + dark)).map(|square| square.sqrt().recip())).collect()
+    let means = around.iter().zip(steady).map(|(around, steady)| around.max(0.5 * *steady));
+    means.map(|mean| (3.0 * (mean * mean + dark)).map(|square| square.sqrt().recip())).collect()
 }
 
 /// Factors of values, by the parts that their squares have: none is to be above the [limit](largest).
@@ -77,14 +79,31 @@ pub(super) fn largest(mut parts: Vec<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
 
     #[test]
     fn the_only_cell_is_relative_to_itself() {
         let [own, others] = [DVec3::new(0.5, 0.25, 0.125), DVec3::splat(0.75)];
         assert_eq!(surroundings(&[own], 1), [own]);
-        assert!(relative_to(&surroundings(&[own], 1))[0].max_element() < 10.0);
+        assert!(relative_to(&surroundings(&[own], 1), &[DVec3::ZERO])[0].max_element() < 10.0);
         assert_eq!(surroundings(&[own, others], 2), [others, own]);
+    }
+
+    #[test]
+    fn what_both_passes_see_is_steady() {
+        let mut pilot = super::super::tests::pilot();
+        for sample in &mut pilot.samples {
+            sample.value = Vec3::ZERO;
+        }
+        let lamp = pilot.range(3, 0).start..pilot.range(3, 1).end;
+        pilot.samples[lamp].iter_mut().for_each(|sample| sample.value = Vec3::splat(8.0));
+        let rare = pilot.range(5, 1).start;
+        pilot.samples[rare].value = Vec3::splat(100.0);
+        let means = pilot.steady_means();
+        // Two samples each.
+        assert_eq!([means[3], means[4], means[5]], [16.0, 0.0, 0.0].map(DVec3::splat));
     }
 
     #[test]
@@ -113,8 +132,12 @@ mod tests {
         cells[1000] = DVec3::splat(40.0);
         limit_means(&mut cells);
         assert!(cells[1000].x < 1.0 && cells[0].x == 0.05 && cells[2047].x == 0.005);
-        let sky = relative_to(&surroundings(&cells, 64))[2047].x * 0.005 * 3.0_f64.sqrt();
-        assert!(sky > 0.9, "{sky}");
+        let mut steady = cells.clone();
+        steady[1000] = DVec3::splat(40.0);
+        let factors = relative_to(&surroundings(&cells, 64), &steady);
+        let [lamp, sky] = [(1000, 40.0), (2047, 0.005)]
+            .map(|(cell, radiance): (usize, f64)| factors[cell].x * radiance * 3.0_f64.sqrt());
+        assert!(sky > 0.9 && (lamp - 2.0).abs() < 1e-3, "{sky} {lamp}");
         let mut even = vec![DVec3::ONE; 25];
         limit_means(&mut even);
         assert!(even.iter().all(|mean| *mean == DVec3::ONE));

@@ -92,7 +92,7 @@ impl Variance {
     pub(super) fn of(mut pilot: PilotRender) -> Self {
         let mut means = pilot.means();
         limit_means(&mut means);
-        pilot.make_relative(&relative_to(&surroundings(&means, pilot.columns)));
+        pilot.make_relative(&relative_to(&surroundings(&means, pilot.columns), &pilot.steady_means()));
         let per_path = 1.0 / (pilot.cells * pilot.passes) as f64;
         let mut parts: Vec<f64> = pilot.samples.iter().map(|s| per_path * pilot.second_moment(s)).collect();
         parts.extend(pilot.splats.iter().map(|(_, splat)| pilot.per_splat() * pilot.second_moment(splat)));
@@ -305,6 +305,25 @@ impl PilotRender {
             means[*cell as usize] += splat.value.as_dvec3() * self.per_splat() * self.cells as f64;
         }
         means
+    }
+
+    /// The radiance of each cell that does not hang on one sample: the least of all passes, and its splats
+    /// but for the brightest. Something small and bright is not as dark as what is around it.
+    pub(super) fn steady_means(&self) -> Vec<DVec3> {
+        let of_pass = |cell, pass| -> DVec3 {
+            self.samples_of(cell, pass).iter().map(|sample| sample.value.as_dvec3()).sum()
+        };
+        let of_cell =
+            |cell| (0..self.passes).map(|pass| of_pass(cell, pass)).fold(DVec3::INFINITY, DVec3::min);
+        let mut means: Vec<DVec3> = (0..self.cells).map(of_cell).collect();
+        let mut brightest = vec![DVec3::ZERO; self.cells];
+        for (cell, splat) in &self.splats {
+            let (cell, value) =
+                (*cell as usize, splat.value.as_dvec3() * self.per_splat() * self.cells as f64);
+            means[cell] += value;
+            brightest[cell] = brightest[cell].max(value);
+        }
+        means.iter().zip(brightest).map(|(mean, brightest)| (mean - brightest).max(DVec3::ZERO)).collect()
     }
 
     /// Multiplies samples by a factor of their cell.
