@@ -308,7 +308,7 @@ impl<'a, S: Scene> PreparedScene<'a, S> {
         self.emission_coordinates(emitter, point, direction, on_ray).map_or(1.0, |at| guide.density(at))
     }
 
-    /// Which of the random numbers of a start the emitter tells, thus which a guide may split. `None` if it
+    /// Random numbers of a start that the emitter tells, thus those that a guide may split. `None` if it
     /// tells none, or if none of a few starts bring light.
     #[must_use]
     pub fn emission_axes(&self, emitter: EmitterId) -> Option<[bool; 4]> {

@@ -73,9 +73,9 @@ impl Candidates {
         let is_fixed = settings.light_paths != LightPaths::Auto;
         let light_paths = counts(full.light_paths, &LIGHT_PATH_FACTORS, is_fixed, &|count| count <= most);
         let longest = light_paths.iter().copied().fold(full.light_paths, u32::max);
-        let is_fixed = settings.beams.is_some();
-        let beam_paths =
-            counts(full.beam_paths, &BEAM_PATH_FACTORS, is_fixed, &|count| is_room([longest, count]));
+        let is_room = |count| is_room([longest, count]);
+        let are_fixed = settings.beams.is_some();
+        let beam_paths = counts(full.beam_paths, &BEAM_PATH_FACTORS, are_fixed, &is_room);
         let usual = full.radii.surf;
         let widest = if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };
         let needed = if support.needs_merges { full.techniques } else { TechniqueSet::EMPTY };
@@ -96,7 +96,7 @@ impl Candidates {
         };
         candidates.full.radii.surf = widest;
         let wider = WIDER_BEAMS as f32 * full.radii.bb1d;
-        if !is_fixed
+        if !are_fixed
             && settings.radii.bb1d == Radius::Auto
             && wider <= full.radii.field.largest_radius().min(LARGEST_RADIUS)
         {
@@ -117,8 +117,8 @@ impl Candidates {
     /// Plans to begin with, the simplest first: camera sub-paths alone, paths alone, everything.
     pub(super) fn starts(&self) -> [Plan; 3] {
         let everything = self.with_techniques(self.full.techniques);
-        let fast = [Technique::Pb2d, Technique::Pp3d, Technique::Bb1d, Technique::Bp2d];
-        let one = fast.into_iter().find(|technique| self.any_of.has(*technique));
+        let in_turn = [Technique::Pb2d, Technique::Pp3d, Technique::Bb1d, Technique::Bp2d];
+        let one = in_turn.into_iter().find(|technique| self.any_of.has(*technique));
         let least = one.map_or(self.always, |technique| self.always.with(technique));
         let with = |set: TechniqueSet| self.with_techniques(set.union(least));
         // What stays on only for the sake of paths that were not seen is to cost little.

@@ -133,7 +133,7 @@ fn check_bounds(emitter: &impl Emitter, bounds: &BoundingSphere, emission: &Emis
 /// Starts whose coordinates are known.
 #[derive(Default)]
 struct Guided {
-    /// Which pairs are known, by the first of them.
+    /// Pairs that are known, by the first of them.
     axes: Option<[bool; 2]>,
     starts: u32,
     /// Those that the coordinates give again to most digits.
