@@ -34,11 +34,12 @@ const SAFEGUARD_OVERHEAD: f64 = 1.05;
 /// All plans that may be chosen: whatever settings do not fix.
 #[derive(Clone, Debug)]
 pub(super) struct Candidates {
-    /// All techniques, a light sub-path per pixel if there is room, the widest radii: what pilot renders run,
-    /// since they can tell what less of anything, or more light sub-paths, would do.
-    pub(super) full: Plan,
-    /// Beams, and the radius of them, that the full plan has where it is no pilot render.
-    usual_beams: (u32, f32),
+    /// The full plan: all techniques, a light sub-path per pixel if there is room. It is what runs if there is
+    /// no time for a choice.
+    pub(super) usual: Plan,
+    /// The full plan with the widest radii: what pilot renders run, since they can tell what less of anything,
+    /// or more light sub-paths, would do.
+    pub(super) of_pilot: Plan,
     /// Techniques that stay on: some paths may have no other.
     always: TechniqueSet,
     /// Techniques of which one stays on at least: each finds the same paths, which may have no other.
@@ -76,12 +77,22 @@ impl Candidates {
         let is_room = |count| is_room([longest, count]);
         let are_fixed = settings.beams.is_some();
         let beam_paths = counts(full.beam_paths, &BEAM_PATH_FACTORS, are_fixed, &is_room);
-        let usual = full.radii.surf;
-        let widest = if settings.radii.surf == Radius::Auto { widest(usual, statistics) } else { usual };
+        let surf = full.radii.surf;
+        let widest = if settings.radii.surf == Radius::Auto { widest(surf, statistics) } else { surf };
         let needed = if support.needs_merges { full.techniques } else { TechniqueSet::EMPTY };
-        let mut candidates = Self {
-            full: Plan { roulette: settings.roulette.unwrap_or(roulette::OF_PILOT), ..full },
-            usual_beams: (full.beam_paths, full.radii.bb1d),
+        let mut of_pilot = Plan { roulette: settings.roulette.unwrap_or(roulette::OF_PILOT), ..full };
+        of_pilot.radii.surf = widest;
+        let wider = WIDER_BEAMS as f32 * full.radii.bb1d;
+        if !are_fixed
+            && settings.radii.bb1d == Radius::Auto
+            && wider <= full.radii.field.largest_radius().min(LARGEST_RADIUS)
+        {
+            of_pilot.radii.bb1d = wider;
+            of_pilot.beam_paths = full.beam_paths.div_ceil(WIDER_BEAMS);
+        }
+        Self {
+            usual: full,
+            of_pilot,
             always: needed.intersection(TechniqueSet::only(Technique::Surf)),
             any_of: needed.intersection(TechniqueSet::VOLUME_MERGES),
             safeguard: if scene.scene.has_specular_surfaces() {
@@ -91,32 +102,14 @@ impl Candidates {
             },
             light_paths,
             beam_paths,
-            surf_radii: if widest > usual { vec![usual, widest] } else { vec![usual] },
+            surf_radii: if widest > surf { vec![surf, widest] } else { vec![surf] },
             roulettes: settings.roulette.map_or_else(|| roulette::all().to_vec(), |own| vec![own]),
-        };
-        candidates.full.radii.surf = widest;
-        let wider = WIDER_BEAMS as f32 * full.radii.bb1d;
-        if !are_fixed
-            && settings.radii.bb1d == Radius::Auto
-            && wider <= full.radii.field.largest_radius().min(LARGEST_RADIUS)
-        {
-            candidates.full.radii.bb1d = wider;
-            candidates.full.beam_paths = full.beam_paths.div_ceil(WIDER_BEAMS);
         }
-        candidates
-    }
-
-    /// The full plan with the usual radii: what runs if there is no time for a choice.
-    pub(super) fn usual(&self) -> Plan {
-        let mut plan = self.full;
-        plan.radii.surf = self.surf_radii[0];
-        (plan.beam_paths, plan.radii.bb1d) = self.usual_beams;
-        plan
     }
 
     /// Plans to begin with, the simplest first: camera sub-paths alone, paths alone, everything.
     pub(super) fn starts(&self) -> [Plan; 3] {
-        let everything = self.with_techniques(self.full.techniques);
+        let everything = self.with_techniques(self.usual.techniques);
         let in_turn = [Technique::Pb2d, Technique::Pp3d, Technique::Bb1d, Technique::Bp2d];
         let one = in_turn.into_iter().find(|technique| self.any_of.has(*technique));
         let least = one.map_or(self.always, |technique| self.always.with(technique));
@@ -132,17 +125,16 @@ impl Candidates {
 
     /// The usual plan with those of some techniques that can be had, and the roulette that suits them.
     fn with_techniques(&self, set: TechniqueSet) -> Plan {
-        let usual = self.usual();
-        let techniques = set.intersection(usual.techniques);
+        let techniques = set.intersection(self.usual.techniques);
         let suitable = roulette::usual_roulette(techniques);
-        let roulette = if self.roulettes.contains(&suitable) { suitable } else { usual.roulette };
-        Plan { techniques, roulette, ..usual }
+        let roulette = if self.roulettes.contains(&suitable) { suitable } else { self.usual.roulette };
+        Plan { techniques, roulette, ..self.usual }
     }
 
     /// All candidates that differ from a plan in one thing.
     pub(super) fn steps(&self, from: &Plan) -> Vec<Plan> {
         let mut steps = Vec::new();
-        for technique in self.full.techniques.intersection(TechniqueSet::LIGHT_PATHS).iter() {
+        for technique in self.usual.techniques.intersection(TechniqueSet::LIGHT_PATHS).iter() {
             let always = with_period(*from, technique, NonZeroU32::MIN);
             let techniques = always.techniques.with(technique);
             steps.push(Plan { techniques, ..always });
@@ -207,7 +199,7 @@ impl Candidates {
                 in_some_pixels = Plan { techniques, ..with_period(in_some_pixels, technique, PERIOD) };
             }
         }
-        let widest = with_surf_radius(always, self.full.radii.surf);
+        let widest = with_surf_radius(always, self.of_pilot.radii.surf);
         let most = SAFEGUARD_OVERHEAD * cost.iteration(&plan);
         let affordable = [widest, always].into_iter().find(|safe| cost.iteration(safe) <= most);
         if self.safeguard.is_empty() { plan } else { affordable.unwrap_or(in_some_pixels) }
@@ -263,8 +255,8 @@ mod tests {
             ..plan()
         };
         Candidates {
-            full,
-            usual_beams: (full.beam_paths, full.radii.bb1d),
+            usual: full,
+            of_pilot: full,
             always: TechniqueSet::EMPTY,
             any_of: TechniqueSet::EMPTY,
             safeguard: TechniqueSet::EMPTY,

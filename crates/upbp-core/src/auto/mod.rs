@@ -48,7 +48,7 @@ use crate::deadline::{Budget, Clock};
 use crate::error::RenderError;
 use crate::plan::{FrozenPlan, Plan};
 use crate::settings::{CheckedSettings, Techniques};
-use candidate::Candidates;
+use candidate::{Candidates, finished};
 use cost::Cost;
 use full_plan::{Inputs, Planner};
 use memory_limit::Room;
@@ -224,27 +224,28 @@ fn best_plan<S: Scene, L: Lanes>(
     budget: &Budget<'_>,
 ) -> Plan {
     let allowance = budget.rest(TIME_AFTER_PILOT, TIME_FOR_PILOT);
-    let enough = Size::enough_pixels(scene, candidates.full.techniques);
+    let enough = Size::enough_pixels(scene, candidates.usual.techniques);
     let most = Size::most_pixels(scene);
     let mut size = Size::LEAST;
     if !allowance.is_limited() {
         size.pixels = enough;
     }
+    let usual = finished(candidates.usual);
     let (mut plan, mut spent) = (None, 0.0);
     loop {
         let mut clock = Clock::start();
         let Some(mut pilot) =
-            PilotRender::run::<S, L>(scene, settings, &candidates.full, size, limits, &allowance.halt())
+            PilotRender::run::<S, L>(scene, settings, &candidates.of_pilot, size, limits, &allowance.halt())
         else {
             // No time, or more samples than there is room for.
             if plan.is_some() || allowance.halt().now() || size.pixels <= Size::LEAST.pixels {
-                return plan.unwrap_or(candidates.usual());
+                return plan.unwrap_or(usual);
             }
             size.pixels = (size.pixels / 4).max(Size::LEAST.pixels);
             continue;
         };
         let cost = Cost::of(&pilot).of_pilot();
-        pilot.iterations = Cost::of(&pilot).iterations(&plan.unwrap_or(candidates.usual()), &budget.stop);
+        pilot.iterations = Cost::of(&pilot).iterations(&plan.unwrap_or(usual), &budget.stop);
         let variance = Variance::of(pilot);
         let found = search::best(&variance, candidates);
         plan = Some(found.plan);

@@ -48,11 +48,11 @@ impl Found {
 pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let cost = Cost::of(variance.pilot());
     if !variance.sees_light() || variance.pilot().cells < LEAST_CELLS {
-        let plan = finished(candidates.usual());
+        let plan = finished(candidates.usual);
         return Found { plan, is_clear: false, variance: f64::INFINITY, cost: cost.iteration(&plan) };
     }
     let mut judge = Judge { variance, cost, known: Vec::new() };
-    let usual = candidates.full.light_paths;
+    let usual = candidates.usual.light_paths;
     let [camera, paths, everything] = candidates.starts().map(|start| {
         let end = descend(&mut judge, start, candidates);
         let counts = judge.judge(&candidates.light_paths(&end.plan));

@@ -204,7 +204,7 @@ impl Walks {
         for (index, factor) in factors.iter().enumerate() {
             let square = factor * factor;
             let lights = [0, 1].map(|pass: usize| self.passes[pass][index].of(emitter));
-            // Two walks at a pixel, which begin alike: half the square of their difference is their variance.
+            // Two independent walks at a pixel: half the square of their difference is their variance.
             let variance = |of: fn(&Light) -> f64| 0.5 * square * (of(&lights[0]) - of(&lights[1])).powi(2);
             shared += variance(|light| light.shared);
             hits += variance(|light| light.hits);
