@@ -23,8 +23,8 @@ pub(super) struct Found {
     pub(super) plan: Plan,
     /// Whether no other candidate is likely to be better by more than [`LEAST_GAIN`].
     pub(super) is_clear: bool,
-    /// Relative variance of a pixel in an iteration.
-    pub(super) variance: f64,
+    /// The relMSE of an iteration.
+    pub(super) relative_mse: f64,
     /// Processor nanoseconds of an iteration.
     pub(super) cost: f64,
 }
@@ -34,8 +34,7 @@ impl Found {
     /// a clock.
     pub(super) fn work(&self, stop: &Stop) -> f64 {
         let by_iterations = stop.iterations.map(|iterations| iterations as f64);
-        // The relative variance of an iteration is its relMSE.
-        let by_error = stop.error.map(|error| self.variance / error);
+        let by_error = stop.error.map(|error| self.relative_mse / error);
         let iterations = by_iterations.into_iter().chain(by_error).fold(f64::INFINITY, f64::min);
         iterations * self.cost
     }
@@ -49,7 +48,7 @@ pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let cost = Cost::of(variance.pilot());
     if !variance.sees_light() || variance.pilot().cells < LEAST_CELLS {
         let plan = finished(candidates.usual);
-        return Found { plan, is_clear: false, variance: f64::INFINITY, cost: cost.iteration(&plan) };
+        return Found { plan, is_clear: false, relative_mse: f64::INFINITY, cost: cost.iteration(&plan) };
     }
     let mut judge = Judge { variance, cost, known: Vec::new() };
     let usual = candidates.usual.light_paths;
@@ -66,12 +65,7 @@ pub(super) fn best(variance: &Variance, candidates: &Candidates) -> Found {
     let factors = judge.judge(&Candidates::camera_factors(&best.plan));
     let best = factors.into_iter().fold(best, |a, b| if b.product() < a.product() { b } else { a });
     let plan = finished(candidates.with_safeguard(best.plan, cost));
-    Found {
-        plan,
-        is_clear,
-        variance: variance.relative(&best.plan).iter().sum(),
-        cost: cost.iteration(&plan),
-    }
+    Found { plan, is_clear, relative_mse: variance.relative_mse(&best.plan), cost: cost.iteration(&plan) }
 }
 
 /// Takes the steepest step as long as one leads down.

@@ -17,7 +17,7 @@ use std::ops::AddAssign;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::image::DARK;
+use super::DARK;
 
 /// Reach of the fine windows: 5 × 5 pixels, as few as still tell a spread from noise.
 const REACH: usize = 2;

@@ -13,7 +13,7 @@ pub struct Image {
 
 /// Added to the square of the converged value in relative errors, so that dark pixels do not count without
 /// bound.
-pub(super) const DARK: f64 = 0.01;
+pub(crate) const DARK: f64 = 0.01;
 
 /// Sides in pixels of the square blocks whose errors count alike, where neighbours may share errors.
 pub(crate) const BLOCK_SIDES: [u32; 4] = [1, 4, 8, 16];

@@ -19,8 +19,8 @@ pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap};
 use exact_sum::Sum3;
 pub use features::FeatureImages;
 use features::FeatureSums;
-pub(crate) use image::BLOCK_SIDES;
 pub use image::Image;
+pub(crate) use image::{BLOCK_SIDES, DARK};
 pub use iterations::{IterationSet, MAX_ITERATIONS};
 use pixel_sets::{SETS, set_of, stand_ins};
 

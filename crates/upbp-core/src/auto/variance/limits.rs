@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::film::DARK;
+
 /// The largest part that a sample may have in the whole, where 67 or more have any ([`largest`]).
 const LARGEST_PART: f64 = 0.03;
 /// Part of the squared mean of the picture that is added to the squared radiance which errors are relative
@@ -37,13 +39,35 @@ pub(super) fn surroundings(cells: &[DVec3], columns: usize) -> Vec<DVec3> {
     cells.iter().enumerate().map(mean).collect()
 }
 
-/// Factors that make radiance relative to what is around, or to half of what is `steady` if that is more,
-/// such that squares are means over channels. Half, since noise of an even picture is not brightness.
-pub(super) fn relative_to(around: &[DVec3], steady: &[DVec3]) -> Vec<DVec3> {
-    let overall = around.iter().map(|mean| mean.element_sum()).sum::<f64>() / (3 * around.len()) as f64;
-    let dark = (DARKNESS * overall * overall).max(f64::MIN_POSITIVE);
-    let means = around.iter().zip(steady).map(|(around, steady)| around.max(0.5 * *steady));
-    means.map(|mean| (3.0 * (mean * mean + dark)).map(|square| square.sqrt().recip())).collect()
+/// The radiance that errors are relative to.
+pub(super) struct Brightness {
+    /// Of each cell: what is around, or half of what is steady if that is more. Half, since noise of an even
+    /// picture is not brightness.
+    cells: Vec<DVec3>,
+    /// What is added to its square.
+    dark: f64,
+}
+
+impl Brightness {
+    pub(super) fn of(around: &[DVec3], steady: &[DVec3]) -> Self {
+        let overall = around.iter().map(|mean| mean.element_sum()).sum::<f64>() / (3 * around.len()) as f64;
+        Self {
+            cells: around.iter().zip(steady).map(|(around, steady)| around.max(0.5 * *steady)).collect(),
+            dark: (DARKNESS * overall * overall).max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// Factors that make radiance relative, such that squares are means over channels.
+    pub(super) fn factors(&self) -> Vec<DVec3> {
+        let squares = self.cells.iter().map(|cell| 3.0 * (cell * cell + self.dark));
+        squares.map(|square| square.map(|channel| channel.sqrt().recip())).collect()
+    }
+
+    /// The relMSE of a picture whose mean square of relative errors is one, everywhere alike.
+    pub(super) fn relative_mse(&self) -> f64 {
+        let of_cell = |cell: &DVec3| ((cell * cell + self.dark) / (cell * cell + DARK)).element_sum() / 3.0;
+        self.cells.iter().map(of_cell).sum::<f64>() / self.cells.len() as f64
+    }
 }
 
 /// Factors of values, by the parts that their squares have: none is to be above the [limit](largest).
@@ -87,8 +111,27 @@ mod tests {
     fn the_only_cell_is_relative_to_itself() {
         let [own, others] = [DVec3::new(0.5, 0.25, 0.125), DVec3::splat(0.75)];
         assert_eq!(surroundings(&[own], 1), [own]);
-        assert!(relative_to(&surroundings(&[own], 1), &[DVec3::ZERO])[0].max_element() < 10.0);
+        let brightness = Brightness::of(&surroundings(&[own], 1), &[DVec3::ZERO]);
+        assert!(brightness.factors()[0].max_element() < 10.0);
         assert_eq!(surroundings(&[own, others], 2), [others, own]);
+    }
+
+    /// A picture with errors of a tenth, relative as here, has the relMSE that is said.
+    #[test]
+    fn relative_errors_become_relative_mean_squared_errors() {
+        for mean in [1e-3, 0.1, 0.5, 20.0] {
+            let cells: Vec<DVec3> =
+                (0..100).map(|i| DVec3::splat(mean * (0.5 + 0.01 * f64::from(i)))).collect();
+            let brightness = Brightness::of(&cells, &[DVec3::ZERO; 100]);
+            let (mut relative, mut expected) = (0.0, 0.0);
+            for (cell, factor) in cells.iter().zip(brightness.factors()) {
+                let error = 0.1 / (3.0_f64.sqrt() * factor.x);
+                relative += 3.0 * (error * factor.x).powi(2) / 100.0;
+                expected += error.powi(2) / (cell.x * cell.x + DARK) / 100.0;
+            }
+            let found = relative * brightness.relative_mse();
+            assert!((found / expected - 1.0).abs() < 1e-9, "{mean}: {found}, expected {expected}");
+        }
     }
 
     #[test]
@@ -134,7 +177,7 @@ mod tests {
         assert!(cells[1000].x < 1.0 && cells[0].x == 0.05 && cells[2047].x == 0.005);
         let mut steady = cells.clone();
         steady[1000] = DVec3::splat(40.0);
-        let factors = relative_to(&surroundings(&cells, 64), &steady);
+        let factors = Brightness::of(&surroundings(&cells, 64), &steady).factors();
         let [lamp, sky] = [(1000, 40.0), (2047, 0.005)]
             .map(|(cell, radiance): (usize, f64)| factors[cell].x * radiance * 3.0_f64.sqrt());
         assert!(sky > 0.9 && (lamp - 2.0).abs() < 1e-3, "{sky} {lamp}");

@@ -18,7 +18,7 @@ use upbp_estimators::{PerTechnique, Technique, TechniqueSet};
 use super::pilot_render::recorder::Sample;
 use super::pilot_render::{PilotRender, PixelPair};
 use crate::plan::Plan;
-use limits::{limit_means, limiting_factors, relative_to, surroundings};
+use limits::{Brightness, limit_means, limiting_factors, surroundings};
 use sample_pairs::{Excess, ReadySamples, Reweighted, density_of_pilot, harmonic_mean_photons};
 
 /// The least variance, relative to the second moments of single samples.
@@ -84,6 +84,8 @@ pub(super) struct Variance {
     /// Splats and counts; values are relative to the radiance around them.
     pilot: PilotRender,
     samples: ReadySamples,
+    /// The relMSE of a relative variance of one.
+    relative_mse: f64,
 }
 
 impl Variance {
@@ -92,7 +94,8 @@ impl Variance {
     pub(super) fn of(mut pilot: PilotRender) -> Self {
         let mut means = pilot.means();
         limit_means(&mut means);
-        pilot.make_relative(&relative_to(&surroundings(&means, pilot.columns), &pilot.steady_means()));
+        let brightness = Brightness::of(&surroundings(&means, pilot.columns), &pilot.steady_means());
+        pilot.make_relative(&brightness.factors());
         let per_path = 1.0 / (pilot.cells * pilot.passes) as f64;
         let mut parts: Vec<f64> = pilot.samples.iter().map(|s| per_path * pilot.second_moment(s)).collect();
         parts.extend(pilot.splats.iter().map(|(_, splat)| pilot.per_splat() * pilot.second_moment(splat)));
@@ -110,7 +113,7 @@ impl Variance {
         }
         let samples = ReadySamples::new(&pilot);
         pilot.samples = Vec::new();
-        Self { pilot, samples }
+        Self { pilot, samples, relative_mse: brightness.relative_mse() }
     }
 
     /// Whether the pilot render met any light.
@@ -127,6 +130,11 @@ impl Variance {
     /// of cells. Infinite if a path that the pilot render found is one that the plan cannot find.
     pub(super) fn relative(&self, plan: &Plan) -> [f64; GROUPS] {
         self.with(&Counts::of(plan, &self.pilot))
+    }
+
+    /// The relMSE of an iteration of a plan.
+    pub(super) fn relative_mse(&self, plan: &Plan) -> f64 {
+        self.relative_mse * self.relative(plan).iter().sum::<f64>()
     }
 
     /// Variances of blocks of pixels, times their pixels, mean over [sides](crate::film::BLOCK_SIDES) of
