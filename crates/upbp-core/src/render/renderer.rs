@@ -251,10 +251,10 @@ impl<'a> Renderer<'a> {
     /// Adds sets of pixels of an iteration to the film, and to the record what was done for them.
     fn add_part(&mut self, iteration: u64, sets: Range<u32>, mut counters: Counters, mut times: PassTimes) {
         let start = Instant::now();
-        let State { record, film, .. } = &mut self.state;
+        let (part, State { record, film, .. }) = (sets.len(), &mut self.state);
         counters.dropped += film.add_part(iteration, sets, &self.pixels, &self.features);
         times.film = start.elapsed();
-        self.film_time = times.film;
+        self.film_time = film_time(self.film_time, times.film, part as u32);
         // What a state file says may be of any size: sums that saturate.
         record.counters.add(&counters);
         record.times.add(&times);
@@ -375,16 +375,11 @@ impl<'a> Renderer<'a> {
     }
 
     fn fraction(&self, stop: &Stop) -> f64 {
-        let film = &self.state.film;
-        let begun: f64 = film.begun().values().sum();
-        let in_range = film.iteration_set().count_in(&self.range) as f64 + begun;
-        let by_range = in_range / self.range.end.saturating_sub(self.range.start).max(1) as f64;
-        let by_iterations =
-            stop.iterations.map_or(0.0, |limit| (film.iterations() as f64 + begun) / limit.max(1) as f64);
+        let by_iterations = fraction_of_iterations(&self.state.film, &self.range, stop.iterations);
         let by_time = stop.seconds.map_or(0.0, |limit| self.seconds() / limit);
         // The relMSE falls with the number of iterations.
         let by_error = stop.error.map_or(0.0, |limit| limit / self.estimated_error.high);
-        by_range.max(by_iterations).max(by_time).max(by_error).clamp(0.0, 1.0)
+        by_iterations.max(by_time).max(by_error).clamp(0.0, 1.0)
     }
 
     /// A handle that stops the render from any thread.
@@ -412,6 +407,23 @@ impl<'a> Renderer<'a> {
     }
 }
 
+/// Time that adding an iteration to the film takes, if it was taken for `known`, and a part of so many sets
+/// has taken `time`: the whole takes no less than the part, and no more than as many parts as make a whole.
+fn film_time(known: Duration, time: Duration, sets: u32) -> Duration {
+    known.clamp(time, time * SETS / sets.clamp(1, SETS))
+}
+
+/// Part that is done of the iterations in `range`, or of the `limit` of those on the film if it is nearer. An
+/// iteration out of the range that another render has begun stays as it is.
+fn fraction_of_iterations(film: &Film, range: &Range<u64>, limit: Option<u64>) -> f64 {
+    let begun = film.begun().into_iter().filter(|(iteration, _)| range.contains(iteration));
+    let begun: f64 = begun.map(|(_, share)| share).sum();
+    let in_range = film.iteration_set().count_in(range) as f64 + begun;
+    let by_range = in_range / range.end.saturating_sub(range.start).max(1) as f64;
+    let by_limit = limit.map_or(0.0, |limit| (film.iterations() as f64 + begun) / limit.max(1) as f64);
+    by_range.max(by_limit)
+}
+
 /// Seconds that an iteration may take, the adding to the film not included, after so many `seconds` of a
 /// render with a limit; `is_first` if there is nothing on the film.
 fn seconds_left(limit: f64, seconds: f64, film_time: f64, is_first: bool) -> f64 {
@@ -433,6 +445,9 @@ fn seconds_until_it_pays(times: &PassSeconds, iterations: u64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use upbp_estimators::TechniqueSet;
+    use upbp_estimators::scene::PixelRect;
+
     use super::*;
 
     /// Two iterations of 8 s, a quarter of them light sub-paths, after a preparation of a second.
@@ -446,6 +461,34 @@ mod tests {
         // After 17 s of 20 it is, although less than half of it fits; after 18 s it is not.
         assert!(TIMES.total() + until_it_pays < 20.0);
         assert!(TIMES.total() + 1.0 + until_it_pays > 20.0);
+    }
+
+    #[test]
+    fn a_part_tells_the_time_of_a_whole_as_far_as_it_can() {
+        let [known, short, long] = [10, 1, 30].map(Duration::from_millis);
+        // A few sets do not take what a whole iteration takes.
+        assert_eq!(film_time(known, short, 8), known);
+        // Half of them do, up to a factor of two.
+        assert_eq!(film_time(known, short, SETS / 2), 2 * short);
+        assert_eq!(film_time(known, long, 8), long);
+        assert_eq!([short, long].map(|time| film_time(known, time, SETS)), [short, long]);
+    }
+
+    #[test]
+    fn begun_iterations_count_in_the_range_alone() {
+        let rect = PixelRect { x: 0, y: 0, width: 2, height: 1 };
+        let mut film = Film::new(rect, TechniqueSet::BPT);
+        let mut add = |iteration, end| film.add_part(iteration, 0..end, &[Pixel::BLACK; 2], &[]);
+        add(3, SETS / 2);
+        add(10, SETS);
+        add(11, SETS / 4);
+        assert_eq!(fraction_of_iterations(&film, &(10..20), None), 0.125);
+        assert_eq!(fraction_of_iterations(&film, &(0..5), None), 0.1);
+        assert_eq!(fraction_of_iterations(&film, &(20..25), None), 0.0);
+        assert_eq!(fraction_of_iterations(&film, &(10..20), Some(5)), 0.25);
+        // A range without iterations is no error.
+        let empty = Range { start: 20, end: 10 };
+        assert_eq!(fraction_of_iterations(&film, &empty, None), 0.0);
     }
 
     #[test]
