@@ -10,7 +10,7 @@ use crate::error::{RenderError, SettingsError};
 /// over photons or an estimate of the error that are being made. Of the iteration in hand the sets of pixels
 /// that are done stay on the film.
 ///
-/// It may be made before the render ([`Start`](crate::Start)); all copies stop the same renders.
+/// It is given to the render at its [start](crate::Start::canceller); all copies stop the same renders.
 #[derive(Clone, Debug, Default)]
 pub struct Canceller(Arc<AtomicBool>);
 
@@ -146,6 +146,9 @@ fn preparation_of(seconds: f64) -> f64 {
     (PREPARATION * seconds).max(least.min(largest_part * seconds))
 }
 
+/// Part of the full work that a first run does where nothing else is known of it: see [`Allowance::largest`].
+pub(crate) const FIRST_RUN: f64 = 1.0 / 128.0;
+
 /// The time that one step of a preparation may take.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Allowance<'a> {
@@ -187,13 +190,9 @@ impl<'a> Allowance<'a> {
     /// may end with `None` when it is halted. Small runs come first, each of which tells what there is time
     /// for. The result of the last one that has ended; `None` only if it was cancelled.
     ///
-    /// Without a limit it is the full work, at once.
-    pub(crate) fn largest<T>(&self, run: impl FnMut(f64, &Halt<'_>) -> Option<T>) -> Option<T> {
-        self.largest_from(1.0 / 128.0, run)
-    }
-
-    /// As [`largest`](Self::largest), with the part of the first run, which is the least that is done.
-    pub(crate) fn largest_from<T>(
+    /// Without a limit it is the full work, at once. Else the run of the part `first` is the least that is
+    /// done.
+    pub(crate) fn largest<T>(
         &self,
         first: f64,
         mut run: impl FnMut(f64, &Halt<'_>) -> Option<T>,
@@ -242,7 +241,7 @@ mod tests {
     fn without_a_limit_all_is_done_at_once() {
         let mut parts = Vec::new();
         let canceller = Canceller::default();
-        let result = Allowance::new(&canceller, None).largest(|part, halt| {
+        let result = Allowance::new(&canceller, None).largest(FIRST_RUN, |part, halt| {
             parts.push(part);
             assert!(!halt.now());
             Some(part)
@@ -257,17 +256,17 @@ mod tests {
     fn no_time_is_enough_for_something() {
         let canceller = Canceller::default();
         let mut runs = 0;
-        let result = Allowance::new(&canceller, Some(0.0)).largest(|part, _| {
+        let result = Allowance::new(&canceller, Some(0.0)).largest(FIRST_RUN, |part, _| {
             runs += 1;
             Some(part)
         });
-        assert_eq!((result, runs), (Some(1.0 / 128.0), 1));
+        assert_eq!((result, runs), (Some(FIRST_RUN), 1));
     }
 
     #[test]
     fn what_costs_nothing_is_done_in_full() {
         let canceller = Canceller::default();
-        let result = Allowance::new(&canceller, Some(1e9)).largest(|part, _| Some(part));
+        let result = Allowance::new(&canceller, Some(1e9)).largest(FIRST_RUN, |part, _| Some(part));
         assert_eq!(result, Some(1.0));
     }
 
@@ -293,11 +292,11 @@ mod tests {
     #[test]
     fn an_end_at_once_leaves_what_there_is() {
         let canceller = Canceller::default();
-        let result = Allowance::new(&canceller, Some(1e9)).largest(|part, halt| {
+        let result = Allowance::new(&canceller, Some(1e9)).largest(FIRST_RUN, |part, halt| {
             let ended = !halt.now();
             canceller.cancel();
             ended.then_some(part)
         });
-        assert_eq!(result, Some(1.0 / 128.0));
+        assert_eq!(result, Some(FIRST_RUN));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use upbp_core::{Image, Renderer, Settings, Start, Stop, StopReason};
+use upbp_core::{Canceller, Image, Renderer, Settings, Start, Stop, StopReason};
 use upbp_scene::ReadyScene;
 
 fn renderer(room: &ReadyScene) -> Renderer<'_> {
@@ -41,8 +41,11 @@ fn each_rule_stops() {
     assert_eq!(reason, StopReason::Cancelled);
     assert_eq!(by_callback.film().iterations(), 3);
 
-    let mut by_handle = renderer(&room);
-    let canceller = by_handle.canceller();
+    let canceller = Canceller::default();
+    let settings = Settings { techniques: "bpt".parse().expect("a technique"), ..Settings::default() };
+    let start = Start { canceller: canceller.clone(), ..Start::default() };
+    let by_handle = room.start_renderer(settings.validate().expect("valid settings"), start);
+    let mut by_handle = by_handle.expect("a scene that can be rendered");
     let reason = by_handle.render(&Stop::default(), |now| {
         if now.iterations == 2 {
             canceller.cancel();

@@ -120,8 +120,7 @@ pub(crate) fn choose<S: Scene, L: Lanes>(
         let paths = paths.map(|count| times * count);
         let run = |part, halt: &Halt<'_>| measure_enough::<S, L>(scene, &plan, paths, part, enough, halt);
         let allowance = budget.part((1.0 - QUICK_LOOK) * TIME_FOR_EMITTERS * part);
-        let seen =
-            allowance.largest_from(FIRST_PART / f64::from(times), run).ok_or(RenderError::Cancelled)?;
+        let seen = allowance.largest(FIRST_PART / f64::from(times), run).ok_or(RenderError::Cancelled)?;
         by_technique = seen.by_technique;
         if emitters > 1 {
             scene.choose_emitters_by(&seen.emission, &shares(&seen.next_events, emitters));

@@ -18,16 +18,16 @@ pub(super) fn choose<S: Scene>(scene: &PreparedScene<'_, S>, settings: &Settings
     lane_probabilities(scene.scene.media())
 }
 
-/// The lanes of a plan that is given.
+/// Checks the lanes of a plan that is given.
 ///
 /// # Errors
 /// If the settings rule them out, or if the scene's media have a lane that is not drawn and no other is like
 /// it: what scatters in it alone would be missing.
-pub(super) fn of_plan<S: Scene>(
+pub(super) fn check<S: Scene>(
     scene: &PreparedScene<'_, S>,
     plan: &Plan,
     settings: &Settings,
-) -> Result<Option<[f64; 3]>, RenderError> {
+) -> Result<(), RenderError> {
     if plan.lanes.is_some() && settings.heuristic != Heuristic::Balance {
         return Err(RenderError::Settings(SettingsError {
             name: "heuristic",
@@ -43,5 +43,5 @@ pub(super) fn of_plan<S: Scene>(
              found {lanes:?}"
         )));
     }
-    Ok(plan.lanes)
+    Ok(())
 }

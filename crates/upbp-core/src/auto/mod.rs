@@ -120,7 +120,8 @@ fn check<S: Scene>(
     let support = TechniqueSupport::of(scene, settings)?;
     support.check(&plan)?;
     let room = Room::of(scene, settings, support.techniques, plan.lanes.is_some(), true)?;
-    let lanes = lanes::of_plan(scene, &plan, settings)?;
+    lanes::check(scene, &plan, settings)?;
+    let lanes = plan.lanes;
     let inputs = Inputs { settings, techniques: plan.techniques, lanes };
     let statistics = if lanes.is_some() {
         measure::<S, [f64; 3]>(scene, inputs, &room, budget)?

@@ -20,7 +20,7 @@ use super::photon_distances::{Nearest, Neighbours, median};
 use super::pixel_footprint::{self, FAR};
 use super::roulette::usual_roulette;
 use super::thinned::Thinned;
-use crate::deadline::{Allowance, Clock, Halt};
+use crate::deadline::{Allowance, Clock, FIRST_RUN, Halt};
 use crate::error::RenderError;
 
 /// Light sub-paths of a quick look.
@@ -110,7 +110,7 @@ pub(super) fn measure<S: Scene, L: Lanes>(
         };
         Some(light.statistics(&plan, field, &queries, scene.bounds.radius))
     };
-    allowance.largest(run).ok_or(RenderError::Cancelled)
+    allowance.largest(FIRST_RUN, run).ok_or(RenderError::Cancelled)
 }
 
 /// A plan whose light sub-paths and camera sub-paths go where those of iterations do. Its radii are of no

@@ -16,6 +16,7 @@ impl<T, const MOST: usize> Default for Thinned<T, MOST> {
 
 impl<T, const MOST: usize> Thinned<T, MOST> {
     pub(super) fn push(&mut self, element: T) {
+        const { assert!(MOST.is_multiple_of(2), "every second element of an odd number is not half of them") };
         if self.count.is_multiple_of(self.step) {
             if self.kept.len() == MOST {
                 self.thin_to(2 * self.step);

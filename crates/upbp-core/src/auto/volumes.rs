@@ -17,7 +17,7 @@ use upbp_estimators::{Counters, IterationPlan, LightMap, PreparedScene, Techniqu
 use super::full_plan::{Inputs, Planner, pilot_plan};
 use super::parallel_walks::{PilotRun, camera_path, in_pieces, pixel};
 use super::statistics::Statistics;
-use crate::deadline::{Budget, Halt};
+use crate::deadline::{Budget, FIRST_RUN, Halt};
 use crate::error::RenderError;
 use crate::media::Medium;
 use crate::settings::CheckedSettings;
@@ -25,7 +25,7 @@ use crate::settings::CheckedSettings;
 /// Camera sub-paths of a pass.
 const PATHS: u32 = 2048;
 /// Passes, with the same pixels.
-const PASSES: u32 = 2;
+const PASSES: usize = 2;
 /// Blocks of the picture along each side, whose mean radiance errors are relative to.
 const BLOCKS: u32 = 8;
 /// Part of the mean radiance of the picture that is added to that of a block, so that a black one has no say.
@@ -66,16 +66,12 @@ pub(crate) fn choose<S: Scene>(
     let plan = pilot_plan(scene, settings, &plan);
     let run = |part: f64, halt: &Halt<'_>| {
         let paths = (part * f64::from(PATHS)).ceil() as u32;
-        let passes = (0..PASSES).map(|pass| trace_pass(scene, &plan, pass, paths, halt));
-        Some(Walks { paths, passes: passes.collect::<Option<_>>()? })
+        let trace = |pass| trace_pass(scene, &plan, pass, paths, halt);
+        Some(Walks { paths, passes: [trace(0)?, trace(1)?] })
     };
-    let walks = budget.part(TIME_FOR_VOLUMES).largest(run).ok_or(RenderError::Cancelled)?;
+    let walks = budget.part(TIME_FOR_VOLUMES).largest(FIRST_RUN, run).ok_or(RenderError::Cancelled)?;
     let factors = walks.relative_to(PixelRect::whole(scene.scene.camera().resolution()));
-    let least = if scene.scene.has_specular_surfaces() {
-        SELDOM * f64::from(PASSES * walks.paths)
-    } else {
-        LEAST_MET
-    };
+    let least = if scene.scene.has_specular_surfaces() { SELDOM * walks.count() } else { LEAST_MET };
     scene.leave_out_volumes(|emitter| walks.are_hits_enough(emitter, &factors, least));
     Ok(())
 }
@@ -170,10 +166,15 @@ impl<B> Observer<B> for LightRecorder<'_> {
 /// Camera sub-paths, by pass and pixel.
 struct Walks {
     paths: u32,
-    passes: Vec<Vec<WalkLight>>,
+    passes: [Vec<WalkLight>; PASSES],
 }
 
 impl Walks {
+    /// Number of camera sub-paths of all passes.
+    fn count(&self) -> f64 {
+        PASSES as f64 * f64::from(self.paths)
+    }
+
     /// The factor by which the light at each pixel becomes relative to the radiance around.
     fn relative_to(&self, film: PixelRect) -> Vec<f64> {
         let block = |index: usize| {
@@ -188,7 +189,7 @@ impl Walks {
             *count += 1.0;
             sum += seen.all;
         }
-        let mean = sum / f64::from(PASSES * self.paths);
+        let mean = sum / self.count();
         let around = |index: usize| {
             let (radiance, count) = blocks[block(index)];
             radiance / count + DARK * mean
@@ -203,7 +204,7 @@ impl Walks {
         let (mut sum, mut squares) = (0.0, 0.0);
         for (index, factor) in factors.iter().enumerate() {
             let square = factor * factor;
-            let lights = [0, 1].map(|pass: usize| self.passes[pass][index].of(emitter));
+            let lights = self.passes.each_ref().map(|pass| pass[index].of(emitter));
             // Two independent walks at a pixel: half the square of their difference is their variance.
             let variance = |of: fn(&Light) -> f64| 0.5 * square * (of(&lights[0]) - of(&lights[1])).powi(2);
             shared += variance(|light| light.shared);
@@ -229,8 +230,8 @@ mod tests {
 
     fn walks(of: impl Fn(usize, usize) -> Light) -> Walks {
         let seen = |pass, index| WalkLight { all: 1.0, lights: vec![(LAMP, of(pass, index))] };
-        let passes = (0..2).map(|pass| (0..1000).map(|index| seen(pass, index)).collect());
-        Walks { paths: 1000, passes: passes.collect() }
+        let passes = [0, 1].map(|pass| (0..1000).map(|index| seen(pass, index)).collect());
+        Walks { paths: 1000, passes }
     }
 
     /// A hit of the given value.

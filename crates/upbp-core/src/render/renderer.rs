@@ -382,12 +382,6 @@ impl<'a> Renderer<'a> {
         by_iterations.max(by_time).max(by_error).clamp(0.0, 1.0)
     }
 
-    /// A handle that stops the render from any thread.
-    #[must_use]
-    pub fn canceller(&self) -> Canceller {
-        self.canceller.clone()
-    }
-
     /// The film.
     #[must_use]
     pub const fn film(&self) -> &Film {
