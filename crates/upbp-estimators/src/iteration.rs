@@ -154,6 +154,8 @@ pub struct IterationChoices {
     pub query_beams: BeamExtent,
     /// The probability of each lane to be the hero of a sub-path, if walks run in lanes; they sum to one.
     pub lanes: Option<[f64; 3]>,
+    /// Whether camera sub-paths tell the [`Features`](crate::Features) of what they see first.
+    pub features: bool,
 }
 
 /// The kernels of a technique in a medium.
@@ -278,7 +280,7 @@ impl IterationPlan {
             turns: periods.turns(choices.seed, choices.iteration),
             mis,
             merges,
-            features: false,
+            features: choices.features,
         }
     }
 

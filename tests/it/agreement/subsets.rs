@@ -56,6 +56,7 @@ pub(super) fn choices(techniques: &str, lengths: PathLengths, seed: u64) -> Iter
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
         lanes: None,
+        features: false,
     }
 }
 

@@ -56,6 +56,7 @@ fn choices() -> IterationChoices {
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Long,
         lanes: None,
+        features: false,
     }
 }
 

@@ -267,6 +267,7 @@ impl Setup {
                 photon_beams: self.photon_beams,
                 query_beams: self.query_beams,
                 lanes: None,
+                features: false,
             },
         )
     }

@@ -61,6 +61,7 @@ fn photons_in(
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Long,
             lanes: None,
+            features: false,
         },
     );
     let context = Context { prepared: &world, plan: &plan };

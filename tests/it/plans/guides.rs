@@ -214,6 +214,7 @@ fn kernels_of_fewer_light_sub_paths_hold_as_many_photons() {
             photon_beams: BeamExtent::Short,
             query_beams: BeamExtent::Short,
             lanes: None,
+            features: false,
         },
     );
     let photons = |plan: &IterationPlan, kernel: fn(&Kernels) -> Kernel| {

@@ -194,13 +194,14 @@ impl<S: Scene> Planner<'_, '_, S> {
 }
 
 /// The first iteration of a plan, for runs that tell the densities of techniques from their parts in weights:
-/// with the heuristic whose weights do, whichever the render has.
+/// with the heuristic whose weights do, whichever the render has, and without features, which nobody asks
+/// these runs for.
 pub(super) fn pilot_plan<S: Scene>(
     scene: &PreparedScene<'_, S>,
     settings: &Settings,
     plan: &Plan,
 ) -> IterationPlan {
-    let settings = Settings { heuristic: Heuristic::Balance, ..settings.clone() };
+    let settings = Settings { heuristic: Heuristic::Balance, features: false, ..settings.clone() };
     iteration_plan(scene, &settings, plan, 0)
 }
 
@@ -211,7 +212,7 @@ pub(crate) fn iteration_plan<S: Scene>(
     plan: &Plan,
     iteration: u64,
 ) -> IterationPlan {
-    let iteration_plan = IterationPlan::new(
+    IterationPlan::new(
         scene.scene,
         &IterationChoices {
             seed: settings.seed,
@@ -233,7 +234,7 @@ pub(crate) fn iteration_plan<S: Scene>(
             photon_beams: settings.photon_beams,
             query_beams: settings.query_beams,
             lanes: plan.lanes,
+            features: settings.features,
         },
-    );
-    IterationPlan { features: settings.features, ..iteration_plan }
+    )
 }

@@ -141,6 +141,7 @@ fn nominal_plan<S: Scene>(
         photon_beams: settings.photon_beams,
         query_beams: BeamExtent::Short,
         lanes,
+        features: false,
     };
     IterationPlan::new(scene.scene, &choices)
 }

@@ -223,6 +223,7 @@ fn trace(scene: &Room) -> Counters {
         photon_beams: BeamExtent::Short,
         query_beams: BeamExtent::Short,
         lanes: None,
+        features: false,
     };
     let plan = IterationPlan::new(scene, &choices);
     let context = Context { prepared: &prepared, plan: &plan };
