@@ -138,6 +138,9 @@ pub struct FrozenPlan {
 }
 
 impl FrozenPlan {
+    /// Beginning of the text of every plan.
+    pub(crate) const BEGINNING: &'static str = "FrozenPlan(";
+
     /// Reads a plan from RON text, as [`to_ron`](Self::to_ron) writes it.
     ///
     /// # Errors
@@ -151,7 +154,9 @@ impl FrozenPlan {
     pub fn to_ron(&self) -> String {
         let pretty = ron::ser::PrettyConfig::default().compact_arrays(true);
         // Numbers and names: there is nothing that RON cannot spell.
-        format!("FrozenPlan{}", ron::ser::to_string_pretty(self, pretty).unwrap_or_default())
+        let text = ron::ser::to_string_pretty(self, pretty).unwrap_or_default();
+        // Without the name the text begins with the parenthesis.
+        format!("{}{}", Self::BEGINNING, text.strip_prefix('(').unwrap_or(&text))
     }
 }
 

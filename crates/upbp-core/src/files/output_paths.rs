@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use self::platform::{FileId, file_id, is_block_device, is_character_device};
 use super::atomic_write::{check_writable, folder, is_one_name, target};
 use crate::error::OutputError;
+use crate::plan::FrozenPlan;
+use crate::state::MAGIC;
 
 /// Kinds of files. One that is there and holds something else is not overwritten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,8 +46,8 @@ impl Content {
             Self::Exr => b"\x76\x2f\x31\x01",
             Self::Png => b"\x89PNG\r\n\x1a\n",
             Self::Report => b"{\n  \"version\":",
-            Self::Plan => b"FrozenPlan(",
-            Self::State => b"UPBPSTAT",
+            Self::Plan => FrozenPlan::BEGINNING.as_bytes(),
+            Self::State => &MAGIC,
             Self::Text(beginning) => beginning.as_bytes(),
         }
     }
@@ -75,7 +77,7 @@ pub struct Output<'a> {
 pub fn check_outputs(outputs: &[Output<'_>], inputs: &[(&str, &Path)]) -> Result<(), OutputError> {
     // An input that is not there cannot be destroyed.
     let mut taken: Vec<_> =
-        inputs.iter().filter_map(|&(role, path)| Some((role, path, Identity::of(path).ok()?))).collect();
+        inputs.iter().filter_map(|&(role, path)| Some((role, path, FileIdentity::of(path).ok()?))).collect();
     for &Output { role, path, content } in outputs {
         let fail = |source| OutputError::Write { path: path.to_owned(), source };
         let metadata = fs::metadata(path).ok();
@@ -86,7 +88,7 @@ pub fn check_outputs(outputs: &[Output<'_>], inputs: &[(&str, &Path)]) -> Result
         if metadata.as_ref().is_some_and(is_block_device) {
             return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, "it is a disk")));
         }
-        let identity = Identity::of(path).map_err(fail)?;
+        let identity = FileIdentity::of(path).map_err(fail)?;
         for &(other_role, other_path, ref other) in &taken {
             if identity.is(other).map_err(fail)? {
                 return Err(OutputError::SameFile {
@@ -118,14 +120,14 @@ fn holds(path: &Path, content: Content) -> io::Result<bool> {
 }
 
 /// Identity of a file.
-enum Identity {
+enum FileIdentity {
     /// One that is there.
     There(FileId),
     /// One to come, in a folder that is there.
     New { folder: FileId, path: PathBuf },
 }
 
-impl Identity {
+impl FileIdentity {
     fn of(path: &Path) -> io::Result<Self> {
         match file_id(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {

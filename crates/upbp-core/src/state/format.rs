@@ -27,7 +27,7 @@ use crate::film::pixel_sets::SETS;
 use crate::film::{IterationSet, MAX_ITERATIONS};
 
 /// First bytes of every state file.
-const MAGIC: [u8; 8] = *b"UPBPSTAT";
+pub(crate) const MAGIC: [u8; 8] = *b"UPBPSTAT";
 
 /// Version of the format.
 const VERSION: u32 = 9;

@@ -21,7 +21,7 @@ use crate::error::{OutputError, StateError};
 use crate::files::{open_file, write_whole};
 use crate::film::{Film, Image, MAX_ITERATIONS};
 
-pub(crate) use format::fingerprint;
+pub(crate) use format::{MAGIC, fingerprint};
 
 /// A render at some moment: what it is, what it has done, its film.
 #[derive(Clone, Debug, PartialEq)]
