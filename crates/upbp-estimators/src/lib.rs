@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod camera_output;
 pub mod check;
 mod counters;
 mod emission_guide;
@@ -8,7 +9,6 @@ mod emitter_selection;
 mod emitter_tree;
 mod emitters_by_receiver;
 mod features;
-mod film_sample;
 mod iteration;
 mod kernel;
 mod lens_emitters;
@@ -31,12 +31,12 @@ pub use glam;
 /// Participating media, phase functions, spectra.
 pub use upbp_media as media;
 
+pub use camera_output::CameraWalk;
 pub use counters::Counters;
 pub use emission_guide::{EmissionGuide, EmissionSample};
 pub use emitter_choice::{EmitterChoice, EmitterChoiceError};
 pub use emitter_selection::{EmitterSample, EmitterShares, effective_samples};
 pub use features::Features;
-pub use film_sample::CameraWalk;
 pub use iteration::{IterationChoices, IterationPlan, Kernels, LEAST_RADIUS, NO_LIMIT, PathLengths};
 pub use kernel::Kernel;
 pub use light_map::LightMap;

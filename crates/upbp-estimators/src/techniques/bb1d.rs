@@ -3,7 +3,7 @@
 use upbp_media::Lanes;
 
 use super::merge::merge;
-use crate::film_sample::Output;
+use crate::camera_output::Output;
 use crate::light_map::LightMap;
 use crate::observer::Observer;
 use crate::path::{CameraEdge, Context, EdgeTrace};

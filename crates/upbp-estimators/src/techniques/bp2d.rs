@@ -3,7 +3,7 @@
 use upbp_media::{Lanes, MediumId};
 
 use super::merge::merge;
-use crate::film_sample::Output;
+use crate::camera_output::Output;
 use crate::light_map::LightMap;
 use crate::observer::Observer;
 use crate::path::{CameraVertex, Context};

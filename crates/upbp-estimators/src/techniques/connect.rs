@@ -5,7 +5,7 @@
 
 use upbp_media::Lanes;
 
-use crate::film_sample::Output;
+use crate::camera_output::Output;
 use crate::light_map::LightMap;
 use crate::observer::{Completion, ObservedSample, Observer};
 use crate::path::{

@@ -2,7 +2,7 @@
 
 use upbp_media::{Lanes, Medium, Spectrum};
 
-use crate::film_sample::Output;
+use crate::camera_output::Output;
 use crate::mis::{Densities, Edge, Weight};
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{CameraEdge, Context, EdgeTrace, MediumSpan};

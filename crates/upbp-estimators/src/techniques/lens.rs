@@ -3,7 +3,7 @@
 
 use upbp_media::Lanes;
 
-use crate::film_sample::Output;
+use crate::camera_output::Output;
 use crate::mis::Densities;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{Context, Target, clear_edge};

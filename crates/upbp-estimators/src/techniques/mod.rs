@@ -27,7 +27,7 @@ use pb2d::pb2d;
 use pp3d::pp3d;
 use surf::surf;
 
-use crate::film_sample::Output;
+use crate::camera_output::Output;
 use crate::light_map::LightMap;
 use crate::observer::Observer;
 use crate::path::{CameraEdge, CameraVertex, Context, EdgeTrace, Interaction};

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use upbp_media::{BodyId, Lanes, MediumStack};
 
-use crate::film_sample::Output;
+use crate::camera_output::Output;
 use crate::observer::{Completion, LightEnd, ObservedSample, Observer};
 use crate::path::{
     CameraVertex, Context, MIN_COSINE, MediumInterface, Target, clear_edge, cross_all, ray_origin,

@@ -5,8 +5,8 @@ use upbp_accel::Ray;
 use upbp_media::{Lanes, Spectrum};
 
 use super::first_seen::FirstSeen;
+use crate::camera_output::{CameraWalk, Output};
 use crate::counters::Counters;
-use crate::film_sample::{CameraWalk, Output};
 use crate::light_map::LightMap;
 use crate::mis::{BeamExtent, Densities, Edge, EdgeMis};
 use crate::observer::{ObservedVertex, Observer};

@@ -3,8 +3,8 @@
 use glam::Vec3;
 use upbp_media::Spectrum;
 
+use crate::camera_output::CameraWalk;
 use crate::features::Features;
-use crate::film_sample::CameraWalk;
 use crate::path::Arrived;
 use crate::scene::Scene;
 use crate::technique::Layer;
