@@ -13,7 +13,7 @@ use crate::scene::{BoundingSphere, Emitter, EmitterBounds, EmitterId};
 /// The least part of its intensity that a node is taken to send anywhere: bounds are the host's word.
 const LEAST_INTENSITY: f64 = 0.02;
 /// Most clusters of emitters that are told apart where shares are learnt.
-pub(crate) const MOST_CLUSTERS: usize = 64;
+const MOST_CLUSTERS: usize = 64;
 /// No side of a split has less than one of this many emitters, so that the depth is logarithmic.
 const BALANCE: usize = 8;
 /// Smallest squared distance, square scene units.

@@ -188,13 +188,13 @@ impl ObjFile {
 
     /// The number of materials that have triangles.
     #[must_use]
-    pub fn material_count(&self) -> usize {
+    pub(crate) fn material_count(&self) -> usize {
         self.ranges.iter().filter(|ranges| !ranges[MATERIAL].is_empty()).count()
     }
 
     /// Whether faces are meant to look smooth, in smoothing groups, and the file has no normals for it.
     #[must_use]
-    pub fn lacks_normals(&self) -> bool {
+    pub(crate) fn lacks_normals(&self) -> bool {
         self.has_smoothing_groups && self.normals.is_empty()
     }
 

@@ -7,7 +7,7 @@ use std::io::BufRead;
 use upbp_media::{MediaError, PhaseFunction, Spectrum};
 
 /// The largest file that is read, in bytes.
-pub const MAX_FILE: u64 = 1 << 24;
+pub(crate) const MAX_FILE: u64 = 1 << 24;
 
 /// Reads a table.
 ///

@@ -175,7 +175,7 @@ impl ErrorEstimate {
     /// A rule that asks often stops at the luckiest answer: ask after the iterations that
     /// [`is_due`](Self::is_due) names.
     #[must_use]
-    pub fn reached(&self, target: f64) -> bool {
+    pub(crate) fn reached(&self, target: f64) -> bool {
         self.high <= target
     }
 
@@ -183,7 +183,7 @@ impl ErrorEstimate {
     /// 40 and so on, four times while the number doubles. Which ones does not depend on where a render
     /// was interrupted.
     #[must_use]
-    pub const fn is_due(iterations: u64) -> bool {
+    pub(crate) const fn is_due(iterations: u64) -> bool {
         // No digits but the first three.
         iterations >= FEW_ITERATIONS && iterations.trailing_zeros() + 2 >= iterations.ilog2()
     }

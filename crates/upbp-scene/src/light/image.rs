@@ -214,7 +214,7 @@ impl EnvironmentImage {
 
     /// The number of pixels of a file that were infinite in a channel, as the sun is in half precision.
     #[must_use]
-    pub const fn infinite_pixels(&self) -> usize {
+    pub(crate) const fn infinite_pixels(&self) -> usize {
         self.infinite_pixels
     }
 

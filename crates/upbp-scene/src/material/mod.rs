@@ -49,7 +49,7 @@ impl Material {
     /// Whether the material scatters light into single directions only. Rough glass does where the indices on
     /// both sides are the same, which the material does not know.
     #[must_use]
-    pub const fn is_specular(&self) -> bool {
+    pub(crate) const fn is_specular(&self) -> bool {
         matches!(self, Self::Mirror(_) | Self::Dielectric(_))
     }
 }
