@@ -135,13 +135,6 @@ impl MediumStack {
         self.entries().last().map_or(1.0, |entry| entry.ior)
     }
 
-    /// Priority of the topmost body; `i32::MIN` outside all bodies.
-    #[inline]
-    #[must_use]
-    pub fn priority(&self) -> i32 {
-        self.entries().last().map_or(i32::MIN, |entry| entry.priority)
-    }
-
     /// Whether the point is inside of `body`, on top or hidden.
     #[inline]
     #[must_use]
@@ -262,7 +255,7 @@ mod tests {
     fn outside_everything_is_the_global_medium() {
         let stack = MediumStack::new(Some(MediumId(7)));
         assert!(stack.is_empty());
-        assert_eq!((stack.medium(), stack.ior(), stack.priority()), (Some(MediumId(7)), 1.0, i32::MIN));
+        assert_eq!((stack.medium(), stack.ior()), (Some(MediumId(7)), 1.0));
         assert_eq!((stack.top(), stack.len()), (None, 0));
     }
 
@@ -296,7 +289,7 @@ mod tests {
         assert_eq!(stack.enter(interior(1, 0)), Crossed::Done);
         // The second time even with another priority.
         assert_eq!(stack.enter(interior(1, 3)), Crossed::AlreadyInside);
-        assert_eq!((stack.len(), stack.priority()), (1, 0));
+        assert_eq!((stack.len(), stack.top()), (1, Some(interior(1, 0))));
         assert_eq!(stack.leave(BodyId(2)), Crossed::NotInside);
         assert_eq!(stack.len(), 1);
     }

@@ -165,12 +165,6 @@ impl<L: LaneValues> EdgeDensity<L> {
     }
 }
 
-impl<L: LaneValues> Default for EdgeDensity<L> {
-    fn default() -> Self {
-        Self::EMPTY
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::collection::vec;
@@ -278,7 +272,7 @@ mod tests {
 
     #[test]
     fn an_edge_without_segments_passes() {
-        let edge = EdgeDensity::<f64>::default();
+        let edge = EdgeDensity::<f64>::EMPTY;
         assert_eq!((edge.pass_probability, edge.transmittance), (1.0, Spectrum::ONE));
         assert_eq!((edge.forward(true), edge.backward(true)), (0.0, 0.0));
     }

@@ -196,7 +196,7 @@ fn is_surface(bodies: &[Body], before: &MediumStack, behind: &MediumStack) -> bo
     let refracts = |rank: &i32| bodies.iter().any(|body| body.rank == *rank && body.refracts);
     let highest = [goes(before, behind), goes(behind, before)].concat().into_iter().filter(refracts).max();
     let Some(highest) = highest else { return false };
-    let (here, there) = (before.priority(), behind.priority());
+    let [here, there] = [before, behind].map(|stack| stack.top().map_or(i32::MIN, |body| body.priority));
     here != there && (here == highest || there == highest || before.ior() != behind.ior())
 }
 

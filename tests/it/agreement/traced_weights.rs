@@ -464,7 +464,7 @@ fn bodies_around_a_point_on_the_way_are_those_that_contain_it() {
             let t = span.start + (span.end.min(10.0) - span.start) * random.uniform();
             let found = edge_trace.stack_in(span, t);
             assert_eq!(found, scene.stack_at(ray.at(t)), "{ray:?}, {t}");
-            hidden += usize::from(found.len() > 1 && found.priority() == 10);
+            hidden += usize::from(found.len() > 1 && found.top().is_some_and(|body| body.priority == 10));
         }
     }
     assert!(hidden > 100, "only {hidden} points in fog and glass");

@@ -43,29 +43,27 @@ impl Block {
 pub struct PointTree {
     tree: PackedTree<Rounded, Block>,
     count: usize,
-    dropped: usize,
 }
 
 impl PointTree {
-    /// Builds the tree over points in scene units. Points that are not finite are dropped and
-    /// [counted](PointTree::dropped).
+    /// Builds the tree over points in scene units. Points that are not finite are dropped,
+    /// and not [counted](PointTree::len).
     ///
     /// # Panics
     /// For more than `u32::MAX` points.
     #[must_use]
     pub fn build(mut points: Vec<(Vec3, u32)>) -> Self {
-        let count = points.len();
         if !points.par_iter().with_min_len(1 << 14).all(|(position, _)| position.is_finite()) {
             points.retain(|(position, _)| position.is_finite());
         }
-        let dropped = count - points.len();
+        let count = points.len();
         if points.is_empty() {
-            return Self { tree: PackedTree::EMPTY, count: 0, dropped };
+            return Self { tree: PackedTree::EMPTY, count };
         }
         let empty = Block { position: [[f32::NAN; WIDTH]; 3], payload: [0; WIDTH] };
         let bounds = |&(position, _): &Item<u32>| (position, position);
         let tree = PackedTree::build(points, bounds, empty, Block::fill);
-        Self { tree, count: count - dropped, dropped }
+        Self { tree, count }
     }
 
     /// Visits every point nearer than `radius` to `centre`, in scene units; `visit` gets the payload and the
@@ -256,12 +254,6 @@ impl PointTree {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
-    }
-
-    /// The number of points that were left out because they were not finite.
-    #[must_use]
-    pub fn dropped(&self) -> usize {
-        self.dropped
     }
 
     /// Memory in use, bytes.

@@ -67,20 +67,17 @@ pub struct SegmentTree {
     tree: PackedTree<Exact, Block>,
     payloads: Vec<u32>,
     pieces: usize,
-    dropped: usize,
 }
 
 impl SegmentTree {
-    /// Builds the tree. Segments that are empty or not finite are dropped and
-    /// [counted](SegmentTree::dropped): clip a beam without an end to the scene first.
+    /// Builds the tree. Segments that are empty or not finite are dropped, and
+    /// not [counted](SegmentTree::len): clip a beam without an end to the scene first.
     ///
     /// # Panics
     /// For more than `u32::MAX` pieces.
     #[must_use]
     pub fn build(mut segments: Vec<(Segment, u32)>, params: SplitParams) -> Self {
-        let count = segments.len();
         segments.retain(|(segment, _)| segment.is_usable());
-        let dropped = count - segments.len();
         let pieces = split(segments.iter().map(|(segment, _)| segment), params);
         // Without what widens boxes, which must not change the order.
         let item = |index: usize| {
@@ -103,7 +100,7 @@ impl SegmentTree {
             }
         });
         let payloads = segments.into_iter().map(|(_, payload)| payload).collect();
-        Self { tree, payloads, pieces: pieces.len(), dropped }
+        Self { tree, payloads, pieces: pieces.len() }
     }
 
     /// Visits every segment that the ray passes within `radius`, at its closest approach to it, see
@@ -274,12 +271,6 @@ impl SegmentTree {
     #[must_use]
     pub fn pieces(&self) -> usize {
         self.pieces
-    }
-
-    /// The number of segments that were left out because they were empty or not finite.
-    #[must_use]
-    pub fn dropped(&self) -> usize {
-        self.dropped
     }
 
     /// Memory in use, bytes.
