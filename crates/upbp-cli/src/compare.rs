@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 use upbp_core::{Image, check_outputs, read_exr};
 
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, Failures, say};
 use crate::files::{self, Images};
 
 /// Side of a block in pixels.
@@ -41,13 +41,13 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     let comparison = pair.compare().map_err(|reason| {
         Failure::Input(format!("{} and {}: {reason}", options.image.display(), options.reference.display()))
     })?;
-    let mut failures = Vec::new();
+    let mut failures = Failures::default();
     if let Some(images) = &options.output {
         let error = pair.error();
-        images.write(&error, &in_colour(&error, options.exposure), |written| failures.extend(written.err()));
+        images.write(&error, &in_colour(&error, options.exposure), &mut failures);
     }
     let said = say(&comparison.text(&options.image, &options.reference));
-    Failure::all(&failures)?;
+    failures.all()?;
     said?;
     match &options.output {
         Some(images) => say(&format!("wrote {}", images.names())),

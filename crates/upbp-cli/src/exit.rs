@@ -29,11 +29,21 @@ impl Failure {
     pub(crate) fn input(error: impl Into<Box<dyn Error>>) -> Self {
         Self::Input(describe(&*error.into()))
     }
+}
 
-    /// Makes one failure of all files that could not be written, if there are any.
-    pub(crate) fn all(failures: &[OutputError]) -> Result<(), Self> {
-        let messages: Vec<_> = failures.iter().map(|error| describe(error)).collect();
-        if messages.is_empty() { Ok(()) } else { Err(Self::Output(messages.join("\nerror: "))) }
+/// Messages about files that could not be written; none keeps the others from being written.
+#[derive(Default)]
+pub(crate) struct Failures(Vec<String>);
+
+impl Failures {
+    /// Takes note of what came of writing a file.
+    pub(crate) fn note(&mut self, written: Result<(), OutputError>) {
+        self.0.extend(written.err().map(|error| describe(&error)));
+    }
+
+    /// Makes one failure of all, if there are any.
+    pub(crate) fn all(self) -> Result<(), Failure> {
+        if self.0.is_empty() { Ok(()) } else { Err(Failure::Output(self.0.join("\nerror: "))) }
     }
 }
 

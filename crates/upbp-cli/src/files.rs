@@ -9,7 +9,7 @@ use upbp_core::{
     write_png, write_text,
 };
 
-use crate::exit::complain;
+use crate::exit::{Failures, complain};
 
 /// Places of images: an OpenEXR image and a PNG beside it, or a PNG alone.
 #[derive(Clone, Debug)]
@@ -56,13 +56,13 @@ impl Images {
         state: &State,
         report: &Report,
         tones: ToneMapping,
-        mut attempt: impl FnMut(Result<(), OutputError>),
+        failures: &mut Failures,
     ) -> Option<String> {
         if let Some(path) = &self.exr {
-            attempt(write_exr(path, state, report));
+            failures.note(write_exr(path, state, report));
         }
         let image = state.film().image();
-        attempt(write_png(&self.png, &image, tones));
+        failures.note(write_png(&self.png, &image, tones));
         if image.pixels.iter().flatten().all(|value| *value == 0.0) {
             // Nobody who renders in a script looks at every picture.
             complain(BLACK);
@@ -71,16 +71,11 @@ impl Images {
     }
 
     /// Writes an image, and another one to look at, each whatever became of the other.
-    pub(crate) fn write(
-        &self,
-        image: &Image,
-        shown: &Image,
-        mut attempt: impl FnMut(Result<(), OutputError>),
-    ) {
+    pub(crate) fn write(&self, image: &Image, shown: &Image, failures: &mut Failures) {
         if let Some(path) = &self.exr {
-            attempt(write_image(path, image));
+            failures.note(write_image(path, image));
         }
-        attempt(write_png(&self.png, shown, ToneMapping::default()));
+        failures.note(write_png(&self.png, shown, ToneMapping::default()));
     }
 
     /// A hint for a PNG that is darker than a sixteenth of white, all but the brightest hundredth of it.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 use upbp_core::{Content, Output, OutputError, State, check_outputs};
 
-use crate::exit::{Failure, say};
+use crate::exit::{Failure, Failures, say};
 use crate::files::{self, Images, Look};
 
 #[derive(Debug, Args)]
@@ -64,19 +64,18 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::Input("there is no picture in the states yet: no pixel is rendered".to_owned()));
     }
     let report = merged.report();
-    let mut failures = Vec::new();
-    let mut attempt = |written: Result<(), OutputError>| failures.extend(written.err());
+    let mut failures = Failures::default();
     if let Some(path) = &options.state {
-        attempt(merged.save(path));
+        failures.note(merged.save(path));
     }
     let mut hint = None;
     if let Some(images) = &options.image.output {
-        hint = images.write_render(&merged, &report, options.image.look.tones(), &mut attempt);
+        hint = images.write_render(&merged, &report, options.image.look.tones(), &mut failures);
     }
     if let Some(path) = &options.report {
-        attempt(files::write_report(&report, path));
+        failures.note(files::write_report(&report, path));
     }
-    Failure::all(&failures)?;
+    failures.all()?;
     // Last, since nobody may be reading.
     if options.quiet {
         files::warn(&report);

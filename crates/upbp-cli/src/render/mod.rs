@@ -14,8 +14,8 @@ use upbp_core::{
 };
 use upbp_scene::{ReadyScene, SceneError};
 
-use crate::exit::{Failure, complain, say};
-use crate::files;
+use crate::exit::{Failure, Failures, complain, say};
+use crate::files::{self, Images};
 use bar::Bar;
 pub(crate) use options::{Options, names};
 use progress::{Beside, render};
@@ -25,7 +25,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     in_pool(options, || {
         let canceller = interrupt::install().map_err(Failure::input)?;
         let job = Job::read(options)?;
-        for output in options.outputs(&options.images()) {
+        for output in options.outputs(&job.images) {
             remove_leftovers(output.path);
         }
         let bar = Bar::on_stderr(options.messages.quiet);
@@ -41,7 +41,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
         if done(renderer.film()) == before && !renderer.film().is_empty() && !options.messages.quiet {
             explain_nothing(reason, renderer.state());
         }
-        write(renderer.state(), reason, options)
+        write(renderer.state(), reason, options, &job.images)
     })
 }
 
@@ -66,9 +66,9 @@ pub(crate) fn check(options: &Options) -> Result<(), Failure> {
         let canceller = interrupt::install().map_err(Failure::input)?;
         let job = Job::read(options)?;
         let renderer = job.start(options, canceller, &Bar::on_stderr(true))?;
-        let (report, mut failures) = (renderer.report(), Vec::new());
-        write_texts(renderer.state(), &report, options, |written| failures.extend(written.err()));
-        Failure::all(&failures)?;
+        let (report, mut failures) = (renderer.report(), Failures::default());
+        write_texts(renderer.state(), &report, options, &mut failures);
+        failures.all()?;
         if options.messages.quiet {
             return Ok(());
         }
@@ -83,12 +83,13 @@ fn in_pool(options: &Options, work: impl FnOnce() -> Result<(), Failure> + Send)
     pool.map_err(Failure::input)?.install(work)
 }
 
-/// Everything that a render reads, except the state.
+/// Everything that a render reads, except the state, and the images that it writes.
 struct Job {
     scene: ReadyScene,
     settings: CheckedSettings,
     reference: Option<Image>,
     plan: Option<FrozenPlan>,
+    images: Images,
 }
 
 impl Job {
@@ -103,12 +104,12 @@ impl Job {
         let outputs = options.outputs(&images);
         check_outputs(&outputs, &inputs).map_err(Failure::input)?;
         if !options.messages.quiet {
-            options.explain_idle(&settings);
+            options.explain_idle(&settings, &images);
         }
         let reference =
             options.messages.reference.as_deref().map(read_exr).transpose().map_err(Failure::input)?;
         let plan = options.method.plan.as_deref().map(read_plan).transpose().map_err(Failure::Input)?;
-        Ok(Self { scene, settings, reference, plan })
+        Ok(Self { scene, settings, reference, plan, images })
     }
 
     /// Prepares the render, and goes on from its state if there is one.
@@ -186,37 +187,31 @@ fn read_state(path: &Path) -> Result<Option<State>, OutputError> {
 }
 
 /// Writes the plan and the report, if they were asked for.
-fn write_texts(
-    state: &State,
-    report: &Report,
-    options: &Options,
-    mut attempt: impl FnMut(Result<(), OutputError>),
-) {
+fn write_texts(state: &State, report: &Report, options: &Options, failures: &mut Failures) {
     if let Some(path) = &options.method.save_plan {
-        attempt(write_text(path, &state.identity().frozen_plan().to_ron()));
+        failures.note(write_text(path, &state.identity().frozen_plan().to_ron()));
     }
     if let Some(path) = &options.messages.report {
-        attempt(files::write_report(report, path));
+        failures.note(files::write_report(report, path));
     }
 }
 
 /// Writes everything that was asked for, the state first. What fails does not keep the rest from being
 /// written.
-fn write(state: &State, reason: StopReason, options: &Options) -> Result<(), Failure> {
-    let mut failures = Vec::new();
-    let mut attempt = |written: Result<(), OutputError>| failures.extend(written.err());
+fn write(state: &State, reason: StopReason, options: &Options, images: &Images) -> Result<(), Failure> {
+    let mut failures = Failures::default();
     if let Some(path) = &options.saving.state {
-        attempt(state.save(path));
+        failures.note(state.save(path));
     }
-    let (report, images) = (state.report(), options.images());
-    write_texts(state, &report, options, &mut attempt);
+    let report = state.report();
+    write_texts(state, &report, options, &mut failures);
     // Before the first pixels there is no picture.
     let rendered = !state.film().is_empty();
     let mut hint = None;
     if rendered {
-        hint = images.write_render(state, &report, options.image.look.tones(), &mut attempt);
+        hint = images.write_render(state, &report, options.image.look.tones(), &mut failures);
     }
-    Failure::all(&failures)?;
+    failures.all()?;
     // Whoever asked for a picture is not to take an older one for it.
     if !rendered {
         complain("warning: no picture: the light sub-paths of the first iteration were not done");

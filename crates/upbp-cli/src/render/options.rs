@@ -168,6 +168,7 @@ impl Options {
     pub(crate) fn images(&self) -> Images {
         self.image.output.clone().unwrap_or_else(|| Images::of_scene(&self.scene))
     }
+
     /// The rules that stop the render.
     pub(crate) fn stop(&self) -> Stop {
         let Limits { iterations, time, target_error } = &self.limits;
@@ -229,14 +230,15 @@ impl Options {
         .filter_map(|(role, path)| Some((role, path?)))
     }
 
-    /// Says which options change nothing beside the others: no error, since scripts try sets of techniques.
-    pub(crate) fn explain_idle(&self, settings: &Settings) {
+    /// Says which options change nothing beside the others and the `images` to write: no error, since scripts
+    /// try sets of techniques.
+    pub(crate) fn explain_idle(&self, settings: &Settings, images: &Images) {
         let techniques = settings.techniques.candidates();
         let is_without = |what| format!("techniques `{techniques}` are without {what}");
         let Method { light_paths, beams, fixed_radius, .. } = self.method;
         let any = |has: fn(Technique) -> bool| techniques.iter().any(has);
         let (has_light_paths, has_layers) =
-            (techniques.intersects(TechniqueSet::LIGHT_PATHS), self.images().have_layers());
+            (techniques.intersects(TechniqueSet::LIGHT_PATHS), images.have_layers());
         for (is_idle, option, reason) in [
             (light_paths.is_some() && !has_light_paths, "--light-paths", is_without("light sub-paths")),
             (beams.is_some() && !any(Technique::uses_beams), "--beams", is_without("photon beams")),
