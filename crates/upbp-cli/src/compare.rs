@@ -118,7 +118,7 @@ impl Pair {
 
 /// The divisor of a squared error in the relMSE, as in [`Image::relative_mse`].
 fn scale2(reference: f64) -> f64 {
-    reference * reference + 0.01
+    reference * reference + Image::DARK
 }
 
 /// A picture of relative errors: the colour has the sign of the mean, and a larger error is brighter.

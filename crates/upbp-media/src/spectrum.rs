@@ -21,6 +21,8 @@ impl Spectrum {
     pub const ZERO: Self = Self::splat(0.0);
     /// All channels one.
     pub const ONE: Self = Self::splat(1.0);
+    /// Weights of the channels in [`luminance`](Self::luminance): those of the Rec. 709 primaries.
+    pub const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
     /// Creates a spectrum from its red, green and blue channels.
     #[inline]
@@ -89,7 +91,8 @@ impl Spectrum {
     #[inline]
     #[must_use]
     pub const fn luminance(self) -> f32 {
-        0.2126 * self.r() + 0.7152 * self.g() + 0.0722 * self.b()
+        let [r, g, b] = Self::LUMINANCE;
+        r as f32 * self.r() + g as f32 * self.g() + b as f32 * self.b()
     }
 
     /// Whether no channel is infinite or NaN.
@@ -242,6 +245,7 @@ mod tests {
         assert_eq!((COLOUR[0], COLOUR[1], COLOUR[2]), (COLOUR.r(), COLOUR.g(), COLOUR.b()));
         assert!((COLOUR.mean() + 1.75 / 3.0).abs() < 1e-6);
         assert!((Spectrum::ONE.luminance() - 1.0).abs() < 1e-6);
+        assert_eq!(Spectrum::LUMINANCE.map(|weight| weight as f32), [0.2126, 0.7152, 0.0722]);
         assert_eq!(COLOUR.max(Spectrum::ZERO), Spectrum::new(0.25, 2.0, 0.0));
     }
 

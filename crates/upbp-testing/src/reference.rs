@@ -75,7 +75,7 @@ impl Reference {
     pub fn floor(&self) -> Floor {
         let pixels = self.pixels.iter().flatten().zip(self.errors.iter().flatten());
         let sums = pixels.fold([0.0; 2], |[relative, squares], (r, s)| {
-            [relative + s * s / (r * r + 0.01), squares + s * s]
+            [relative + s * s / (r * r + Image::DARK), squares + s * s]
         });
         let [relative_mse, square] = sums.map(|sum| sum / (3 * self.pixels.len()) as f64);
         Floor { relative_mse, rmse: square.sqrt() }

@@ -17,7 +17,7 @@ use std::ops::AddAssign;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::DARK;
+use super::Image;
 
 /// Reach of the fine windows: 5 × 5 pixels, as few as still tell a spread from noise.
 const REACH: usize = 2;
@@ -427,7 +427,7 @@ impl<'a> Pair<'a> {
                     };
                     let smooth = others + coarse.trust(c) * (fine.others[c] - others);
                     let rest = smooth + fine.own[c] * (value[c] - smooth);
-                    let error = |seen: f64| noise[c] / ((seen + rest).powi(2) + DARK);
+                    let error = |seen: f64| noise[c] / ((seen + rest).powi(2) + Image::DARK);
                     most += error(by_both[c]) / 3.0;
                     to_f32(error(seen[c]))
                 });

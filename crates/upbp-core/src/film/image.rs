@@ -11,14 +11,14 @@ pub struct Image {
     pub pixels: Vec<[f32; 3]>,
 }
 
-/// Added to the square of the converged value in relative errors, so that dark pixels do not count without
-/// bound.
-pub(crate) const DARK: f64 = 0.01;
-
 /// Sides in pixels of the square blocks whose errors count alike, where neighbours may share errors.
 pub(crate) const BLOCK_SIDES: [u32; 4] = [1, 4, 8, 16];
 
 impl Image {
+    /// Added to the square of the converged value in relative errors, so that dark pixels do not count
+    /// without bound.
+    pub const DARK: f64 = 0.01;
+
     /// Whether there are as many pixels as the size says.
     pub(crate) fn is_whole(&self) -> bool {
         u64::from(self.width) * u64::from(self.height) == self.pixels.len() as u64
@@ -28,7 +28,7 @@ impl Image {
     /// another size.
     #[must_use]
     pub fn relative_mse(&self, reference: &Self) -> f64 {
-        self.mean_of(reference, |x, r| (x - r).powi(2) / (r * r + DARK))
+        self.mean_of(reference, |x, r| (x - r).powi(2) / (r * r + Self::DARK))
     }
 
     /// relMSE of the means of square blocks of pixels times their pixels, mean over blocks of 1, 4, 8 and 16
@@ -50,7 +50,7 @@ impl Image {
             let [x, y, r] = [self, other, reference].map(|image| image.block_sums(*side as usize));
             let term = |((x, y), r): (([f64; 4], [f64; 4]), [f64; 4])| {
                 let n = x[3];
-                let squares = (0..3).map(|c| ((x[c] - y[c]) / n).powi(2) / ((r[c] / n).powi(2) + DARK));
+                let squares = (0..3).map(|c| ((x[c] - y[c]) / n).powi(2) / ((r[c] / n).powi(2) + Self::DARK));
                 n * n * squares.sum::<f64>()
             };
             let sum: f64 = x.zip(y).zip(r).map(term).sum();

@@ -20,7 +20,7 @@ use exact_sum::Sum3;
 pub use features::FeatureImages;
 use features::FeatureSums;
 pub use image::Image;
-pub(crate) use image::{BLOCK_SIDES, DARK};
+pub(crate) use image::BLOCK_SIDES;
 pub use iterations::{IterationSet, MAX_ITERATIONS};
 use pixel_sets::{SETS, set_of, stand_ins};
 
@@ -442,8 +442,8 @@ impl Film {
     #[must_use]
     pub fn shares(&self) -> Vec<(Layer, f64)> {
         let luminance = |sum: &Sum3| {
-            let [r, g, b] = exact_sum::values(sum);
-            0.2126 * r + 0.7152 * g + 0.0722 * b
+            let ([r, g, b], weights) = (exact_sum::values(sum), Spectrum::LUMINANCE);
+            weights[0] * r + weights[1] * g + weights[2] * b
         };
         let sums: Vec<f64> =
             self.layers.iter().map(|(_, sums)| sums.iter().map(luminance).sum::<f64>()).collect();

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::film::DARK;
+use crate::film::Image;
 
 /// The largest part that a sample may have in the whole, where 67 or more have any ([`largest`]).
 const LARGEST_PART: f64 = 0.03;
@@ -65,7 +65,7 @@ impl Brightness {
 
     /// The relMSE of a picture whose mean square of relative errors is one, everywhere alike.
     pub(super) fn relative_mse(&self) -> f64 {
-        let of_cell = |cell: &DVec3| ((cell * cell + self.dark) / (cell * cell + DARK)).element_sum() / 3.0;
+        let of_cell = |cell: &DVec3| ((cell * cell + self.dark) / (cell * cell + Image::DARK)).element_sum() / 3.0;
         self.cells.iter().map(of_cell).sum::<f64>() / self.cells.len() as f64
     }
 }
@@ -127,7 +127,7 @@ mod tests {
             for (cell, factor) in cells.iter().zip(brightness.factors()) {
                 let error = 0.1 / (3.0_f64.sqrt() * factor.x);
                 relative += 3.0 * (error * factor.x).powi(2) / 100.0;
-                expected += error.powi(2) / (cell.x * cell.x + DARK) / 100.0;
+                expected += error.powi(2) / (cell.x * cell.x + Image::DARK) / 100.0;
             }
             let found = relative * brightness.relative_mse();
             assert!((found / expected - 1.0).abs() < 1e-9, "{mean}: {found}, expected {expected}");
