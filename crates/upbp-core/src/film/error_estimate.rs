@@ -47,9 +47,9 @@ pub(crate) struct HalfImage<'a> {
     /// Mean radiance of each pixel.
     pub(crate) image: &'a [[f32; 3]],
     /// The part of the light that the camera sees directly, or by mirrors and through glass only: then it is
-    /// no sign of an error that a pixel is much brighter than its neighbours. `None` where it is not known.
-    pub(crate) seen: Option<&'a [[f32; 3]]>,
-    /// Number of iterations.
+    /// no sign of an error that a pixel is much brighter than its neighbours.
+    pub(crate) seen: &'a [[f32; 3]],
+    /// Number of iterations, at least one.
     pub(crate) iterations: u64,
 }
 
@@ -88,7 +88,7 @@ pub enum Doubt {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMap {
     /// Estimated `(value − converged)² / (converged² + 0.01)` by channel; their mean is the estimated
-    /// relMSE. Infinite with an empty half.
+    /// relMSE.
     pub relative: Vec<[f32; 3]>,
     /// Mean over the channels, if light that one half only has seen was there by luck.
     upper: Vec<f32>,
@@ -104,15 +104,15 @@ impl ErrorMap {
     /// Estimates the error of the mean of both halves.
     ///
     /// # Panics
-    /// If the halves are of different sizes, or not of whole rows of `width`.
+    /// If the halves are of different sizes, or not of whole rows of `width`, or one has no iterations.
     pub(crate) fn new(width: usize, halves: [HalfImage<'_>; 2]) -> Self {
         let pair = Pair::new(width, halves);
         let iterations = halves[0].iterations.saturating_add(halves[1].iterations);
         let black = halves.iter().all(|half| half.image.iter().all(|pixel| *pixel == [0.0; 3]));
         let pixels = halves[0].image.len();
-        let mut relative = vec![[f32::INFINITY; 3]; pixels];
-        let mut upper = vec![f32::INFINITY; pixels];
-        if pixels > 0 && halves.iter().all(|half| half.iterations > 0) {
+        let mut relative = vec![[0.0; 3]; pixels];
+        let mut upper = vec![0.0; pixels];
+        if pixels > 0 {
             let blocks: Vec<Vec<Block>> =
                 (0..pair.height.div_ceil(BLOCK)).into_par_iter().map(|row| pair.blocks(row)).collect();
             let rows = relative.par_chunks_mut(BLOCK * width).zip(upper.par_chunks_mut(BLOCK * width));
@@ -290,21 +290,21 @@ struct Block {
 impl HalfImage<'_> {
     /// Light that is not seen directly.
     fn rest(&self, i: usize) -> [f32; 3] {
-        let seen = self.seen.map_or([0.0; 3], |seen| seen[i]);
-        std::array::from_fn(|c| (self.image[i][c] - seen[c]).max(0.0))
+        std::array::from_fn(|c| (self.image[i][c] - self.seen[i][c]).max(0.0))
     }
 }
 
 impl<'a> Pair<'a> {
     fn new(width: usize, halves: [HalfImage<'a>; 2]) -> Self {
         let pixels = halves[0].image.len();
-        for image in halves.iter().flat_map(|half| [Some(half.image), half.seen]).flatten() {
+        for image in halves.iter().flat_map(|half| [half.image, half.seen]) {
             assert_eq!(image.len(), pixels, "the halves have one size");
         }
         assert!(pixels.checked_rem(width).unwrap_or(pixels) == 0, "{pixels} pixels in rows of {width}");
+        assert!(halves.iter().all(|half| half.iterations > 0), "there are two halves");
         let [a, b] = halves.map(|half| half.iterations as f64);
-        let sum = (a + b).max(1.0);
-        Self { width, height: pixels.checked_div(width).unwrap_or(0), halves, parts: [a / sum, b / sum] }
+        let parts = [a / (a + b), b / (a + b)];
+        Self { width, height: pixels.checked_div(width).unwrap_or(0), halves, parts }
     }
 
     /// The mean of both halves.
@@ -315,7 +315,7 @@ impl<'a> Pair<'a> {
 
     /// Light seen directly: the mean, and what both halves have of it.
     fn seen(&self, i: usize) -> [[f64; 3]; 2] {
-        let of = |half: &HalfImage<'_>| half.seen.map_or([0.0; 3], |seen| seen[i]);
+        let of = |half: &HalfImage<'_>| half.seen[i];
         let [a, b] = self.halves.each_ref().map(of);
         [self.mean(of), std::array::from_fn(|c| f64::from(a[c].min(b[c])))]
     }
@@ -328,9 +328,6 @@ impl<'a> Pair<'a> {
     /// The variance of the mean.
     fn noise(&self, i: usize) -> [f64; 3] {
         let [a, b] = self.halves.map(|half| half.image[i]);
-        if self.parts.contains(&0.0) {
-            return [f64::INFINITY; 3];
-        }
         std::array::from_fn(|c| self.scaled(a[c], b[c]).powi(2))
     }
 

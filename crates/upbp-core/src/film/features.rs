@@ -114,7 +114,7 @@ mod tests {
         let add = |film: &mut Film, i: usize| {
             film.add_part(i as u64, 0..pixel_sets::SETS, &[Pixel::BLACK; 2], &iterations[i]);
         };
-        let film = || Film::new(RECT, TechniqueSet::BPT).with_features();
+        let film = || Film::new(RECT, TechniqueSet::BPT, true);
         let (mut whole, mut halves) = (film(), [film(), film()]);
         for i in 0..4 {
             add(&mut whole, i);
@@ -129,6 +129,6 @@ mod tests {
         let [first, mut second] = halves;
         second.merge(&first);
         assert_eq!(second, whole);
-        assert_eq!(Film::new(RECT, TechniqueSet::BPT).features(), None);
+        assert_eq!(Film::new(RECT, TechniqueSet::BPT, false).features(), None);
     }
 }

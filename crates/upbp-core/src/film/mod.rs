@@ -8,6 +8,7 @@ mod iterations;
 pub(crate) mod pixel_sets;
 
 use std::collections::BTreeMap;
+use std::num::NonZeroU8;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -80,38 +81,40 @@ pub struct Film {
     /// Sums of what the camera sees first, if they are kept.
     features: Option<FeatureSums>,
     iterations: IterationSet,
-    /// Iterations that are there in part, with the number of [sets of pixels](pixel_sets) that are.
-    parts: BTreeMap<u64, u32>,
+    /// Iterations that are there in part.
+    parts: Parts,
 }
 
-/// Sums of nothing, one per pixel.
-fn black(rect: PixelRect) -> Vec<Sum3> {
-    vec![exact_sum::ZERO; pixels(rect)]
-}
+/// Numbers of [sets of pixels](pixel_sets) that are there of iterations: at least one, and not all 256.
+pub(crate) type Parts = BTreeMap<u64, NonZeroU8>;
 
 const fn pixels(rect: PixelRect) -> usize {
     rect.pixels() as usize
 }
 
 impl Film {
-    /// A black film for the layers of `techniques`.
-    pub(crate) fn new(rect: PixelRect, techniques: TechniqueSet) -> Self {
-        let layers = Self::layers_of(techniques).into_iter().map(|layer| (layer, black(rect))).collect();
-        Self {
-            rect,
-            layers,
-            even: black(rect),
-            seen: [black(rect), black(rect)],
-            squares: black(rect),
-            features: None,
-            iterations: IterationSet::default(),
-            parts: BTreeMap::new(),
-        }
+    /// A black film for the layers of `techniques`, and for [features](FeatureImages) if they are to be kept.
+    pub(crate) fn new(rect: PixelRect, techniques: TechniqueSet, features: bool) -> Self {
+        Self::of(rect, techniques, features, || vec![exact_sum::ZERO; pixels(rect)])
     }
 
-    /// A film that keeps [features](FeatureImages) as well.
-    pub(crate) fn with_features(self) -> Self {
-        Self { features: Some(FeatureSums::of(|| black(self.rect))), ..self }
+    /// A film of such lists of sums.
+    fn of(
+        rect: PixelRect,
+        techniques: TechniqueSet,
+        features: bool,
+        list: impl Fn() -> Vec<Sum3> + Copy,
+    ) -> Self {
+        Self {
+            rect,
+            layers: Self::layers_of(techniques).into_iter().map(|layer| (layer, list())).collect(),
+            even: list(),
+            seen: [list(), list()],
+            squares: list(),
+            features: features.then(|| FeatureSums::of(list)),
+            iterations: IterationSet::default(),
+            parts: Parts::new(),
+        }
     }
 
     /// The layers that `techniques` contribute to, in order.
@@ -168,14 +171,15 @@ impl Film {
     }
 
     /// Iterations of which only some of the 256 sets of pixels are there, with the number of these.
-    pub(crate) const fn parts(&self) -> &BTreeMap<u64, u32> {
+    pub(crate) const fn parts(&self) -> &Parts {
         &self.parts
     }
 
     /// Iterations of which only some of the pixels are there, with their share.
     #[must_use]
     pub fn begun(&self) -> BTreeMap<u64, f64> {
-        self.parts.iter().map(|(iteration, sets)| (*iteration, f64::from(*sets) / f64::from(SETS))).collect()
+        let share = |sets: &NonZeroU8| f64::from(sets.get()) / f64::from(SETS);
+        self.parts.iter().map(|(iteration, sets)| (*iteration, share(sets))).collect()
     }
 
     /// Number of pixels.
@@ -200,7 +204,7 @@ impl Film {
         let done = if self.iterations.contains(iteration) {
             SETS
         } else {
-            self.parts.get(&iteration).copied().unwrap_or(0)
+            self.parts.get(&iteration).map_or(0, |sets| sets.get().into())
         };
         done..SETS
     }
@@ -244,11 +248,12 @@ impl Film {
         if let Some(sums) = &mut self.features {
             sums.add(width, &sets, features);
         }
-        if sets.end == SETS {
+        if let Ok(done) = u8::try_from(sets.end) {
+            self.parts.extend(NonZeroU8::new(done).map(|done| (iteration, done)));
+        } else {
+            // All 256.
             self.parts.remove(&iteration);
             self.iterations.insert(iteration);
-        } else {
-            self.parts.insert(iteration, sets.end);
         }
         dropped
     }
@@ -311,32 +316,22 @@ impl Film {
         techniques: TechniqueSet,
         features: bool,
         iterations: IterationSet,
-        parts: BTreeMap<u64, u32>,
+        parts: Parts,
     ) -> Self {
-        let layers = Self::layers_of(techniques).into_iter().map(|layer| (layer, Vec::new())).collect();
-        Self {
-            rect,
-            layers,
-            even: Vec::new(),
-            seen: Default::default(),
-            squares: Vec::new(),
-            features: features.then(|| FeatureSums::of(Vec::new)),
-            iterations,
-            parts,
-        }
+        Self { iterations, parts, ..Self::of(rect, techniques, features, Vec::new) }
     }
 
     /// The mean of all iterations, all layers together: radiance in W m⁻² sr⁻¹, linear Rec. 709.
     #[must_use]
     pub fn image(&self) -> Image {
-        self.collect(|i, [even, odd]| self.total(i).map(|v| v / (even + odd)))
+        self.picture(|i, [even, odd]| self.total(i).map(|v| v / (even + odd)))
     }
 
     /// The mean of one layer, `None` if it is not kept.
     #[must_use]
     pub fn layer(&self, layer: Layer) -> Option<Image> {
         let (_, sums) = self.layers.iter().find(|(own, _)| *own == layer)?;
-        Some(self.collect(|i, [even, odd]| exact_sum::values(&sums[i]).map(|v| v / (even + odd))))
+        Some(self.picture(|i, [even, odd]| exact_sum::values(&sums[i]).map(|v| v / (even + odd))))
     }
 
     /// Albedo, normal and depth of what the camera sees first, `None` if they are not kept.
@@ -344,14 +339,9 @@ impl Film {
     pub fn features(&self) -> Option<FeatureImages> {
         let sums = self.features.as_ref()?;
         Some(FeatureImages {
-            albedo: self.collect(|i, [even, odd]| sums.albedo(i, even + odd)),
-            normal: self.collect(|i, [even, odd]| sums.normal(i, even + odd)),
-            depth: self
-                .collect(|i, _| [sums.depth(i); 3])
-                .pixels
-                .into_iter()
-                .map(|[depth, ..]| depth)
-                .collect(),
+            albedo: self.picture(|i, [even, odd]| sums.albedo(i, even + odd)),
+            normal: self.picture(|i, [even, odd]| sums.normal(i, even + odd)),
+            depth: self.collect(|i, _| sums.depth(i) as f32),
         })
     }
 
@@ -372,8 +362,8 @@ impl Film {
         if self.counts().as_flattened().contains(&0.0) {
             return None;
         }
-        let even = self.collect(|i, [even, _]| exact_sum::values(&self.even[i]).map(|v| v / even));
-        let odd = self.collect(|i, [_, odd]| {
+        let even = self.picture(|i, [even, _]| exact_sum::values(&self.even[i]).map(|v| v / even));
+        let odd = self.picture(|i, [_, odd]| {
             let (total, even) = (self.total(i), exact_sum::values(&self.even[i]));
             // The layers and their total are cut off at different digits: a remainder as small as that may be
             // of either sign, and is no light that the odd iterations have seen.
@@ -390,7 +380,7 @@ impl Film {
     /// does not.
     #[must_use]
     pub fn variance(&self) -> Image {
-        self.collect(|i, [even, odd]| {
+        self.picture(|i, [even, odd]| {
             let n = even + odd;
             if n < 2.0 {
                 return [f64::INFINITY; 3];
@@ -408,14 +398,15 @@ impl Film {
     #[must_use]
     pub fn error_map(&self) -> Option<ErrorMap> {
         let halves = self.halves()?;
-        // Those of the last set: other pixels may have more, of parts.
+        // Those of the last set, which are some where there are two halves: other pixels may have more, of
+        // parts.
         let iterations = self.counts()[SETS as usize - 1].map(|count| count as u64);
         let seen = [0, 1]
-            .map(|h| self.collect(|i, counts| exact_sum::values(&self.seen[h][i]).map(|v| v / counts[h])));
+            .map(|h| self.picture(|i, counts| exact_sum::values(&self.seen[h][i]).map(|v| v / counts[h])));
         let half = |h: usize| HalfImage {
             image: &halves[h].pixels,
-            seen: Some(&seen[h].pixels),
-            iterations: iterations[h].max(1),
+            seen: &seen[h].pixels,
+            iterations: iterations[h],
         };
         Some(ErrorMap::new(self.rect.width as usize, [half(0), half(1)]))
     }
@@ -465,8 +456,8 @@ impl Film {
         });
         // Those of which just the first sets are done, by the last of these.
         let mut counts = vec![[0; 2]; SETS as usize];
-        for (iteration, done) in self.parts.iter().filter(|(_, done)| **done > 0) {
-            counts[(*done).min(SETS) as usize - 1][half(*iteration).0] += 1;
+        for (iteration, done) in &self.parts {
+            counts[usize::from(done.get()) - 1][half(*iteration).0] += 1;
         }
         let mut all = whole;
         for counts in counts.iter_mut().rev() {
@@ -476,9 +467,15 @@ impl Film {
         counts.into_iter().map(|counts| counts.map(|count| count as f64)).collect()
     }
 
-    /// Picture of what `value` says of a pixel by its index and the counts of its halves; black while there
-    /// is nothing.
-    fn collect(&self, value: impl Fn(usize, [f64; 2]) -> [f64; 3] + Sync) -> Image {
+    /// Picture of what `value` says of a pixel, in the way of [`collect`](Self::collect).
+    fn picture(&self, value: impl Fn(usize, [f64; 2]) -> [f64; 3] + Sync) -> Image {
+        let pixels = self.collect(|i, counts| value(i, counts).map(|v| v as f32));
+        Image { width: self.rect.width, height: self.rect.height, pixels }
+    }
+
+    /// Values of all pixels, row by row, by the index of a pixel and the counts of its halves; the default,
+    /// such as black, while there is nothing.
+    fn collect<T: Default + Send>(&self, value: impl Fn(usize, [f64; 2]) -> T + Sync) -> Vec<T> {
         let (counts, width) = (self.counts(), self.rect.width as usize);
         let place = |i: usize| (i % width, i / width);
         let count = |(x, y)| counts[set_of(x, y) as usize];
@@ -486,10 +483,9 @@ impl Film {
         let pixel = |i| {
             let own = place(i);
             let shown = std::iter::once(own).chain(stand_ins(own.0, own.1)).find(has_samples);
-            shown.map_or([0.0; 3], |(x, y)| value(y * width + x, count((x, y))).map(|v| v as f32))
+            shown.map_or_else(T::default, |(x, y)| value(y * width + x, count((x, y))))
         };
-        let pixels = (0..self.even.len()).into_par_iter().with_min_len(1024).map(pixel).collect();
-        Image { width: self.rect.width, height: self.rect.height, pixels }
+        (0..self.even.len()).into_par_iter().with_min_len(1024).map(pixel).collect()
     }
 }
 

@@ -36,7 +36,7 @@ fn shared_errors_count_by_the_pixels_that_share_them() {
     // The halves of a film differ in the same ways.
     let rect = PixelRect { x: 0, y: 0, width: 32, height: 32 };
     let ratio = |value: &dyn Fn(u32) -> f32| {
-        let mut film = Film::new(rect, TechniqueSet::BPT);
+        let mut film = Film::new(rect, TechniqueSet::BPT, false);
         let flat: Vec<Pixel> = (0..32 * 32).map(|_| pixel(1.0, 0.0)).collect();
         film.add(0, &flat);
         let noisy: Vec<Pixel> = (0..32 * 32).map(|i| pixel(value(i), 0.0)).collect();
@@ -50,7 +50,7 @@ fn shared_errors_count_by_the_pixels_that_share_them() {
 
 #[test]
 fn means_and_halves_are_those_of_the_iterations() {
-    let mut film = Film::new(RECT, TechniqueSet::STANDARD);
+    let mut film = Film::new(RECT, TechniqueSet::STANDARD, false);
     assert!(film.is_empty() && film.estimated_error().relative_mse.is_infinite());
     for (i, value) in [(0, 1.0), (7, 2.0), (3, 6.0)] {
         assert_eq!(film.add(i, &[pixel(value, 1.0), pixel(0.0, 0.0)]), 0);
@@ -72,7 +72,7 @@ fn means_and_halves_are_those_of_the_iterations() {
 /// Sums of layers and of the whole are cut off at different digits: that is no light.
 #[test]
 fn a_half_has_no_light_that_the_other_alone_has_seen() {
-    let mut film = Film::new(RECT, TechniqueSet::STANDARD);
+    let mut film = Film::new(RECT, TechniqueSet::STANDARD, false);
     film.add(0, &[pixel(5.0, 5e-5), pixel(5.0, 5e-5)]);
     film.add(1, &[Pixel::BLACK, pixel(0.0, 1e-6)]);
     let [even, odd] = film.halves().unwrap();
@@ -86,7 +86,7 @@ fn a_half_has_no_light_that_the_other_alone_has_seen() {
 fn parts_add_up_to_the_whole() {
     let rect = PixelRect { x: 1, y: 2, width: 19, height: 17 };
     let iteration = |i: u32| -> Vec<Pixel> { (0..19 * 17).map(|p| pixel((p * i) as f32, 0.5)).collect() };
-    let mut whole = Film::new(rect, TechniqueSet::STANDARD);
+    let mut whole = Film::new(rect, TechniqueSet::STANDARD, false);
     let mut parted = whole.clone();
     for i in [4, 7] {
         whole.add(i.into(), &iteration(i));
@@ -98,7 +98,7 @@ fn parts_add_up_to_the_whole() {
     assert_eq!(coarse.pixels[18], [4.0 * 16.0 + 0.5; 3]);
     assert_eq!((parted.is_empty(), parted.iterations(), parted.missing(4)), (false, 0, 1..SETS));
     parted.add_part(7, 0..9, &iteration(7), &[]);
-    let mut other = Film::new(rect, TechniqueSet::BPT);
+    let mut other = Film::new(rect, TechniqueSet::BPT, false);
     other.add_part(7, 0..2, &iteration(7), &[]);
     assert_eq!(parted.overlap(&other), Some(7..8));
     parted.add_part(4, 1..200, &iteration(4), &[]);
@@ -117,15 +117,15 @@ fn parts_add_up_to_the_whole() {
 fn parts_are_merged_into_their_halves() {
     let rect = PixelRect { x: 0, y: 0, width: 16, height: 16 };
     let iteration = |value: f32| vec![pixel(value, 0.0); 256];
-    let mut film = Film::new(rect, TechniqueSet::BPT);
+    let mut film = Film::new(rect, TechniqueSet::BPT, false);
     // Two of four are in the odd half; a part of a fifth is, too.
     for (index, value) in [(1, 2.0), (3, 4.0), (5, 9.0), (6, 1.0)] {
         film.add(index, &iteration(value));
     }
-    let mut part = Film::new(rect, TechniqueSet::BPT);
+    let mut part = Film::new(rect, TechniqueSet::BPT, false);
     part.add_part(9, 0..64, &iteration(25.0), &[]);
     film.merge(&part);
-    assert_eq!(film.parts().iter().collect::<Vec<_>>(), [(&9, &64)]);
+    assert_eq!(film.parts().iter().collect::<Vec<_>>(), [(&9, &NonZeroU8::new(64).unwrap())]);
     assert_eq!((film.iterations(), film.missing(9)), (4, 64..SETS));
     let [even, odd] = film.halves().unwrap();
     let (x, y) = (0..256).map(|i| (i % 16, i / 16)).find(|(x, y)| set_of(*x, *y) == 64).unwrap();
@@ -140,7 +140,7 @@ fn parts_are_merged_into_their_halves() {
 
 #[test]
 fn small_additions_do_not_stall() {
-    let mut film = Film::new(PixelRect { x: 0, y: 0, width: 1, height: 1 }, TechniqueSet::BPT);
+    let mut film = Film::new(PixelRect { x: 0, y: 0, width: 1, height: 1 }, TechniqueSet::BPT, false);
     for i in 0..200_000 {
         film.add(i, &[pixel(0.1, 0.0)]);
     }
@@ -164,7 +164,7 @@ fn millions_of_splats_in_one_pixel_lose_nothing() {
 
 #[test]
 fn what_is_no_radiance_is_left_out_and_counted() {
-    let mut film = Film::new(RECT, TechniqueSet::STANDARD);
+    let mut film = Film::new(RECT, TechniqueSet::STANDARD, false);
     assert_eq!(film.add(0, &[pixel(f32::INFINITY, 1.0), pixel(f32::NAN, -1.0)]), 9);
     assert_eq!(film.image().pixels, [[1.0; 3], [0.0; 3]]);
 }

@@ -98,8 +98,7 @@ pub(super) fn prepare<'a, S: Scene>(
         expected_bytes: choice.room.expected_bytes::<S>(&choice.plan, &choice.statistics),
         ..Record::default()
     };
-    let film = Film::new(rect, choice.plan.techniques);
-    let film = if identity.settings.features { film.with_features() } else { film };
+    let film = Film::new(rect, choice.plan.techniques, identity.settings.features);
     let statistics = choice.statistics;
     let engine: Box<dyn Engine + 'a> = if choice.plan.lanes.is_some() {
         Box::new(SceneEngine::<S, [f64; 3]> { scene: prepared, statistics, map: LightMap::empty() })

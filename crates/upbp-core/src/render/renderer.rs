@@ -471,7 +471,7 @@ mod tests {
     #[test]
     fn begun_iterations_count_in_the_range_alone() {
         let rect = PixelRect { x: 0, y: 0, width: 2, height: 1 };
-        let mut film = Film::new(rect, TechniqueSet::BPT);
+        let mut film = Film::new(rect, TechniqueSet::BPT, false);
         let mut add = |iteration, end| film.add_part(iteration, 0..end, &[Pixel::BLACK; 2], &[]);
         add(3, SETS / 2);
         add(10, SETS);

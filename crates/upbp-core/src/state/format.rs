@@ -12,7 +12,6 @@
 //! to be good, and in its place, before anything in it is believed. Memory for the film grows as blocks
 //! arrive, so a file cannot ask for more than some fifty times its own length.
 
-use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 
 use rayon::prelude::*;
@@ -23,8 +22,7 @@ use super::{Identity, Record, State};
 use crate::error::StateError;
 use crate::film::Film;
 use crate::film::exact_sum::{self, MAX_ENCODED, Sum3};
-use crate::film::pixel_sets::SETS;
-use crate::film::{IterationSet, MAX_ITERATIONS};
+use crate::film::{IterationSet, MAX_ITERATIONS, Parts};
 
 /// First bytes of every state file.
 pub(crate) const MAGIC: [u8; 8] = *b"UPBPSTAT";
@@ -41,8 +39,8 @@ const MAX_HEADER: u64 = 1 << 28;
 struct Header {
     identity: Identity,
     iterations: IterationSet,
-    /// Iterations that are there in part, with the number of sets of pixels that are.
-    begun: BTreeMap<u64, u32>,
+    /// Iterations that are there in part.
+    begun: Parts,
     record: Record,
 }
 
@@ -136,9 +134,9 @@ impl State {
             return Err(damaged("header", &"the crop is not inside of the film"));
         }
         let numbers = iterations.len() + begun.len() as u64;
-        for (iteration, done) in &begun {
-            if *iteration >= MAX_ITERATIONS || iterations.contains(*iteration) || !(1..SETS).contains(done) {
-                return Err(damaged("header", &format!("no part of an iteration: {iteration}, {done} sets")));
+        for iteration in begun.keys() {
+            if *iteration >= MAX_ITERATIONS || iterations.contains(*iteration) {
+                return Err(damaged("header", &format!("no part of an iteration: {iteration}")));
             }
         }
         let mut film =
