@@ -20,8 +20,8 @@ pub use error_estimate::{Doubt, ErrorEstimate, ErrorMap};
 use exact_sum::Sum3;
 pub use features::FeatureImages;
 use features::FeatureSums;
-pub use image::Image;
 pub(crate) use image::BLOCK_SIDES;
+pub use image::Image;
 pub use iterations::{IterationSet, MAX_ITERATIONS};
 use pixel_sets::{SETS, set_of, stand_ins};
 

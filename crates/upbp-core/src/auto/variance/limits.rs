@@ -65,7 +65,8 @@ impl Brightness {
 
     /// The relMSE of a picture whose mean square of relative errors is one, everywhere alike.
     pub(super) fn relative_mse(&self) -> f64 {
-        let of_cell = |cell: &DVec3| ((cell * cell + self.dark) / (cell * cell + Image::DARK)).element_sum() / 3.0;
+        let of_cell =
+            |cell: &DVec3| ((cell * cell + self.dark) / (cell * cell + Image::DARK)).element_sum() / 3.0;
         self.cells.iter().map(of_cell).sum::<f64>() / self.cells.len() as f64
     }
 }
