@@ -37,8 +37,9 @@ pub(super) struct Candidates {
     /// The full plan: all techniques, a light sub-path per pixel if there is room. It is what runs if there
     /// is no time for a choice.
     pub(super) usual: Plan,
-    /// The full plan with the widest radii: what pilot renders run, since they can tell what less of
-    /// anything, or more light sub-paths, would do.
+    /// The full plan with the widest radii, [wider beams](WIDER_BEAMS) and a roulette that any other can be
+    /// told from: pilot renders run it, since they can tell what less of anything, or more light sub-paths,
+    /// would do.
     pub(super) of_pilot: Plan,
     /// Techniques that stay on: some paths may have no other.
     always: TechniqueSet,

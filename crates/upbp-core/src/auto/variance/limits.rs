@@ -44,7 +44,7 @@ pub(super) struct Brightness {
     /// Of each cell: what is around, or half of what is steady if that is more. Half, since noise of an even
     /// picture is not brightness.
     cells: Vec<DVec3>,
-    /// What is added to its square.
+    /// Added to their squares, so that errors of black cells count.
     dark: f64,
 }
 
